@@ -65,7 +65,8 @@ static void build_plan(ath_branch *branches, int32_t branch_count, int32_t verti
         REQUIRE(count <= 2 * (int64_t)ATH_PIECE_VERTICES * vertices, "bases are bounded by the vertices");
         double *bases = fuzz_memory((size_t)count * sizeof *bases, 0xa5);
         double *work = fuzz_memory(ATH_BASIS_WORK * sizeof *work, 0xa5);
-        ath_basis_fill(pieces, plan.piece_count, 0, INT32_MAX, rest, 0, work, bases);
+        int32_t next = 0;
+        ath_basis_fill(pieces, &next, plan.piece_count, 0, INT32_MAX, rest, 0, work, bases, 0);
         ath_plan_nodes(&plan, nodes);
         free(work);
         free(bases);

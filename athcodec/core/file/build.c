@@ -30,28 +30,41 @@ size_t ath_build_size(const ath_file *file)
 }
 
 /* Fills the bases that levels up to one take: the picture of a coarse level does not wait for all of them. */
-static void build_to(ath_file *file, int32_t level)
+static int build_to(ath_file *file, int32_t level, int32_t *cost)
 {
-    if (level <= file->built_level) return;
-    if (file->bases_count > 0)
-        ath_basis_fill(file->pieces, file->plan.piece_count, file->built_level + 1, level, file->rest, 0,
-                       (double *)file->scratch, file->bases);
-    file->built_level = level;
+    int result = ATH_OK;
+    while (result == ATH_OK && file->built_level < level) {
+        int32_t next = file->built_level + 1;
+        if (file->bases_count > 0)
+            result = ath_basis_fill(file->pieces, &file->next_piece, file->plan.piece_count, next, next, file->rest, 0,
+                                    (double *)file->scratch, file->bases, cost);
+        if (result == ATH_OK) file->built_level = next;
+    }
+    return result;
+}
+
+int ath_build_within(ath_file *file, void *memory, size_t memory_bytes, int32_t *cost)
+{
+    ath_file counted = *file;
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    if (!file->bases) {
+        if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
+        carve_build(file, (uint8_t *)memory);
+        file->plan.bases = file->bases;
+        file->built_level = -1;
+    }
+    for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
+        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1), frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
+        if (!file->waves[kind][frames]) continue;
+        if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
+        ath_waves(frames, kind, file->waves[kind][frames]);
+    }
+    return build_to(file, 0, cost);
 }
 
 int ath_build(ath_file *file, void *memory, size_t memory_bytes)
 {
-    ath_file counted = *file;
-    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
-    carve_build(file, (uint8_t *)memory);
-    file->plan.bases = file->bases;
-    file->built_level = -1;
-    build_to(file, 0);
-    for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
-        for (int32_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
-            if (file->waves[kind][frames]) ath_waves(frames, kind, file->waves[kind][frames]);
-    return ATH_OK;
+    return ath_build_within(file, memory, memory_bytes, 0);
 }
 
 const double *ath_file_waves(const ath_file *file, int32_t segment)
@@ -135,13 +148,37 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
         int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
         if (result != ATH_OK) return result;
         layer->rest_known = 1;
-        if (!layer->plan.bases) ath_take(&counted, layer->bases_count * sizeof(double));
+        if (!layer->bases) ath_take(&counted, layer->bases_count * sizeof(double));
     }
     *memory_bytes = ath_size_or_most(counted.used);
     return ATH_OK;
 }
 
-int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
+static int build_layer(ath_file *file, int32_t q, int32_t *cost)
+{
+    ath_layer *layer = &file->layers[q];
+    int result = ATH_OK;
+    if (layer->plan.bases) return ATH_OK;
+    if (layer->bases_count > 0) {
+        result = ath_basis_fill(layer->pieces, &file->next_piece, layer->plan.piece_count, 0, INT32_MAX, layer->rest,
+                                known_bases(file, q), (double *)file->scratch, layer->bases, cost);
+        if (result == ATH_OK) layer->plan.bases = layer->bases;
+    } else if (!ath_spend(cost, layer->plan.piece_count)) {
+        result = ATH_MORE;
+    } else {
+        const ath_piece *before = plan_before(file, q)->pieces;
+        for (int32_t p = 0; p < layer->plan.piece_count; p++) {
+            layer->pieces[p].modes = before[p].modes;
+            layer->pieces[p].basis = before[p].basis;
+            layer->pieces[p].rank = before[p].rank;
+            layer->pieces[p].tip_weight = before[p].tip_weight;
+        }
+        layer->plan.bases = plan_before(file, q)->bases;
+    }
+    return result;
+}
+
+int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory_bytes, int32_t *cost)
 {
     ath_arena arena = {(uint8_t *)memory, 0};
     size_t needed;
@@ -149,25 +186,17 @@ int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
     if (result != ATH_OK) return result;
     if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
     level = ath_file_stage(file, level);
-    build_to(file, level);
-    for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
-        ath_layer *layer = &file->layers[q];
-        if (layer->plan.bases) continue;
-        double *bases = (double *)ath_take(&arena, layer->bases_count * sizeof(double));
-        if (layer->bases_count > 0) {
-            ath_basis_fill(layer->pieces, layer->plan.piece_count, 0, INT32_MAX, layer->rest, known_bases(file, q),
-                           (double *)file->scratch, bases);
-            layer->plan.bases = bases;
-        } else {
-            const ath_piece *before = plan_before(file, q)->pieces;
-            for (int32_t p = 0; p < layer->plan.piece_count; p++) {
-                layer->pieces[p].modes = before[p].modes;
-                layer->pieces[p].basis = before[p].basis;
-                layer->pieces[p].rank = before[p].rank;
-                layer->pieces[p].tip_weight = before[p].tip_weight;
-            }
-            layer->plan.bases = plan_before(file, q)->bases;
-        }
-    }
-    return ATH_OK;
+    int32_t layers = level > 0 ? ath_layer_of(file, level) + 1 : 0;
+    for (int32_t q = file->first_layer; q < layers; q++)
+        if (!file->layers[q].bases)
+            file->layers[q].bases = (double *)ath_take(&arena, file->layers[q].bases_count * sizeof(double));
+    result = ath_build_within(file, 0, 0, cost);
+    if (result == ATH_OK) result = build_to(file, level, cost);
+    for (int32_t q = file->first_layer; result == ATH_OK && q < layers; q++) result = build_layer(file, q, cost);
+    return result;
+}
+
+int ath_refine(ath_file *file, int32_t level, void *memory, size_t memory_bytes)
+{
+    return ath_refine_within(file, level, memory, memory_bytes, 0);
 }

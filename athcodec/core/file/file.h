@@ -14,6 +14,7 @@ typedef struct {
     ath_node *nodes; /* first layer only */
     double *rest;    /* null: it has the rest pose of the layer before */
     int32_t *rest_steps;
+    double *bases;        /* plan.bases once they are filled */
     uint64_t bases_count; /* 0: it has the bases of the layer before, or they are not known yet */
     int32_t rest_known;
 } ath_layer;
@@ -49,6 +50,8 @@ struct ath_file {
         *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* by kind and number of frames; null: no segment needs them */
     uint64_t bases_count;
     int32_t built_level;       /* level up to which `bases` are filled; -1: none */
+    int32_t next_piece;        /* where filling the bases that come next goes on */
+    int32_t next_waves;        /* the same of waves, by kind and number of frames */
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
     int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */

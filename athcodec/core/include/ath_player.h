@@ -226,7 +226,10 @@ struct ath_player {
     uint64_t calls, prepared;
     int32_t budget, left; /* of each call, and what is left of it in this one */
     int32_t dropped;      /* jobs that were dropped for others since one was done */
-    int32_t deepest;      /* deepest level that is built */
+    int32_t deepest;      /* deepest level of the file */
+    int32_t built;        /* deepest level whose bases are built */
+    size_t *sizes;        /* bytes of a segment at each level */
+    int32_t refused;      /* the error that keeps a level from being built, else ATH_OK */
     int32_t track_count;
     ath_player_track tracks[ATH_BLEND_CLIPS];
     void *blending;  /* scratch memory of blends; null: no blend was shown */
@@ -282,19 +285,22 @@ static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entr
 
 /* ---- opening ---- */
 
-/* Builds what the segments share at each level, as far as its bytes are there. */
-static int ath_player_refine(ath_player *p)
+/* Builds what the segments share up to a level, for a budget. Threads that prepare levels above do not see it. */
+static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
 {
-    for (int32_t level = 0; level < p->info.level_count; level++) {
+    while (p->built < level) {
+        int32_t left = *budget;
         size_t size;
-        int result = ath_refine_size(p->file, level, &size, &p->fault);
-        if (result == ATH_MISSING) return ATH_OK;
-        if (result != ATH_OK) return result;
+        if (p->refused != ATH_OK) return p->refused;
+        if (left <= 0) return ATH_MORE;
+        int result = ath_refine_size(p->file, p->built + 1, &size, &p->fault);
         void *memory = size > 0 ? ath_player_block_of(p, size) : NULL;
         if (size > 0 && !memory) return ATH_NO_MEMORY;
-        result = ath_refine(p->file, level, memory, size);
-        if (result != ATH_OK) return result;
-        p->deepest = level;
+        if (result != ATH_OK) return p->refused = result;
+        result = ath_refine_within(p->file, p->built + 1, memory, size, &left);
+        p->prepared += (uint64_t)((int64_t)*budget - left);
+        if (*budget != ATH_PLAYER_EXACT) *budget = left;
+        if (result == ATH_OK) p->built++;
     }
     return ATH_OK;
 }
@@ -308,13 +314,16 @@ static int ath_player_build(ath_player *p, const uint8_t *bytes, size_t size, si
     if (result != ATH_OK) return result;
     p->file = (ath_file *)memory;
     ath_get_info(p->file, &p->info);
+    p->deepest = p->info.level_count - 1;
     if (p->info.rest_is_host && own->host_mesh)
         result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
     if (result != ATH_OK) return result;
     size_t build = ath_build_size(p->file);
     if (!(memory = ath_player_block_of(p, build))) return ATH_NO_MEMORY;
-    result = ath_build(p->file, memory, build);
-    return result == ATH_OK ? ath_player_refine(p) : result;
+    if ((result = ath_build(p->file, memory, build)) != ATH_OK) return result;
+    p->sizes = (size_t *)ath_player_block_of(p, (size_t)p->info.level_count * sizeof *p->sizes);
+    for (int32_t level = 0; p->sizes && level <= p->deepest; level++) p->sizes[level] = ath_segment_size(p->file, level);
+    return p->sizes ? ATH_OK : ATH_NO_MEMORY;
 }
 
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
@@ -438,7 +447,7 @@ static void ath_player_retire(ath_player *p, ath_player_job *job)
 /* Begins to prepare a segment, from the end of the one that it is joined to if that is cached. */
 static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_player_job **started)
 {
-    size_t size = ath_segment_size(p->file, level), work_size = ath_work_size(p->file);
+    size_t size = p->sizes[level], work_size = ath_work_size(p->file);
     ath_player_entry *before = ath_player_find(p, ath_joined_to(p->file, segment, level), level);
     ath_player_job *job = ath_player_idle_job(p);
     if (!job) return ATH_NO_MEMORY;
@@ -526,6 +535,7 @@ static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int
         int is_exact = *budget == ATH_PLAYER_EXACT, result = ATH_OK;
         if (job && job != p->own && !is_exact) return ATH_OK;
         if (*budget <= 0) return ATH_MORE;
+        if ((result = ath_player_refine(p, level, budget)) != ATH_OK) return result;
         if (!is_exact)
             result = ath_player_own_job(p, segment, level, &job);
         else if (!job || job != p->own)
@@ -550,7 +560,6 @@ static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int
 static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t level)
 {
     int32_t ready = ath_ready_level(p->file, segment);
-    if (ready > p->deepest) ready = p->deepest;
     return level < 0 || level > ready ? ready : level;
 }
 
@@ -569,7 +578,7 @@ static int32_t ath_player_aim(const ath_player *p, int32_t segment, int32_t leve
 {
     int32_t aim = level;
     if (ath_player_find(p, segment, level) || ath_player_job_of(p, segment, level)) return level;
-    while (aim > 0 && ath_segment_size(p->file, aim) > ath_segment_size(p->file, level) / 8) aim--;
+    while (aim > 0 && p->sizes[aim] > p->sizes[level] / 8) aim--;
     return ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
 }
 
@@ -932,10 +941,12 @@ static int ath_player_wish(const ath_player *p, int32_t place, int32_t *segment,
 ath_player_job *ath_player_begin(ath_player *player)
 {
     ath_player_job *job = NULL;
-    int32_t segment, level;
-    for (int32_t i = 0; !job && ath_player_wish(player, i, &segment, &level); i++)
-        if (segment >= 0 && !ath_player_find(player, segment, level) && !ath_player_job_of(player, segment, level))
-            ath_player_start(player, segment, level, &job);
+    int32_t segment, level, budget = ATH_PLAYER_BUDGET, result = ATH_OK;
+    for (int32_t i = 0; !job && result != ATH_MORE && ath_player_wish(player, i, &segment, &level); i++)
+        if (segment >= 0 && !ath_player_find(player, segment, level) && !ath_player_job_of(player, segment, level)) {
+            result = ath_player_refine(player, level, &budget);
+            if (result == ATH_OK) ath_player_start(player, segment, level, &job);
+        }
     return job;
 }
 
