@@ -54,7 +54,8 @@ int ath_build_within(ath_file *file, void *memory, size_t memory_bytes, int32_t 
         file->built_level = -1;
     }
     for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
-        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1), frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
+        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1),
+                frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
         if (!file->waves[kind][frames]) continue;
         if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
         ath_waves(frames, kind, file->waves[kind][frames]);
@@ -100,11 +101,10 @@ static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     ath_bytes body;
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
-    if (result == ATH_OK)
-        result = ath_decode_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count, step,
-                                 file->connected, rest_steps_before(file, q), plan_before(file, q)->rest,
-                                 layer->rest_steps, layer->rest);
-    return result;
+    if (result != ATH_OK) return result;
+    ath_start_rest(file->model, body, file->branches, file->info.branch_count, step, file->connected,
+                   rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);
+    return ath_decode_rest(file->model, 0);
 }
 
 /* Reads a layer's rest pose. That of the layer before is known. */

@@ -19,8 +19,21 @@ typedef struct {
     int32_t rest_known;
 } ath_layer;
 
+/* What a part of opening hands on to the next ones. */
+typedef struct {
+    int32_t part; /* the next one */
+    ath_limits limits;
+    ath_fault_info fault;
+    ath_rest_head rest;
+    ath_bytes body; /* of REST */
+    ath_polygons shape;
+    uint32_t *counts; /* of the polygons that are decoded, and their corners */
+    int32_t *corners;
+} ath_opening;
+
 struct ath_file {
     ath_header header;
+    ath_opening opening;
     ath_info info;
     ath_plan plan;
     ath_chunk *chunks;
@@ -96,8 +109,10 @@ ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && 
 
 /* ---- rest poses and waves ---- */
 
-/* Reads REST: the reference pose, or which mesh of the host's it is. */
-int ath_read_reference(ath_file *file, ath_fault_info *fault);
+/* Does one of ATH_REST_PARTS parts of reading REST: the reference pose, or which mesh of the host's it is. Returns ATH_OK
+ * when it is done, or ATH_MORE. */
+enum { ATH_REST_PARTS = 8 };
+int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault);
 /* Completes what follows from the reference pose. */
 void ath_know_rest(ath_file *file);
 /* Return the waves of a segment's stems, and those of the maps of its nodes. */

@@ -377,13 +377,9 @@ static int check_levels(const ath_file *file, ath_fault_info *fault)
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
 
-static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int read_plan(ath_file *file, ath_fault_info *fault)
 {
-    int result = read_clips(file, fault);
-    if (result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
-    if (result == ATH_OK) result = count_coded(file, fault);
-    if (result == ATH_OK) result = read_hierarchy(file, limits, fault);
-    if (result != ATH_OK) return result;
+    int result;
     build_plan(file);
     file->info.node_count = file->plan.node_count;
     file->info.depth_levels = ath_min(file->info.level_count, ath_level_of(&file->header, file->plan.height + 1) + 1);
@@ -392,10 +388,39 @@ static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     if ((result = check_joins(file, fault)) != ATH_OK) return result;
     plan_layers(file);
-    if ((result = ath_read_reference(file, fault)) != ATH_OK) return result;
-    if ((result = read_time(file, fault)) != ATH_OK) return result;
-    if (!file->info.rest_is_host) ath_know_rest(file);
     return ATH_OK;
+}
+
+enum { READ_REST = 3, READ_TIME = READ_REST + ATH_REST_PARTS, KNOW_REST };
+
+/* Does the next part of opening, in the order of FORMAT.md, "Opening". Returns ATH_OK when it is done, or ATH_MORE. */
+static int do_part(ath_file *file, int32_t *cost, ath_fault_info *fault)
+{
+    const ath_limits *limits = &file->opening.limits;
+    int32_t part = file->opening.part;
+    int result = part == 0 ? read_clips(file, fault) : ATH_OK;
+    if (part == 1) return read_hierarchy(file, limits, fault);
+    if (part == 2) return read_plan(file, fault);
+    if (part == READ_TIME) return read_time(file, fault);
+    if (part >= READ_REST && part < READ_TIME) return ath_read_reference(file, part - READ_REST, cost, fault);
+    if (part == KNOW_REST && !file->info.rest_is_host) ath_know_rest(file);
+    if (part == 0 && result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
+    return part == 0 && result == ATH_OK ? count_coded(file, fault) : result;
+}
+
+int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)
+{
+    ath_opening *own = &file->opening;
+    int result = own->part > KNOW_REST ? ATH_OK : ATH_MORE;
+    while (result == ATH_MORE && (!cost || *cost > 0)) {
+        result = do_part(file, cost, &own->fault);
+        if (result != ATH_OK) continue;
+        ath_spend(cost, ath_max(file->info.vertex_count, file->info.frame_count));
+        if (own->part++ < KNOW_REST) result = ATH_MORE;
+    }
+    own->fault.code = result == ATH_MORE ? ATH_OK : result;
+    if (fault) *fault = own->fault;
+    return result;
 }
 
 /* Parses the front into the file after checking that it fits into the memory. */
@@ -423,18 +448,24 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     return ATH_OK;
 }
 
-int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
-             ath_fault_info *fault)
+int ath_open_start(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+                   ath_fault_info *fault)
 {
     ath_limits chosen = limits_or_default(limits);
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     ath_file *file = (ath_file *)memory;
     if (!ath_fits(memory, memory_bytes, sizeof *file)) return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     int result = read_front(file, memory_bytes, bytes, available, &chosen, why);
-    if (result == ATH_OK) {
-        ath_feed(file, bytes, 0, available);
-        result = read_prelude(file, &chosen, why);
-    }
     why->code = result;
-    return result;
+    if (result != ATH_OK) return result;
+    ath_feed(file, bytes, 0, available);
+    file->opening.limits = chosen;
+    return ATH_MORE;
+}
+
+int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+             ath_fault_info *fault)
+{
+    int result = ath_open_start(memory, memory_bytes, bytes, available, limits, fault);
+    return result == ATH_MORE ? ath_open_within((ath_file *)memory, 0, fault) : result;
 }

@@ -214,6 +214,10 @@ ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *
 ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
                      const ath_limits *limits, ath_fault_info *fault);
 
+ATH_API int ath_open_start(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                           const ath_limits *limits, ath_fault_info *fault);
+ATH_API int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault);
+
 /* Gives the rest pose to a file whose info.rest_is_host is 1: the mesh that the file was made for. `xyz` points to
  * `vertex_count` positions of three floats, `stride` bytes apart, at any alignment; a vertex buffer will do. They are
  * the source's numbers in its order, units and axes, as loaded: not scaled or turned, and bit for bit the same, except

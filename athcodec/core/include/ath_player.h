@@ -57,6 +57,10 @@ typedef struct ath_player_options {
  * ATH_WRONG_HOST_MESH. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
+/* Begins to open a file: ath_player_ahead goes on with it, and is to be called until it no longer returns ATH_MORE. Before,
+ * call nothing else but ath_player_close. Returns ATH_MORE, or an error as above. */
+int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                          ath_fault_info *fault);
 /* Closes a player, which may be null. End its jobs before. */
 void ath_player_close(ath_player *player);
 /* Returns the file, for ath_get_info, ath_clips, ath_level_for, ath_cut and all functions that take a const file. */
@@ -226,6 +230,7 @@ struct ath_player {
     uint64_t calls, prepared;
     int32_t budget, left; /* of each call, and what is left of it in this one */
     int32_t dropped;      /* jobs that were dropped for others since one was done */
+    int32_t is_open;      /* 0 until ath_player_ahead has opened the file */
     int32_t deepest;      /* deepest level of the file */
     int32_t built;        /* deepest level whose bases are built */
     size_t *sizes;        /* bytes of a segment at each level */
@@ -305,29 +310,31 @@ static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
     return ATH_OK;
 }
 
-static int ath_player_build(ath_player *p, const uint8_t *bytes, size_t size, size_t file_size)
+/* Goes on with opening for a budget; null: to the end. */
+static int ath_player_build(ath_player *p, int32_t *budget)
 {
     const ath_player_options *own = &p->options;
-    void *memory = ath_player_block_of(p, file_size);
-    if (!memory) return ATH_NO_MEMORY;
-    int result = ath_open(memory, file_size, bytes, size, own->limits, &p->fault);
-    if (result != ATH_OK) return result;
-    p->file = (ath_file *)memory;
-    ath_get_info(p->file, &p->info);
-    p->deepest = p->info.level_count - 1;
-    if (p->info.rest_is_host && own->host_mesh)
-        result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
-    if (result != ATH_OK) return result;
-    size_t build = ath_build_size(p->file);
-    if (!(memory = ath_player_block_of(p, build))) return ATH_NO_MEMORY;
-    if ((result = ath_build(p->file, memory, build)) != ATH_OK) return result;
-    p->sizes = (size_t *)ath_player_block_of(p, (size_t)p->info.level_count * sizeof *p->sizes);
-    for (int32_t level = 0; p->sizes && level <= p->deepest; level++) p->sizes[level] = ath_segment_size(p->file, level);
-    return p->sizes ? ATH_OK : ATH_NO_MEMORY;
+    void *memory = NULL;
+    size_t size = 0;
+    int result = p->sizes ? ATH_OK : ath_open_within(p->file, budget, &p->fault);
+    if (result == ATH_OK && !p->sizes) {
+        ath_get_info(p->file, &p->info);
+        p->deepest = p->info.level_count - 1;
+        if (p->info.rest_is_host && own->host_mesh)
+            result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
+        if (result != ATH_OK) return result;
+        memory = ath_player_block_of(p, size = ath_build_size(p->file));
+        p->sizes = (size_t *)ath_player_block_of(p, (size_t)p->info.level_count * sizeof *p->sizes);
+        if (!memory || !p->sizes) return ATH_NO_MEMORY;
+        for (int32_t level = 0; level <= p->deepest; level++) p->sizes[level] = ath_segment_size(p->file, level);
+    }
+    if (result == ATH_OK) result = ath_build_within(p->file, memory, size, budget);
+    p->is_open = result == ATH_OK;
+    return result;
 }
 
-int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
-                    ath_fault_info *fault)
+int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                          ath_fault_info *fault)
 {
     ath_player_options own;
     ath_fault_info why;
@@ -344,14 +351,26 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
     memset(p, 0, sizeof *p);
     p->options = own;
     p->budget = ATH_PLAYER_BUDGET;
-    result = ath_player_build(p, bytes, size, file_size);
-    if (fault) *fault = p->fault;
-    if (result != ATH_OK) {
+    p->file = (ath_file *)ath_player_block_of(p, file_size);
+    result = p->file ? ath_open_start(p->file, file_size, bytes, size, own.limits, fault) : ATH_NO_MEMORY;
+    if (result == ATH_MORE)
+        *player = p;
+    else
         ath_player_close(p);
-        return result;
-    }
-    *player = p;
-    return ATH_OK;
+    return result;
+}
+
+int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                    ath_fault_info *fault)
+{
+    int result = ath_player_open_start(player, bytes, size, options, fault);
+    if (result != ATH_MORE) return result;
+    result = ath_player_build(*player, NULL);
+    if (fault) *fault = (*player)->fault;
+    if (result == ATH_OK) return ATH_OK;
+    ath_player_close(*player);
+    *player = NULL;
+    return result;
 }
 
 static void ath_player_free_jobs(ath_player *p, ath_player_job *job)
@@ -952,8 +971,10 @@ ath_player_job *ath_player_begin(ath_player *player)
 
 int ath_player_ahead(ath_player *player, int32_t vertex_frames)
 {
-    int result = ATH_OK;
-    int32_t segment, level;
+    int32_t segment, level, left = vertex_frames;
+    int result = player->is_open ? ATH_OK : ath_player_build(player, &left);
+    player->prepared += (uint64_t)((int64_t)vertex_frames - left);
+    if (vertex_frames != ATH_PLAYER_EXACT) vertex_frames = left;
     for (int32_t i = 0; result == ATH_OK && ath_player_wish(player, i, &segment, &level); i++)
         if (segment >= 0) result = ath_player_prepare(player, segment, level, &vertex_frames);
     return result;

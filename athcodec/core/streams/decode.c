@@ -6,13 +6,32 @@
 #include "streams/series.inl"
 #include "streams/source_rest.inl"
 
+/* Streams that are decoded for budgets. */
+typedef struct {
+    rest_model model;
+    ath_coder coder;
+    rest_layer layer;
+    const ath_branch *branches;
+    int32_t branch_count;
+    double step, *rest;
+} rest_decoder;
+
+typedef struct {
+    ath_coder coder;
+    faces_list faces;
+    faces_model model; /* the open sides follow */
+} faces_decoder;
+
 size_t ath_prelude_model_size(void)
 {
     size_t larger = sizeof(hierarchy_model) > sizeof(exact_model) ? sizeof(hierarchy_model) : sizeof(exact_model);
-    return larger > sizeof(rest_model) ? larger : sizeof(rest_model);
+    return larger > sizeof(rest_decoder) ? larger : sizeof(rest_decoder);
 }
 
-static int finished(const ath_coder *coder, int valid) { return valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK; }
+static int finished(const ath_coder *coder, int valid)
+{
+    return valid == ATH_MORE ? ATH_MORE : valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK;
+}
 
 /* Marks every value by the sign of the entry that it names, and clears the marks at the end. */
 static int is_permutation(int32_t count, int32_t *source)
@@ -61,14 +80,25 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
     return finished(&coder, valid);
 }
 
-int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
-                    double *rest)
+void ath_start_rest(void *model, ath_bytes stream, const ath_branch *branches, int32_t branch_count, double step,
+                    ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps, double *rest)
 {
-    ath_coder coder;
-    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0};
-    coder_start(&coder, bytes, size);
-    return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
+    rest_decoder *own = (rest_decoder *)model;
+    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0, 0, 0, 0, 0};
+    own->layer = layer;
+    own->branches = branches;
+    own->branch_count = branch_count;
+    own->step = step;
+    own->rest = rest;
+    coder_start(&own->coder, stream.bytes, stream.size);
+    start_rest(&own->coder, &own->model, &own->layer);
+}
+
+int ath_decode_rest(void *model, int32_t *cost)
+{
+    rest_decoder *own = (rest_decoder *)model;
+    return finished(&own->coder, code_rest(&own->coder, &own->model, &own->layer, own->branches, own->branch_count,
+                                           own->step, 0, own->rest, cost));
 }
 
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
@@ -91,16 +121,21 @@ int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const 
 
 size_t ath_faces_memory(int32_t vertex_count)
 {
-    return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
+    return sizeof(faces_decoder) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
 }
 
-int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                      int32_t *corners)
 {
-    ath_coder coder;
-    coder_start(&coder, stream.bytes, stream.size);
-    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, counts, corners);
-    return finished(&coder, code_faces(&coder, (faces_model *)memory, &faces));
+    faces_decoder *own = (faces_decoder *)memory;
+    coder_start(&own->coder, stream.bytes, stream.size);
+    own->faces = faces_of(&own->model, shape, vertex_count, counts, corners);
+}
+
+int ath_decode_faces(void *memory, int32_t *cost)
+{
+    faces_decoder *own = (faces_decoder *)memory;
+    return finished(&own->coder, code_faces(&own->coder, &own->model, &own->faces, cost));
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)
