@@ -124,8 +124,8 @@ static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *bra
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
-    ath_start_rest(model, body, branches, count, step, mesh, NULL, NULL, steps, rest);
     int32_t budget = 0, result;
+    ath_start_rest(model, body, branches, count, step, mesh, NULL, NULL, steps, rest);
     while ((result = ath_decode_rest(model, &budget)) == ATH_MORE) budget = 100;
     if (result == ATH_OK && all_finite(rest, numbers)) {
         ath_start_rest(model, body, branches, count, step / 8.0, mesh, steps, rest, finer_steps, finer);
@@ -150,8 +150,8 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
     void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
     int32_t *order = integers((size_t)vertices);
     for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
+    int32_t budget = 0, result;
     ath_start_faces(memory, body, &shape, vertices, counts, corners);
-    int32_t budget = head[10], result;
     while ((result = ath_decode_faces(memory, &budget)) == ATH_MORE) budget = 1 + head[10];
     for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
         REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
@@ -162,9 +162,7 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
         arena->used = 0;
         ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
         ath_weld_mesh(mesh, head[9] & 1 && shape.corner_count >= (uint32_t)vertices ? corners : NULL, order);
-        ath_place_corners(mesh, &shape, counts, corners, order);
-        ath_join_triangles(mesh);
-        ath_order_vertices(mesh);
+        for (int32_t i = 0; i < MESH_PARTS; i++) ath_build_mesh(mesh, i, &shape, counts, corners, order);
     }
     free(order);
     free(memory);

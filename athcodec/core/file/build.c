@@ -15,7 +15,9 @@ static uint64_t carve_build(ath_file *file, uint8_t *base)
     for (int32_t s = 0; s < file->info.segment_count; s++)
         for (int32_t of_nodes = 0; of_nodes < 2; of_nodes++)
             are_there[wave_kind(file, s, of_nodes)][ath_file_frames(file, s)] = 1;
-    file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
+    file->plan.bases = file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
+    file->built_level = -1;
+    file->next_piece = file->next_waves = 0;
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
             if (are_there[kind][frames])
@@ -29,10 +31,17 @@ size_t ath_build_size(const ath_file *file)
     return ath_size_or_most(carve_build(&counted, 0));
 }
 
-/* Fills the bases that levels up to one take: the picture of a coarse level does not wait for all of them. */
+/* Fills the waves, then the bases that levels up to one take: the picture of a coarse level does not wait for all. */
 static int build_to(ath_file *file, int32_t level, int32_t *cost)
 {
     int result = ATH_OK;
+    for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
+        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1),
+                frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
+        if (!file->waves[kind][frames]) continue;
+        if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
+        ath_waves(frames, kind, file->waves[kind][frames]);
+    }
     while (result == ATH_OK && file->built_level < level) {
         int32_t next = file->built_level + 1;
         if (file->bases_count > 0)
@@ -43,29 +52,12 @@ static int build_to(ath_file *file, int32_t level, int32_t *cost)
     return result;
 }
 
-int ath_build_within(ath_file *file, void *memory, size_t memory_bytes, int32_t *cost)
-{
-    ath_file counted = *file;
-    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases) {
-        if (!ath_fits(memory, memory_bytes, carve_build(&counted, 0))) return ATH_NO_MEMORY;
-        carve_build(file, (uint8_t *)memory);
-        file->plan.bases = file->bases;
-        file->built_level = -1;
-    }
-    for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
-        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1),
-                frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
-        if (!file->waves[kind][frames]) continue;
-        if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
-        ath_waves(frames, kind, file->waves[kind][frames]);
-    }
-    return build_to(file, 0, cost);
-}
-
 int ath_build(ath_file *file, void *memory, size_t memory_bytes)
 {
-    return ath_build_within(file, memory, memory_bytes, 0);
+    if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
+    if (!ath_fits(memory, memory_bytes, ath_build_size(file))) return ATH_NO_MEMORY;
+    carve_build(file, (uint8_t *)memory);
+    return build_to(file, 0, 0);
 }
 
 const double *ath_file_waves(const ath_file *file, int32_t segment)
@@ -143,6 +135,7 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
         return ath_refuse(why, ATH_NEEDS_HOST_MESH, ATH_FIELD_HOST_MESH, 0, file->info.host_checksum[0],
                           file->info.vertex_count);
     level = ath_file_stage(file, level);
+    if (!file->bases) ath_take(&counted, ath_build_size(file));
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
         int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
@@ -184,14 +177,14 @@ int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory
     size_t needed;
     int result = ath_refine_size(file, level, &needed, 0);
     if (result != ATH_OK) return result;
-    if (!file->bases || (needed > 0 && !ath_fits(memory, memory_bytes, needed))) return ATH_NO_MEMORY;
+    if (needed > 0 && !ath_fits(memory, memory_bytes, needed)) return ATH_NO_MEMORY;
+    if (!file->bases) arena.used = carve_build(file, arena.base);
     level = ath_file_stage(file, level);
     int32_t layers = level > 0 ? ath_layer_of(file, level) + 1 : 0;
     for (int32_t q = file->first_layer; q < layers; q++)
         if (!file->layers[q].bases)
             file->layers[q].bases = (double *)ath_take(&arena, file->layers[q].bases_count * sizeof(double));
-    result = ath_build_within(file, 0, 0, cost);
-    if (result == ATH_OK) result = build_to(file, level, cost);
+    result = build_to(file, level, cost);
     for (int32_t q = file->first_layer; result == ATH_OK && q < layers; q++) result = build_layer(file, q, cost);
     return result;
 }

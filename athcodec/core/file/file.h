@@ -111,7 +111,7 @@ ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && 
 
 /* Does one of ATH_REST_PARTS parts of reading REST: the reference pose, or which mesh of the host's it is. Returns ATH_OK
  * when it is done, or ATH_MORE. */
-enum { ATH_REST_PARTS = 8 };
+enum { ATH_REST_PARTS = 5 + MESH_PARTS };
 int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault);
 /* Completes what follows from the reference pose. */
 void ath_know_rest(ath_file *file);

@@ -91,12 +91,11 @@ int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_in
     if (part == 0) return read_head(file, fault);
     if (part == 1 && has_mesh) return read_welds(file, cost, fault);
     if (part == 2 && has_mesh) return ath_decode_faces(file->mesh.work, cost);
-    if (part == 3 && has_mesh)
-        ath_place_corners(&file->mesh, &own->shape, own->counts, own->corners, file->vertex_source);
-    if (part == 4 && has_mesh) ath_join_triangles(&file->mesh);
-    if (part == 5 && has_mesh) ath_order_vertices(&file->mesh);
-    if (part == 6) return start_pose(file, fault);
-    return part == 7 && !file->rest_is_exact ? ath_decode_rest(file->model, cost) : ATH_OK;
+    if (part == 3 + MESH_PARTS) return start_pose(file, fault);
+    if (part == 4 + MESH_PARTS && !file->rest_is_exact) return ath_decode_rest(file->model, cost);
+    if (part < 3 + MESH_PARTS && has_mesh)
+        ath_build_mesh(&file->mesh, part - 3, &own->shape, own->counts, own->corners, file->vertex_source);
+    return ATH_OK;
 }
 
 void ath_know_rest(ath_file *file)

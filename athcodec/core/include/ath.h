@@ -235,7 +235,6 @@ ATH_API int ath_set_host_mesh(ath_file *file, const void *xyz, size_t stride, in
 ATH_API size_t ath_build_size(const ath_file *file);
 ATH_API int ath_build(ath_file *file, void *memory, size_t memory_bytes);
 
-ATH_API int ath_build_within(ath_file *file, void *memory, size_t memory_bytes, int32_t *cost);
 ATH_API int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory_bytes, int32_t *cost);
 /* Levels 0 to info.depth_levels - 1 follow the branch hierarchy at the precision of the first layer. Each further level
  * refines all of the plant by one layer or more. Any level may refine the rest pose, too. Before you prepare a level,

@@ -230,9 +230,8 @@ struct ath_player {
     uint64_t calls, prepared;
     int32_t budget, left; /* of each call, and what is left of it in this one */
     int32_t dropped;      /* jobs that were dropped for others since one was done */
-    int32_t is_open;      /* 0 until ath_player_ahead has opened the file */
     int32_t deepest;      /* deepest level of the file */
-    int32_t built;        /* deepest level whose bases are built */
+    int32_t built;        /* deepest level whose bases are built; -1 until the file is open */
     size_t *sizes;        /* bytes of a segment at each level */
     int32_t refused;      /* the error that keeps a level from being built, else ATH_OK */
     int32_t track_count;
@@ -310,27 +309,24 @@ static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
     return ATH_OK;
 }
 
-/* Goes on with opening for a budget; null: to the end. */
+/* Goes on with opening for a budget, and then builds level 0. */
 static int ath_player_build(ath_player *p, int32_t *budget)
 {
     const ath_player_options *own = &p->options;
-    void *memory = NULL;
-    size_t size = 0;
-    int result = p->sizes ? ATH_OK : ath_open_within(p->file, budget, &p->fault);
+    int32_t before = *budget;
+    int result = p->sizes ? ATH_OK : ath_open_within(p->file, before != ATH_PLAYER_EXACT ? budget : NULL, &p->fault);
+    p->prepared += (uint64_t)((int64_t)before - *budget);
     if (result == ATH_OK && !p->sizes) {
         ath_get_info(p->file, &p->info);
         p->deepest = p->info.level_count - 1;
         if (p->info.rest_is_host && own->host_mesh)
             result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
         if (result != ATH_OK) return result;
-        memory = ath_player_block_of(p, size = ath_build_size(p->file));
         p->sizes = (size_t *)ath_player_block_of(p, (size_t)p->info.level_count * sizeof *p->sizes);
-        if (!memory || !p->sizes) return ATH_NO_MEMORY;
+        if (!p->sizes) return ATH_NO_MEMORY;
         for (int32_t level = 0; level <= p->deepest; level++) p->sizes[level] = ath_segment_size(p->file, level);
     }
-    if (result == ATH_OK) result = ath_build_within(p->file, memory, size, budget);
-    p->is_open = result == ATH_OK;
-    return result;
+    return result == ATH_OK ? ath_player_refine(p, 0, budget) : result;
 }
 
 int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
@@ -351,6 +347,7 @@ int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size
     memset(p, 0, sizeof *p);
     p->options = own;
     p->budget = ATH_PLAYER_BUDGET;
+    p->built = -1;
     p->file = (ath_file *)ath_player_block_of(p, file_size);
     result = p->file ? ath_open_start(p->file, file_size, bytes, size, own.limits, fault) : ATH_NO_MEMORY;
     if (result == ATH_MORE)
@@ -365,7 +362,8 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
 {
     int result = ath_player_open_start(player, bytes, size, options, fault);
     if (result != ATH_MORE) return result;
-    result = ath_player_build(*player, NULL);
+    int32_t exactly = ATH_PLAYER_EXACT;
+    result = ath_player_build(*player, &exactly);
     if (fault) *fault = (*player)->fault;
     if (result == ATH_OK) return ATH_OK;
     ath_player_close(*player);
@@ -971,10 +969,8 @@ ath_player_job *ath_player_begin(ath_player *player)
 
 int ath_player_ahead(ath_player *player, int32_t vertex_frames)
 {
-    int32_t segment, level, left = vertex_frames;
-    int result = player->is_open ? ATH_OK : ath_player_build(player, &left);
-    player->prepared += (uint64_t)((int64_t)vertex_frames - left);
-    if (vertex_frames != ATH_PLAYER_EXACT) vertex_frames = left;
+    int result = player->built < 0 ? ath_player_build(player, &vertex_frames) : ATH_OK;
+    int32_t segment, level;
     for (int32_t i = 0; result == ATH_OK && ath_player_wish(player, i, &segment, &level); i++)
         if (segment >= 0) result = ath_player_prepare(player, segment, level, &vertex_frames);
     return result;

@@ -75,7 +75,7 @@ static void sort_sides(const ath_mesh *mesh, int32_t end, const int32_t *sides, 
 }
 
 /* Two triangles that share a side are halves of a parallelogram. If more share it, they are paired in order. */
-void ath_join_triangles(ath_mesh *mesh)
+static void join_triangles(ath_mesh *mesh)
 {
     int32_t *sides = mesh->work, *sorted = sides + mesh->corner_count, *places = sorted + mesh->corner_count;
     int32_t count = 0, here[2], there[2];
@@ -136,7 +136,7 @@ static int32_t take_next(const ath_mesh *mesh, mesh_front *front)
     return -1;
 }
 
-void ath_order_vertices(ath_mesh *mesh)
+static void order_vertices(ath_mesh *mesh)
 {
     int32_t n = mesh->vertex_count, seed = 0;
     mesh_front front;
@@ -177,9 +177,12 @@ void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_s
     }
 }
 
-void ath_place_corners(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
-                       const int32_t *vertex_source)
+void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
+                    const int32_t *corners, const int32_t *vertex_source)
 {
+    if (part == 1) join_triangles(mesh);
+    if (part == 2) order_vertices(mesh);
+    if (part > 0) return;
     int32_t *place = mesh->rank; /* not in use yet: serves as the file's number of each vertex of the source */
     uint32_t first = 0;
     mesh->corner_count = (int32_t)shape->corner_count;
@@ -194,14 +197,6 @@ void ath_place_corners(ath_mesh *mesh, const ath_polygons *shape, const uint32_t
 }
 
 #ifdef ATH_ENCODER
-
-void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
-                    const int32_t *vertex_source)
-{
-    ath_place_corners(mesh, shape, counts, corners, vertex_source);
-    ath_join_triangles(mesh);
-    ath_order_vertices(mesh);
-}
 
 static uint8_t *after_struct(void *memory) { return (uint8_t *)memory + ((sizeof(ath_mesh) + 15) & ~(size_t)15); }
 

@@ -47,15 +47,12 @@ void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uin
                     uint64_t work_bytes);
 /* Fills `same`. names: vertices of the same name, in source order, share a place; null: each has its own. */
 ATH_ENCODER_API void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_source);
-/* Build the mesh of faces in source order, in this order. counts: null if all have shape->columns corners. `corners` and
- * `counts` must not be in the mesh's memory. `same` is filled already. */
-void ath_place_corners(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
-                       const int32_t *vertex_source);
-void ath_join_triangles(ath_mesh *mesh);
-void ath_order_vertices(ath_mesh *mesh);
+/* Does one of MESH_PARTS parts of building the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
+ * must not be in the mesh's memory. `same` is filled already. */
+enum { MESH_PARTS = 3 };
+ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
+                                    const int32_t *corners, const int32_t *vertex_source);
 #ifdef ATH_ENCODER
-ATH_API void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
-                            const int32_t *vertex_source);
 /* Returns the bytes of a mesh's memory, which ath_place_mesh begins with the struct itself. */
 ATH_API size_t ath_mesh_size(int32_t vertex_count, int32_t corner_count);
 ATH_API void ath_place_mesh(void *memory, int32_t vertex_count, int32_t corner_count);

@@ -6,26 +6,10 @@
 #include "streams/series.inl"
 #include "streams/source_rest.inl"
 
-/* Streams that are decoded for budgets. */
-typedef struct {
-    rest_model model;
-    ath_coder coder;
-    rest_layer layer;
-    const ath_branch *branches;
-    int32_t branch_count;
-    double step, *rest;
-} rest_decoder;
-
-typedef struct {
-    ath_coder coder;
-    faces_list faces;
-    faces_model model; /* the open sides follow */
-} faces_decoder;
-
 size_t ath_prelude_model_size(void)
 {
     size_t larger = sizeof(hierarchy_model) > sizeof(exact_model) ? sizeof(hierarchy_model) : sizeof(exact_model);
-    return larger > sizeof(rest_decoder) ? larger : sizeof(rest_decoder);
+    return larger > sizeof(rest_model) ? larger : sizeof(rest_model);
 }
 
 static int finished(const ath_coder *coder, int valid)
@@ -83,22 +67,19 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
 void ath_start_rest(void *model, ath_bytes stream, const ath_branch *branches, int32_t branch_count, double step,
                     ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps, double *rest)
 {
-    rest_decoder *own = (rest_decoder *)model;
-    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0, 0, 0, 0, 0};
-    own->layer = layer;
-    own->branches = branches;
-    own->branch_count = branch_count;
-    own->step = step;
-    own->rest = rest;
+    rest_model *own = (rest_model *)model;
+    rest_layer layer = {branches, branch_count, step, rest, coarse, before, steps, mesh, 0.0, 0, 0};
     coder_start(&own->coder, stream.bytes, stream.size);
-    start_rest(&own->coder, &own->model, &own->layer);
+    start_rest(&own->coder, own, &layer);
 }
 
 int ath_decode_rest(void *model, int32_t *cost)
 {
-    rest_decoder *own = (rest_decoder *)model;
-    return finished(&own->coder, code_rest(&own->coder, &own->model, &own->layer, own->branches, own->branch_count,
-                                           own->step, 0, own->rest, cost));
+    rest_model *own = (rest_model *)model;
+    ath_coder coder = own->coder;
+    int valid = code_rest(&coder, own, 0, cost);
+    own->coder = coder;
+    return finished(&coder, valid);
 }
 
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
@@ -121,21 +102,20 @@ int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const 
 
 size_t ath_faces_memory(int32_t vertex_count)
 {
-    return sizeof(faces_decoder) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
+    return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
 }
 
 void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                      int32_t *corners)
 {
-    faces_decoder *own = (faces_decoder *)memory;
-    coder_start(&own->coder, stream.bytes, stream.size);
-    own->faces = faces_of(&own->model, shape, vertex_count, counts, corners);
+    start_faces((faces_model *)memory, shape, vertex_count, counts, corners);
+    coder_start(&((faces_model *)memory)->coder, stream.bytes, stream.size);
 }
 
 int ath_decode_faces(void *memory, int32_t *cost)
 {
-    faces_decoder *own = (faces_decoder *)memory;
-    return finished(&own->coder, code_faces(&own->coder, &own->model, &own->faces, cost));
+    faces_model *model = (faces_model *)memory;
+    return finished(&model->coder, code_faces(model, cost));
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)

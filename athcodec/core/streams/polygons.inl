@@ -22,10 +22,24 @@ enum {
     FACE_PLACES = 5, /* first, second, third, later corners, and those where two open sides agree */
     FACE_COUNTS_BITS = 6,
     FACE_FAR_MEAN = 1024,
-    FACE_COST = 8 /* vertex-frames that coding a face takes */
+    FACE_COST = 8 /* vertex-frames */
 };
 
+/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
+ * none. The next face is `face`; it begins at corner `first`, that before it, of `count` corners, at `previous`. */
 typedef struct {
+    const ath_polygons *shape;
+    uint32_t *counts; /* null if all faces have as many corners */
+    int32_t *corners;
+    int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
+    int32_t bound;
+    uint32_t most; /* most corners of a face */
+    uint32_t face, first, previous, count;
+} faces_list;
+
+typedef struct {
+    ath_coder coder;
+    faces_list list;
     ath_context repeats[FACE_RUNS];                            /* by how long the repetition has held */
     ath_context guessed[FACE_GUESSES][FACE_PLACES][FACE_WAYS]; /* by how the corner before was coded */
     ath_context is_recent[FACE_PLACES], recent[FACE_PLACES][1 << FACE_RECENT_BITS];
@@ -37,21 +51,18 @@ typedef struct {
     int32_t next, way;      /* highest vertex so far + 1; how the last corner was coded */
 } faces_model;
 
-/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
- * none. */
-typedef struct {
-    const ath_polygons *shape;
-    uint32_t *counts; /* null if all faces have as many corners */
-    int32_t *corners;
-    int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
-    int32_t bound;
-    uint32_t most;                         /* most corners of a face */
-    uint32_t face, first, previous, count; /* the next face, its first corner, that of the face before, its count */
-} faces_list;
-
-static void faces_model_init(faces_model *model)
+/* The open sides of each vertex stand behind the model. The types of vertices and counts bound their values. */
+static void start_faces(faces_model *model, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                        int32_t *corners)
 {
+    int32_t (*before)[FACE_SIDES] = (int32_t (*)[FACE_SIDES])(void *)(model + 1), (*after)[FACE_SIDES];
+    int32_t bits = ath_bits_of_type(shape->count_type), bound = ath_vertices_of_type(shape->index_type, vertex_count);
+    uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX, count = counts ? 3 : shape->columns;
+    faces_list list = {shape, counts, corners, before, after = before + vertex_count, bound, most, 0, 0, 0, count};
+    for (size_t v = 0; v < (size_t)bound; v++)
+        for (int32_t s = 0; s < FACE_SIDES; s++) before[v][s] = after[v][s] = -1;
     memset(model, 0, sizeof *model);
+    model->list = list;
     for (int32_t i = 0; i < FACE_RUNS; i++) context_init(&model->repeats[i], 60000);
     for (int32_t g = 0; g < FACE_GUESSES; g++)
         for (int32_t j = 0; j < FACE_PLACES; j++)
@@ -67,21 +78,6 @@ static void faces_model_init(faces_model *model)
         model->far_mean[j] = FACE_FAR_MEAN;
     }
     model->count_mean = 64;
-}
-
-/* memory: a model, then the open sides of each vertex. The types of vertices and counts bound their values. */
-static faces_list faces_of(faces_model *memory, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
-                           int32_t *corners)
-{
-    int32_t (*before)[FACE_SIDES] = (int32_t (*)[FACE_SIDES])(void *)(memory + 1);
-    int32_t bits = ath_bits_of_type(shape->count_type), bound = ath_vertices_of_type(shape->index_type, vertex_count);
-    uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX;
-    faces_list faces = {shape, counts, corners, before, before + vertex_count, bound, most, 0, 0, 0, shape->columns};
-    if (counts) faces.count = 3;
-    faces_model_init(memory);
-    for (size_t v = 0; v < (size_t)bound; v++)
-        for (int32_t s = 0; s < FACE_SIDES; s++) before[v][s] = faces.after[v][s] = -1;
-    return faces;
 }
 
 /* Hashes the `length` ways before corner i. */
@@ -252,9 +248,11 @@ static uint32_t code_face_count(ath_coder *coder, faces_model *model, uint32_t b
     return count;
 }
 
-/* Returns 1; 0: the stream is not valid; ATH_MORE: the budget is spent, call it again. */
-static int code_faces(ath_coder *coder, faces_model *model, faces_list *faces, int32_t *cost)
+/* Returns 1; 0: the stream is not valid; ATH_MORE: the budget is spent. */
+static int code_faces(faces_model *model, int32_t *cost)
 {
+    ath_coder *coder = &model->coder;
+    faces_list *faces = &model->list;
     for (; faces->face < faces->shape->face_count; faces->face++) {
         uint32_t *own = faces->counts ? faces->counts + faces->face : 0, first = faces->first;
         if (!ath_spend(cost, FACE_COST)) return ATH_MORE;
