@@ -147,30 +147,6 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
     return ATH_OK;
 }
 
-static int build_layer(ath_file *file, int32_t q, int32_t *cost)
-{
-    ath_layer *layer = &file->layers[q];
-    int result = ATH_OK;
-    if (layer->plan.bases) return ATH_OK;
-    if (layer->bases_count > 0) {
-        result = ath_basis_fill(layer->pieces, &file->next_piece, layer->plan.piece_count, 0, INT32_MAX, layer->rest,
-                                known_bases(file, q), (double *)file->scratch, layer->bases, cost);
-        if (result == ATH_OK) layer->plan.bases = layer->bases;
-    } else if (!ath_spend(cost, layer->plan.piece_count)) {
-        result = ATH_MORE;
-    } else {
-        const ath_piece *before = plan_before(file, q)->pieces;
-        for (int32_t p = 0; p < layer->plan.piece_count; p++) {
-            layer->pieces[p].modes = before[p].modes;
-            layer->pieces[p].basis = before[p].basis;
-            layer->pieces[p].rank = before[p].rank;
-            layer->pieces[p].tip_weight = before[p].tip_weight;
-        }
-        layer->plan.bases = plan_before(file, q)->bases;
-    }
-    return result;
-}
-
 int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory_bytes, int32_t *cost)
 {
     ath_arena arena = {(uint8_t *)memory, 0};
@@ -185,7 +161,25 @@ int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory
         if (!file->layers[q].bases)
             file->layers[q].bases = (double *)ath_take(&arena, file->layers[q].bases_count * sizeof(double));
     result = build_to(file, level, cost);
-    for (int32_t q = file->first_layer; result == ATH_OK && q < layers; q++) result = build_layer(file, q, cost);
+    for (int32_t q = file->first_layer; result == ATH_OK && q < layers; q++) {
+        ath_layer *layer = &file->layers[q];
+        const ath_plan *before = plan_before(file, q);
+        if (layer->plan.bases) continue;
+        if (layer->bases_count > 0) {
+            result = ath_basis_fill(layer->pieces, &file->next_piece, layer->plan.piece_count, 0, INT32_MAX,
+                                    layer->rest, known_bases(file, q), (double *)file->scratch, layer->bases, cost);
+            if (result == ATH_OK) layer->plan.bases = layer->bases;
+            continue;
+        }
+        if (!ath_spend(cost, layer->plan.piece_count)) return ATH_MORE;
+        for (int32_t p = 0; p < layer->plan.piece_count; p++) {
+            layer->pieces[p].modes = before->pieces[p].modes;
+            layer->pieces[p].basis = before->pieces[p].basis;
+            layer->pieces[p].rank = before->pieces[p].rank;
+            layer->pieces[p].tip_weight = before->pieces[p].tip_weight;
+        }
+        layer->plan.bases = before->bases;
+    }
     return result;
 }
 

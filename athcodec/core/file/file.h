@@ -19,21 +19,8 @@ typedef struct {
     int32_t rest_known;
 } ath_layer;
 
-/* What a part of opening hands on to the next ones. */
-typedef struct {
-    int32_t part; /* the next one */
-    ath_limits limits;
-    ath_fault_info fault;
-    ath_rest_head rest;
-    ath_bytes body; /* of REST */
-    ath_polygons shape;
-    uint32_t *counts; /* of the polygons that are decoded, and their corners */
-    int32_t *corners;
-} ath_opening;
-
 struct ath_file {
     ath_header header;
-    ath_opening opening;
     ath_info info;
     ath_plan plan;
     ath_chunk *chunks;
@@ -62,6 +49,14 @@ struct ath_file {
     double
         *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* by kind and number of frames; null: no segment needs them */
     uint64_t bases_count;
+    /* What a part of opening hands on to the next ones; `opened` of them are done. */
+    int32_t opened, *corners; /* corners, counts: of the polygons of `shape` */
+    uint32_t *counts;
+    ath_polygons shape;
+    ath_limits limits;
+    ath_fault_info fault;
+    ath_rest_head rest_head;
+    ath_bytes rest_body;
     int32_t built_level;       /* level up to which `bases` are filled; -1: none */
     int32_t next_piece;        /* where filling the bases that come next goes on */
     int32_t next_waves;        /* the same of waves, by kind and number of frames */

@@ -181,29 +181,31 @@ static int count_coded(ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
-static int check_depth(const ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int check_depth(const ath_file *file, ath_fault_info *fault)
 {
     int32_t deepest = 0;
     for (int32_t b = 0; b < file->info.branch_count; b++) deepest = ath_max(deepest, file->branches[b].depth);
-    if ((uint32_t)deepest < limits->hierarchy_depth) return ATH_OK;
+    if ((uint32_t)deepest < file->limits.hierarchy_depth) return ATH_OK;
     fault->field = ATH_FIELD_HIERARCHY_DEPTH;
     fault->found = (double)deepest + 1;
-    fault->most = (double)limits->hierarchy_depth;
+    fault->most = (double)file->limits.hierarchy_depth;
     return fault->code = ATH_LIMIT_EXCEEDED;
 }
 
-static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int read_hierarchy(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
     ath_bytes chunk;
-    int result = ath_load(file, ATH_HIERARCHY, &chunk, fault);
+    int result = check_memory(header, &file->limits, (uint64_t)file->longest, fault);
+    if (result == ATH_OK) result = count_coded(file, fault);
+    if (result == ATH_OK) result = ath_load(file, ATH_HIERARCHY, &chunk, fault);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
     result = ath_decode_hierarchy(file->model, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
-    return check_depth(file, limits, fault);
+    return check_depth(file, fault);
 }
 
 static void build_plan(ath_file *file)
@@ -391,35 +393,25 @@ static int read_plan(ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
-enum { READ_REST = 3, READ_TIME = READ_REST + ATH_REST_PARTS, KNOW_REST };
-
-/* Does the next part of opening, in the order of FORMAT.md, "Opening". Returns ATH_OK when it is done, or ATH_MORE. */
-static int do_part(ath_file *file, int32_t *cost, ath_fault_info *fault)
-{
-    const ath_limits *limits = &file->opening.limits;
-    int32_t part = file->opening.part;
-    int result = part == 0 ? read_clips(file, fault) : ATH_OK;
-    if (part == 1) return read_hierarchy(file, limits, fault);
-    if (part == 2) return read_plan(file, fault);
-    if (part == READ_TIME) return read_time(file, fault);
-    if (part >= READ_REST && part < READ_TIME) return ath_read_reference(file, part - READ_REST, cost, fault);
-    if (part == KNOW_REST && !file->info.rest_is_host) ath_know_rest(file);
-    if (part == 0 && result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
-    return part == 0 && result == ATH_OK ? count_coded(file, fault) : result;
-}
-
 int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)
 {
-    ath_opening *own = &file->opening;
-    int result = own->part > KNOW_REST ? ATH_OK : ATH_MORE;
+    const int32_t first = 3, last = first + ATH_REST_PARTS; /* the parts that read REST, and the one behind them */
+    ath_fault_info *why = &file->fault;
+    int result = file->opened > last ? ATH_OK : ATH_MORE;
     while (result == ATH_MORE && (!cost || *cost > 0)) {
-        result = do_part(file, cost, &own->fault);
+        int32_t part = file->opened; /* in the order of FORMAT.md, "Opening" */
+        result = part == 0      ? read_clips(file, why)
+                 : part == 1    ? read_hierarchy(file, why)
+                 : part == 2    ? read_plan(file, why)
+                 : part == last ? read_time(file, why)
+                                : ath_read_reference(file, part - first, cost, why);
         if (result != ATH_OK) continue;
+        if (part == last && !file->info.rest_is_host) ath_know_rest(file);
         ath_spend(cost, ath_max(file->info.vertex_count, file->info.frame_count));
-        if (own->part++ < KNOW_REST) result = ATH_MORE;
+        if (file->opened++ < last) result = ATH_MORE;
     }
-    own->fault.code = result == ATH_MORE ? ATH_OK : result;
-    if (fault) *fault = own->fault;
+    why->code = result == ATH_MORE ? ATH_OK : result;
+    if (fault) *fault = *why;
     return result;
 }
 
@@ -459,7 +451,7 @@ int ath_open_start(void *memory, size_t memory_bytes, const uint8_t *bytes, size
     why->code = result;
     if (result != ATH_OK) return result;
     ath_feed(file, bytes, 0, available);
-    file->opening.limits = chosen;
+    file->limits = chosen;
     return ATH_MORE;
 }
 

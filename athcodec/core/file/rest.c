@@ -18,52 +18,51 @@ static void take_numbers(ath_file *file)
 /* Begins to decode polygons behind what building the mesh needs of its scratch memory. */
 static int start_polygons(ath_file *file, ath_bytes chunk)
 {
-    ath_opening *own = &file->opening;
+    ath_polygons *shape = &file->shape;
     int32_t vertex_count = (int32_t)file->header.vertex_count, *work = file->mesh.work;
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
     ath_bytes body;
-    int result = ath_parse_polygons(chunk, &own->shape, &body);
+    int result = ath_parse_polygons(chunk, shape, &body);
     if (result != ATH_OK) return result;
-    if (own->shape.is_derived || !ath_serves_rest(&own->shape, vertex_count)) return ATH_BAD_CHUNK;
-    own->corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
-    own->counts = own->shape.is_mixed ? (uint32_t *)(void *)(own->corners + own->shape.corner_count) : 0;
-    ath_start_faces(work, body, &own->shape, vertex_count, own->counts, own->corners);
+    if (shape->is_derived || !ath_serves_rest(shape, vertex_count)) return ATH_BAD_CHUNK;
+    file->corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
+    file->counts = shape->is_mixed ? (uint32_t *)(void *)(file->corners + shape->corner_count) : 0;
+    ath_start_faces(work, body, shape, vertex_count, file->counts, file->corners);
     return ATH_OK;
 }
 
 /* Reads the head of REST. Which vertices share a place follows it. */
 static int read_head(ath_file *file, ath_fault_info *fault)
 {
-    ath_rest_head *head = &file->opening.rest;
+    ath_rest_head *head = &file->rest_head;
     ath_bytes chunk;
     int result = ath_load(file, ATH_REST, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_rest(chunk, head, &file->opening.body);
+    if (result == ATH_OK) result = ath_parse_rest(chunk, head, &file->rest_body);
     if (result != ATH_OK || !head->connected) return result;
     file->connected = &file->mesh;
     result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
     if (result != ATH_OK || !head->welded) return result;
     result = ath_load(file, ATH_REST, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_welds(&file->opening.body, &chunk);
+    if (result == ATH_OK) result = ath_parse_welds(&file->rest_body, &chunk);
     return result == ATH_OK ? start_polygons(file, chunk) : result;
 }
 
 static int read_welds(ath_file *file, int32_t *cost, ath_fault_info *fault)
 {
-    const ath_opening *own = &file->opening;
+    int welded = file->rest_head.welded;
     ath_bytes chunk;
-    int result = own->rest.welded ? ath_decode_faces(file->mesh.work, cost) : ATH_OK;
-    if (result == ATH_OK && own->rest.welded && own->shape.corner_count < file->header.vertex_count)
-        return ATH_BAD_CHUNK;
+    int result = welded ? ath_decode_faces(file->mesh.work, cost) : ATH_OK;
+    if (result == ATH_OK && welded && file->shape.corner_count < file->header.vertex_count) return ATH_BAD_CHUNK;
     if (result != ATH_OK) return result;
-    ath_weld_mesh(&file->mesh, own->corners, file->vertex_source);
+    ath_weld_mesh(&file->mesh, file->corners, file->vertex_source);
     result = ath_load(file, ATH_FACES, &chunk, fault);
     return result == ATH_OK ? start_polygons(file, chunk) : result;
 }
 
 static int start_pose(ath_file *file, ath_fault_info *fault)
 {
-    const ath_rest_head *head = &file->opening.rest;
-    ath_bytes chunk, body = file->opening.body;
+    const ath_rest_head *head = &file->rest_head;
+    ath_bytes chunk, body = file->rest_body;
     int result = ath_load(file, ATH_REST, &chunk, fault);
     if (result != ATH_OK) return result;
     memcpy(file->info.origin, head->origin, sizeof head->origin);
@@ -86,15 +85,14 @@ static int start_pose(ath_file *file, ath_fault_info *fault)
 
 int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault)
 {
-    const ath_opening *own = &file->opening;
-    int has_mesh = own->rest.connected;
+    int has_mesh = file->rest_head.connected;
     if (part == 0) return read_head(file, fault);
     if (part == 1 && has_mesh) return read_welds(file, cost, fault);
     if (part == 2 && has_mesh) return ath_decode_faces(file->mesh.work, cost);
     if (part == 3 + MESH_PARTS) return start_pose(file, fault);
     if (part == 4 + MESH_PARTS && !file->rest_is_exact) return ath_decode_rest(file->model, cost);
     if (part < 3 + MESH_PARTS && has_mesh)
-        ath_build_mesh(&file->mesh, part - 3, &own->shape, own->counts, own->corners, file->vertex_source);
+        ath_build_mesh(&file->mesh, part - 3, &file->shape, file->counts, file->corners, file->vertex_source);
     return ATH_OK;
 }
 

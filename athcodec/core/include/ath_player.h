@@ -50,17 +50,15 @@ typedef struct ath_player_options {
     const void *host_mesh;    /* see ath_set_host_mesh; null: none */
     size_t host_stride;
     int32_t host_vertex_count;
+    int32_t in_slices; /* 1: ath_player_open only begins to open the file, and ath_player_ahead goes on with it */
 } ath_player_options;
 
 /* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
  * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
- * ATH_WRONG_HOST_MESH. */
+ * ATH_WRONG_HOST_MESH. ATH_MORE, with options->in_slices: call nothing but ath_player_ahead and ath_player_close until
+ * ath_player_ahead no longer returns ATH_MORE; it may return these errors, too. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
-/* Begins to open a file: ath_player_ahead goes on with it, and is to be called until it no longer returns ATH_MORE. Before,
- * call nothing else but ath_player_close. Returns ATH_MORE, or an error as above. */
-int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
-                          ath_fault_info *fault);
 /* Closes a player, which may be null. End its jobs before. */
 void ath_player_close(ath_player *player);
 /* Returns the file, for ath_get_info, ath_clips, ath_level_for, ath_cut and all functions that take a const file. */
@@ -329,12 +327,13 @@ static int ath_player_build(ath_player *p, int32_t *budget)
     return result == ATH_OK ? ath_player_refine(p, 0, budget) : result;
 }
 
-int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
-                          ath_fault_info *fault)
+int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
+                    ath_fault_info *fault)
 {
     ath_player_options own;
     ath_fault_info why;
     size_t front, file_size;
+    int32_t exactly = ATH_PLAYER_EXACT;
     memset(&own, 0, sizeof own);
     if (options) own = *options;
     if (own.cache_bytes == 0) own.cache_bytes = (size_t)64 << 20;
@@ -349,25 +348,14 @@ int ath_player_open_start(ath_player **player, const uint8_t *bytes, size_t size
     p->budget = ATH_PLAYER_BUDGET;
     p->built = -1;
     p->file = (ath_file *)ath_player_block_of(p, file_size);
-    result = p->file ? ath_open_start(p->file, file_size, bytes, size, own.limits, fault) : ATH_NO_MEMORY;
-    if (result == ATH_MORE)
-        *player = p;
-    else
+    result = p->file ? ath_open_start(p->file, file_size, bytes, size, own.limits, &p->fault) : ATH_NO_MEMORY;
+    if (result == ATH_MORE && !own.in_slices) result = ath_player_build(p, &exactly);
+    if (fault) *fault = p->fault;
+    if (result != ATH_OK && result != ATH_MORE) {
         ath_player_close(p);
-    return result;
-}
-
-int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
-                    ath_fault_info *fault)
-{
-    int result = ath_player_open_start(player, bytes, size, options, fault);
-    if (result != ATH_MORE) return result;
-    int32_t exactly = ATH_PLAYER_EXACT;
-    result = ath_player_build(*player, &exactly);
-    if (fault) *fault = (*player)->fault;
-    if (result == ATH_OK) return ATH_OK;
-    ath_player_close(*player);
-    *player = NULL;
+        return result;
+    }
+    *player = p;
     return result;
 }
 
