@@ -87,33 +87,39 @@ static const int32_t *rest_steps_before(const ath_file *file, int32_t q)
     return q > file->first_layer ? file->layers[q - 1].rest_steps : file->rest_steps;
 }
 
-static int decode_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
+static int start_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
 {
     ath_layer *layer = &file->layers[q];
     ath_bytes body;
     double step;
     int result = ath_parse_refined_rest(chunk, &step, &body);
-    if (result != ATH_OK) return result;
+    if (result != ATH_OK || file->rest_is_exact) return ATH_BAD_CHUNK;
     ath_start_rest(file->model, body, file->branches, file->info.branch_count, step, file->connected,
                    rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);
-    return ath_decode_rest(file->model, 0);
+    return ATH_OK;
 }
 
 /* Reads a layer's rest pose. That of the layer before is known. */
-static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
+static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_info *fault)
 {
     ath_layer *layer = &file->layers[q];
     const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_level_of_layer(file, q) : 1, 0);
     layer->plan.rest = plan_before(file, q)->rest;
     if (!chunk) {
+        if (!ath_spend(cost, file->info.vertex_count)) return ATH_MORE;
         memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
         return ATH_OK;
     }
     ath_bytes content = {chunk->bytes, chunk->length};
     int32_t index = (int32_t)(chunk - file->chunks);
-    int result = ath_check_chunk(file, index, fault);
+    int result = file->is_reading ? ATH_OK : ath_check_chunk(file, index, fault);
     if (result != ATH_OK) return result;
-    if (file->rest_is_exact || decode_layer_rest(file, q, content) != ATH_OK) {
+    if (!file->is_reading) result = start_layer_rest(file, q, content);
+    if (result == ATH_OK) result = ath_decode_rest(file->model, cost);
+    file->is_reading = result == ATH_MORE;
+    if (file->is_reading) return ATH_MORE;
+    ath_spend(cost, file->info.vertex_count);
+    if (result != ATH_OK) {
         ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
         return ath_fault_at(fault, chunk, index);
     }
@@ -125,6 +131,11 @@ static int read_layer_rest(ath_file *file, int32_t q, ath_fault_info *fault)
 }
 
 int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fault_info *fault)
+{
+    return ath_refine_size_within(file, level, memory_bytes, 0, fault);
+}
+
+int ath_refine_size_within(ath_file *file, int32_t level, size_t *memory_bytes, int32_t *cost, ath_fault_info *fault)
 {
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     ath_arena counted = {0, 0};
@@ -138,7 +149,7 @@ int ath_refine_size(ath_file *file, int32_t level, size_t *memory_bytes, ath_fau
     if (!file->bases) ath_take(&counted, ath_build_size(file));
     for (int32_t q = file->first_layer; level > 0 && q <= ath_layer_of(file, level); q++) {
         ath_layer *layer = &file->layers[q];
-        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, why);
+        int result = layer->rest_known ? ATH_OK : read_layer_rest(file, q, cost, why);
         if (result != ATH_OK) return result;
         layer->rest_known = 1;
         if (!layer->bases) ath_take(&counted, layer->bases_count * sizeof(double));

@@ -233,6 +233,7 @@ int ath_read_rest(ath_file *file, ath_fault_info *fault)
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     why->code = ATH_OK;
     if (!has_source_rest(file)) return ATH_OK;
+    file->is_reading = 0; /* the memory of a pose that is being read serves this one */
     why->code = read_source_rest(file, why);
     file->source_rest_known = why->code == ATH_OK;
     return why->code;

@@ -295,11 +295,11 @@ static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
         size_t size;
         if (p->refused != ATH_OK) return p->refused;
         if (left <= 0) return ATH_MORE;
-        int result = ath_refine_size(p->file, p->built + 1, &size, &p->fault);
+        int result = ath_refine_size_within(p->file, p->built + 1, &size, &left, &p->fault);
         void *memory = size > 0 ? ath_player_block_of(p, size) : NULL;
         if (size > 0 && !memory) return ATH_NO_MEMORY;
-        if (result != ATH_OK) return p->refused = result;
-        result = ath_refine_within(p->file, p->built + 1, memory, size, &left);
+        if (result != ATH_OK && result != ATH_MORE) return p->refused = result;
+        if (result == ATH_OK) result = ath_refine_within(p->file, p->built + 1, memory, size, &left);
         p->prepared += (uint64_t)((int64_t)*budget - left);
         if (*budget != ATH_PLAYER_EXACT) *budget = left;
         if (result == ATH_OK) p->built++;
