@@ -82,7 +82,8 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
     rest_layer layer = {branches, branch_count, step, rest, coarse, before, steps, mesh, slack, moved, shape_of};
     copy_pose(branches, branch_count, source, moved);
     coder_start(&coder, bytes, capacity);
-    start_rest(&coder, (rest_model *)model, &layer);
+    ((rest_model *)model)->layer = layer;
+    start_rest(&coder, (rest_model *)model);
     return written(&coder, code_rest(&coder, (rest_model *)model, source, 0));
 }
 

@@ -36,8 +36,7 @@ static int build_to(ath_file *file, int32_t level, int32_t *cost)
 {
     int result = ATH_OK;
     for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
-        int32_t kind = file->next_waves / (ATH_SEGMENT_FRAMES + 1),
-                frames = file->next_waves % (ATH_SEGMENT_FRAMES + 1);
+        int32_t kind = file->next_waves % ATH_WAVE_KINDS, frames = file->next_waves / ATH_WAVE_KINDS;
         if (!file->waves[kind][frames]) continue;
         if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
         ath_waves(frames, kind, file->waves[kind][frames]);

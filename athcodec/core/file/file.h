@@ -60,7 +60,7 @@ struct ath_file {
     int32_t built_level;       /* level up to which `bases` are filled; -1: none */
     int32_t is_reading;        /* 1: a layer's rest pose is read in part */
     int32_t next_piece;        /* where filling the bases that come next goes on */
-    int32_t next_waves;        /* the same of waves, by kind and number of frames */
+    int32_t next_waves;        /* where filling the waves goes on, by number of frames and kind */
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
     int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */

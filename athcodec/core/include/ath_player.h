@@ -4,7 +4,7 @@
  *     #define ATH_PLAYER_IMPLEMENTATION      in one C or C++ file, before the include
  *     #include "ath_player.h"
  *
- *     ath_player_open, ath_player_close      open all of a file or a prefix of it
+ *     ath_player_open, ath_player_close      open all of a file or a prefix of it, at once or in slices
  *     ath_player_positions, _matrices        get what to draw of a clip at a time and level
  *     ath_player_faded_positions             do the same during a fade from level to level
  *     ath_player_blended_positions           blend several clips by weights
@@ -20,7 +20,8 @@
  * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. For
  * downloads that grow, and to decide yourself what is in memory, use ath.h.
  *
- * Time. A call that shows something prepares segments for its budget, about 2 ms, and at most one step of ath.h more.
+ * Time. A call that shows something builds levels and prepares segments for its budget, about 2 ms, and at most one step
+ * of ath.h more. Opening takes longer, unless you choose options.in_slices.
  * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. If
  * there is none, it prepares level 0 at once. If the level is prepared for only one of two frames, that one is held.
  *
@@ -55,7 +56,7 @@ typedef struct ath_player_options {
 
 /* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
  * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
- * ATH_WRONG_HOST_MESH. ATH_MORE, with options->in_slices: call nothing but ath_player_ahead and ath_player_close until
+ * ATH_WRONG_HOST_MESH. ATH_MORE, with options->in_slices: leave the mesh in place, and call nothing but ath_player_ahead and ath_player_close, until
  * ath_player_ahead no longer returns ATH_MORE; it may return these errors, too. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
@@ -147,7 +148,8 @@ int ath_player_endless_positions(ath_player *player, ath_player_endless *play, d
  * Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
 int ath_player_ahead(ath_player *player, int32_t vertex_frames);
 
-/* Returns the first of these preparations as a job; null: nothing is left to do, or there is no memory. */
+/* Returns the first of these preparations as a job. Null: nothing is left to do, there is no memory, or its level is
+ * still being built, by ATH_PLAYER_BUDGET with each call. */
 ath_player_job *ath_player_begin(ath_player *player);
 /* Runs a job for a budget, on any thread. Returns ATH_MORE until it is done. */
 int ath_player_run(ath_player_job *job, int32_t vertex_frames);
@@ -287,7 +289,8 @@ static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entr
 
 /* ---- opening ---- */
 
-/* Builds what the segments share up to a level, for a budget. Threads that prepare levels above do not see it. */
+/* Builds what the segments share up to a level, for a budget. Jobs, which prepare levels that are built, do not look at
+ * what this changes. */
 static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
 {
     while (p->built < level) {

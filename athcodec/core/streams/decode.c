@@ -12,10 +12,7 @@ size_t ath_prelude_model_size(void)
     return larger > sizeof(rest_model) ? larger : sizeof(rest_model);
 }
 
-static int finished(const ath_coder *coder, int valid)
-{
-    return valid == ATH_MORE ? ATH_MORE : valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK;
-}
+static int finished(const ath_coder *coder, int valid) { return valid && coder_finish(coder) ? ATH_OK : ATH_BAD_CHUNK; }
 
 /* Marks every value by the sign of the entry that it names, and clears the marks at the end. */
 static int is_permutation(int32_t count, int32_t *source)
@@ -70,16 +67,15 @@ void ath_start_rest(void *model, ath_bytes stream, const ath_branch *branches, i
     rest_model *own = (rest_model *)model;
     rest_layer layer = {branches, branch_count, step, rest, coarse, before, steps, mesh, 0.0, 0, 0};
     coder_start(&own->coder, stream.bytes, stream.size);
-    start_rest(&own->coder, own, &layer);
+    own->layer = layer;
+    start_rest(&own->coder, own);
 }
 
 int ath_decode_rest(void *model, int32_t *cost)
 {
     rest_model *own = (rest_model *)model;
-    ath_coder coder = own->coder;
-    int valid = code_rest(&coder, own, 0, cost);
-    own->coder = coder;
-    return finished(&coder, valid);
+    int valid = code_rest(&own->coder, own, 0, cost);
+    return valid == ATH_MORE ? ATH_MORE : finished(&own->coder, valid);
 }
 
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
@@ -115,7 +111,8 @@ void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, 
 int ath_decode_faces(void *memory, int32_t *cost)
 {
     faces_model *model = (faces_model *)memory;
-    return finished(&model->coder, code_faces(model, cost));
+    int valid = code_faces(model, cost);
+    return valid == ATH_MORE ? ATH_MORE : finished(&model->coder, valid);
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)

@@ -59,10 +59,10 @@ static void start_faces(faces_model *model, const ath_polygons *shape, int32_t v
     int32_t bits = ath_bits_of_type(shape->count_type), bound = ath_vertices_of_type(shape->index_type, vertex_count);
     uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX, count = counts ? 3 : shape->columns;
     faces_list list = {shape, counts, corners, before, after = before + vertex_count, bound, most, 0, 0, 0, count};
-    for (size_t v = 0; v < (size_t)bound; v++)
-        for (int32_t s = 0; s < FACE_SIDES; s++) before[v][s] = after[v][s] = -1;
     memset(model, 0, sizeof *model);
     model->list = list;
+    for (size_t v = 0; v < (size_t)bound; v++)
+        for (int32_t s = 0; s < FACE_SIDES; s++) before[v][s] = after[v][s] = -1;
     for (int32_t i = 0; i < FACE_RUNS; i++) context_init(&model->repeats[i], 60000);
     for (int32_t g = 0; g < FACE_GUESSES; g++)
         for (int32_t j = 0; j < FACE_PLACES; j++)

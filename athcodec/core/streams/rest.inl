@@ -365,10 +365,11 @@ static void take_along(const ath_branch *branches, const ath_branch *branch, con
     }
 }
 
-static void start_rest(ath_coder *coder, rest_model *model, const rest_layer *layer)
+/* The layer is filled in already. */
+static void start_rest(ath_coder *coder, rest_model *model)
 {
+    const rest_layer *layer = &model->layer;
     rest_model_init(model, layer->coarse != 0);
-    model->layer = *layer;
     model->has_copies = !layer->coarse && coder_bit(coder, &model->copies.any, layer->shape_of != 0);
     model->shape = -1;
     model->next = model->filled = 0;
