@@ -316,30 +316,32 @@ def test_no_call_prepares_more_than_its_budget_one_step_and_level_0(name, lib, s
     assert largest[0] <= most and largest[1] <= 2 * (shown + most * (blocks - shown) / frames)
 
 
-NAMES = ["shipped tree", "sample", "rest-welded-layers", "rest-of-level-1", "layers-mixed", "rest-copies"]
+OPENED = ["shipped tree", "sample", "rest-welded-layers", "rest-of-level-1", "layers-mixed", "rest-copies"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", OPENED)
 def test_opening_in_slices_keeps_to_its_budget_and_gives_the_same(name, lib, sample_ath):
-    """The vectors refine the rest pose, along faces and along stems."""
     path, budget = {"sample": sample_ath, "shipped tree": SHIPPED}.get(name, VECTORS / f"{name}.ath"), 100
     with athcodec.open(path) as file, Player(lib, path.read_bytes()) as whole:
         count, levels, longest = file.file.vertex_count, file.file.level_count, file.file.branches["count"].max()
         most = budget + max(98304, count, file.frame_count, 16 * longest)
         with Player(lib, path.read_bytes(), in_slices=1, budget=0) as player:
-            results = [player.result]
-            ahead = lambda: results.append(lib.ath_player_ahead(player.player, budget))  # noqa: E731
-            costs = []
-            for _ in range(2):
-                while results[-1] == MORE:
-                    costs.extend(works(player, ahead)[:, 0])
-                results.append(MORE)
-                player.level(0.0)  # level 0 is there; the deepest one is built and prepared next
-            assert len(costs) > 10 and max(costs) <= most and results[-2] == OK and player.level(0.0) == levels - 1
+            result, costs = player.result, []
+
+            def step():
+                nonlocal result
+                result = lib.ath_player_ahead(player.player, budget)
+
+            for shown in (0, levels - 1):  # level 0 is shown at once; the deepest one is built and prepared in slices
+                while result == MORE:
+                    costs.extend(works(player, step)[:, 0])
+                assert result == OK and player.level(0.0) == shown
+                result = MORE
             lib.ath_player_set_budget(player.player, EXACT)
             for level in range(levels):
                 pair = (opened.positions(count, 0.0, level) for opened in (player, whole))
                 np.testing.assert_array_equal(*pair, strict=True)
+        assert len(costs) > 10 and max(costs) <= most
 
 
 @pytest.mark.parametrize("kind", [ct.HIERARCHY, ct.REST, ct.TIME, ct.FACES])
@@ -682,17 +684,8 @@ def test_it_runs_clean_under_sanitizers(sample_ath, tmp_path):
     (tmp_path / "program.c").write_text(IMPLEMENTATION + PROGRAM)
     run(sys.executable, CORE / "amalgamate.py", tmp_path / "ath.c")
     flags = "-g -O1 -fsanitize=address,undefined -fno-sanitize-recover -DATH_STATIC".split()
-    run(
-        "cc",
-        *flags,
-        "-I",
-        CORE / "include",
-        tmp_path / "ath.c",
-        tmp_path / "program.c",
-        "-lm",
-        "-o",
-        tmp_path / "program",
-    )
+    sources = tmp_path / "ath.c", tmp_path / "program.c"
+    run("cc", *flags, "-I", CORE / "include", *sources, "-lm", "-o", tmp_path / "program")
     done = subprocess.run([str(tmp_path / "program"), str(sample_ath)], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "90 shown\n", "")
 

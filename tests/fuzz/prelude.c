@@ -124,9 +124,8 @@ static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *bra
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
-    int32_t budget = 0, result;
     ath_start_rest(model, body, branches, count, step, mesh, NULL, NULL, steps, rest);
-    while ((result = ath_decode_rest(model, &budget)) == ATH_MORE) budget = 100;
+    int result = ath_decode_rest(model, NULL);
     if (result == ATH_OK && all_finite(rest, numbers)) {
         ath_start_rest(model, body, branches, count, step / 8.0, mesh, steps, rest, finer_steps, finer);
         ath_decode_rest(model, NULL);
@@ -150,9 +149,8 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
     void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
     int32_t *order = integers((size_t)vertices);
     for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
-    int32_t budget = 0, result;
     ath_start_faces(memory, body, &shape, vertices, counts, corners);
-    while ((result = ath_decode_faces(memory, &budget)) == ATH_MORE) budget = 1 + head[10];
+    int result = ath_decode_faces(memory, NULL);
     for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
         REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
     if (result == ATH_OK) {

@@ -388,9 +388,8 @@ static int read_plan(ath_file *file, ath_fault_info *fault)
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
-    if ((result = check_joins(file, fault)) != ATH_OK) return result;
-    plan_layers(file);
-    return ATH_OK;
+    if ((result = check_joins(file, fault)) == ATH_OK) plan_layers(file);
+    return result;
 }
 
 int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)

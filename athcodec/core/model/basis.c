@@ -399,13 +399,6 @@ static void fill_modes(const ath_piece *pieces, int32_t p, const double *rest, c
         cantilever(piece->count, gaps, 0.1, 0.001, piece->tip_weight, bases + piece->modes, work);
 }
 
-static void fill_sheet(ath_piece *piece, const double *rest, double *bases)
-{
-    const double *modes = bases + piece->modes;
-    double *basis = bases + piece->basis;
-    piece->rank = piece->ring > 0 ? tube(piece, rest, modes, basis) : sheet(piece, rest, modes, basis);
-}
-
 void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *work,
                      double *bases)
 {
@@ -415,8 +408,11 @@ void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const
 
 void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
 {
-    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
-        if (piece->flags & ATH_SHEET) fill_sheet(piece, rest, bases);
+    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++) {
+        const double *modes = bases + piece->modes;
+        if (!(piece->flags & ATH_SHEET)) continue;
+        piece->rank = (piece->ring > 0 ? tube : sheet)(piece, rest, modes, bases + piece->basis);
+    }
 }
 
 int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_level, int32_t last_level,
@@ -428,7 +424,7 @@ int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_
         int is_sheet = piece->flags & ATH_SHEET && is_between(ath_base_level(piece), first_level, last_level);
         if (!ath_spend(cost, 1 + 4 * (has_modes + is_sheet) * piece->count * piece->count)) return ATH_MORE;
         if (has_modes) fill_modes(pieces, *next, rest, before, work, bases);
-        if (is_sheet) fill_sheet(piece, rest, bases);
+        if (is_sheet) ath_basis_sheets(piece, 0, 1, rest, bases);
     }
     *next = 0;
     return ATH_OK;
