@@ -238,7 +238,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_mesh_size": (c_size_t, [c_int32, c_int32]),
     "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
     "ath_weld_mesh": (None, [*[c_void_p] * 3]),
-    "ath_build_mesh": (None, [c_void_p, POINTER(CorePolygons), *[c_void_p] * 3]),
+    "ath_build_mesh": (None, [c_void_p, c_int32, POINTER(CorePolygons), *[c_void_p] * 3]),
     "ath_faces_memory": (c_size_t, [c_int32]),
     "ath_encode_faces": (c_int64, [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_void_p]),
     "ath_encode_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8]),

@@ -31,6 +31,7 @@ FILE_ORDER, SOURCE_ORDER = range(2)
 OK, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 65, 66, 68, 69
 BUDGET, EXACT = 150_000, 2**31 - 1
 SHIPPED = Path(athcodec.__file__).parent / "sample" / "leafed_tree.ath"
+VECTORS = Path(__file__).parent.parent / "spec" / "vectors" / "valid"
 IMPLEMENTATION = '#define ATH_PLAYER_IMPLEMENTATION\n#include "ath_player.h"\n'
 
 Allocate = ctypes.CFUNCTYPE(c_void_p, c_void_p, c_size_t)
@@ -40,6 +41,7 @@ Release = ctypes.CFUNCTYPE(None, c_void_p, c_void_p)
 class Options(ctypes.Structure):
     _fields_ = [("allocate", Allocate), ("release", Release), ("context", c_void_p), ("cache_bytes", c_size_t)]
     _fields_ += [("limits", c_void_p), ("host_mesh", c_void_p), ("host_stride", c_size_t), ("host_vertices", c_int32)]
+    _fields_ += [("in_slices", c_int32)]
 
 
 class Share(ctypes.Structure):
@@ -311,6 +313,44 @@ def test_no_call_prepares_more_than_its_budget_one_step_and_level_0(name, lib, s
     print(f"{name}: {largest[0]} of {frames} vertex-frames, {largest[1]} of {blocks} blocks in the longest call")
     most = BUDGET + max(16384, 64 * 80 * levels) + coarsest  # segments of these files are shorter than 80 frames
     assert largest[0] <= most and largest[1] <= 2 * (shown + most * (blocks - shown) / frames)
+
+
+OPENED = ["shipped tree", "sample", "rest-welded-layers", "rest-of-level-1", "layers-mixed", "rest-copies"]
+
+
+@pytest.mark.parametrize("name", OPENED)
+def test_opening_in_slices_keeps_to_its_budget_and_gives_the_same(name, lib, sample_ath):
+    path, budget = {"sample": sample_ath, "shipped tree": SHIPPED}.get(name, VECTORS / f"{name}.ath"), 100
+    with athcodec.open(path) as file, Player(lib, path.read_bytes()) as whole:
+        count, levels, longest = file.file.vertex_count, file.file.level_count, file.file.branches["count"].max()
+        most = budget + max(98304, count, file.frame_count, 16 * longest)
+        with Player(lib, path.read_bytes(), in_slices=1, budget=0) as player:
+            result, costs = player.result, []
+
+            def step():
+                nonlocal result
+                result = lib.ath_player_ahead(player.player, budget)
+
+            for shown in (0, levels - 1):  # level 0 is shown at once; the deepest one is built and prepared in slices
+                while result == MORE:
+                    costs.extend(works(player, step)[:, 0])
+                assert result == OK and player.level(0.0) == shown
+                result = MORE
+            lib.ath_player_set_budget(player.player, EXACT)
+            for level in range(levels):
+                pair = (opened.positions(count, 0.0, level) for opened in (player, whole))
+                np.testing.assert_array_equal(*pair, strict=True)
+        assert len(costs) > 10 and max(costs) <= most
+
+
+@pytest.mark.parametrize("kind", [ct.HIERARCHY, ct.REST, ct.TIME, ct.FACES])
+def test_the_slice_that_finds_damage_reports_it_as_opening_at_once_does(kind, lib):
+    data = Parts.of(SHIPPED.read_bytes()).with_payload(kind, b"\xff" * 40)
+    with Player(lib, data) as whole, Player(lib, data, in_slices=1) as player:
+        while (result := lib.ath_player_ahead(player.player, 1000)) == MORE:
+            pass
+        fault = ctypes.cast(lib.ath_player_fault(player.player), POINTER(Fault)).contents
+        assert result == whole.result == BAD_CHUNK and str(fault) == str(whole.fault)
 
 
 def test_a_level_is_shown_at_once_and_grows_to_the_one_that_is_asked_for(lib):
@@ -640,17 +680,8 @@ def test_it_runs_clean_under_sanitizers(sample_ath, tmp_path):
     (tmp_path / "program.c").write_text(IMPLEMENTATION + PROGRAM)
     run(sys.executable, CORE / "amalgamate.py", tmp_path / "ath.c")
     flags = "-g -O1 -fsanitize=address,undefined -fno-sanitize-recover -DATH_STATIC".split()
-    run(
-        "cc",
-        *flags,
-        "-I",
-        CORE / "include",
-        tmp_path / "ath.c",
-        tmp_path / "program.c",
-        "-lm",
-        "-o",
-        tmp_path / "program",
-    )
+    sources = tmp_path / "ath.c", tmp_path / "program.c"
+    run("cc", *flags, "-I", CORE / "include", *sources, "-lm", "-o", tmp_path / "program")
     done = subprocess.run([str(tmp_path / "program"), str(sample_ath)], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "90 shown\n", "")
 

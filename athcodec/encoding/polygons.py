@@ -14,6 +14,7 @@ from athcodec.errors import ClipError
 from athcodec.motion.polygons import Polygons
 
 CORNERS_OF_REST, FACES_OF_REST = 8, 4  # Corners and faces per vertex up to which a rest pose goes by faces.
+MESH_PARTS = 3  # Calls of the core that build a mesh.
 WELDS = 3, 4  # Corners of the polygons that are tried for names of places: what faces with vertices of their own have.
 
 
@@ -55,13 +56,10 @@ class Mesh:
         lib.ath_place_mesh(at, vertex_count, len(polygons.corners))
         source = address(vertex_source, np.int32, vertex_count)
         lib.ath_weld_mesh(at, None if names is None else address(names, np.int32, vertex_count), source)
-        lib.ath_build_mesh(
-            at,
-            byref(polygons.shape),
-            None if polygons.counts is None else address(polygons.counts, np.uint32, polygons.face_count),
-            address(polygons.corners, np.int32, len(polygons.corners)),
-            source,
-        )
+        counts = None if polygons.counts is None else address(polygons.counts, np.uint32, polygons.face_count)
+        corners = address(polygons.corners, np.int32, len(polygons.corners))
+        for part in range(MESH_PARTS):
+            lib.ath_build_mesh(at, part, byref(polygons.shape), counts, corners, source)
         self.address = at
 
     @classmethod

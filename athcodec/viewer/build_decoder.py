@@ -44,6 +44,7 @@ SMALL = (
     "refine.c",
     "refuse.c",
     "rest.c",
+    "store.c",
 )
 """Run once per file, or little: compiled for size, all else for speed."""
 SCALAR = (*SMALL, "prepare.c")
@@ -55,6 +56,7 @@ FLAGS = [
     "-std=c11",
     "-fno-unroll-loops",  # unrolled it is larger, and no faster
     "-DATH_STATIC",
+    "-DATH_AT_ONCE",  # without the code of slices, which no worker of the page asks for
     # the bits of positions are part of the format, as in core/CMakeLists.txt
     "-ffp-contract=off",
     "-fno-math-errno",

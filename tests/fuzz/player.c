@@ -61,7 +61,11 @@ static void open_player(user *u, const uint8_t *bytes, size_t size, uint32_t ver
     how.host_mesh = mesh;
     how.host_stride = 12;
     how.host_vertex_count = (int32_t)vertices;
+    how.in_slices = scarce;
     int result = ath_player_open(&u->player, bytes, size, &how, &fault);
+    while (result == ATH_MORE) result = ath_player_ahead(u->player, 1 + options[1] * 20);
+    if (result != ATH_OK) ath_player_close(u->player);
+    if (result != ATH_OK) u->player = NULL;
     free(mesh);
     REQUIRE((result == ATH_OK) == (u->player != NULL), "a player is there where opening was well");
     u->is_exact = options[0] % 4 > 0;

@@ -65,7 +65,8 @@ static void build_plan(ath_branch *branches, int32_t branch_count, int32_t verti
         REQUIRE(count <= 2 * (int64_t)ATH_PIECE_VERTICES * vertices, "bases are bounded by the vertices");
         double *bases = fuzz_memory((size_t)count * sizeof *bases, 0xa5);
         double *work = fuzz_memory(ATH_BASIS_WORK * sizeof *work, 0xa5);
-        ath_basis_fill(pieces, plan.piece_count, 0, INT32_MAX, rest, 0, work, bases);
+        int32_t next = 0;
+        ath_basis_fill(pieces, &next, plan.piece_count, 0, INT32_MAX, rest, 0, work, bases, 0);
         ath_plan_nodes(&plan, nodes);
         free(work);
         free(bases);
@@ -123,10 +124,12 @@ static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *bra
     size_t numbers = 3 * (size_t)vertices;
     int32_t *steps = integers(numbers), *finer_steps = integers(numbers);
     double *finer = fuzz_memory(numbers * sizeof *finer, 0xa5);
-    int result = ath_decode_rest(model, body.bytes, body.size, branches, count, step, mesh, NULL, NULL, steps, rest);
-    if (result == ATH_OK && all_finite(rest, numbers))
-        ath_decode_rest(model, body.bytes, body.size, branches, count, step / 8.0, mesh, steps, rest, finer_steps,
-                        finer);
+    ath_start_rest(model, body, branches, count, step, mesh, NULL, NULL, steps, rest);
+    int result = ath_decode_rest(model, NULL);
+    if (result == ATH_OK && all_finite(rest, numbers)) {
+        ath_start_rest(model, body, branches, count, step / 8.0, mesh, steps, rest, finer_steps, finer);
+        ath_decode_rest(model, NULL);
+    }
     free(finer);
     free(finer_steps);
     free(steps);
@@ -146,7 +149,8 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
     void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
     int32_t *order = integers((size_t)vertices);
     for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
-    int result = ath_decode_faces(memory, body, &shape, vertices, counts, corners);
+    ath_start_faces(memory, body, &shape, vertices, counts, corners);
+    int result = ath_decode_faces(memory, NULL);
     for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
         REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
     if (result == ATH_OK) {
@@ -156,7 +160,7 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
         arena->used = 0;
         ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
         ath_weld_mesh(mesh, head[9] & 1 && shape.corner_count >= (uint32_t)vertices ? corners : NULL, order);
-        ath_build_mesh(mesh, &shape, counts, corners, order);
+        for (int32_t i = 0; i < MESH_PARTS; i++) ath_build_mesh(mesh, i, &shape, counts, corners, order);
     }
     free(order);
     free(memory);

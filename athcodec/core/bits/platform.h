@@ -105,6 +105,18 @@ ATH_INLINE void ath_put_number(void *numbers, size_t at, int is_float64, double 
         ((float *)numbers)[at] = (float)number;
 }
 
+/* Takes units of work from a budget; null: there is no limit. Returns 0, and takes nothing, once the budget is spent. */
+ATH_INLINE int ath_spend(int32_t *budget, int32_t units)
+{
+#ifdef ATH_AT_ONCE
+    (void)budget, (void)units;
+#else
+    if (budget && *budget <= 0) return 0;
+    if (budget) *budget -= units;
+#endif
+    return 1;
+}
+
 ATH_INLINE size_t ath_size_or_most(uint64_t size) { return size < SIZE_MAX ? (size_t)size : SIZE_MAX; }
 
 /* Cuts one block of memory into parts of whole cache lines. If the base is null, it only counts. */

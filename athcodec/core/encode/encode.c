@@ -79,10 +79,12 @@ int64_t ath_encode_rest(void *model, uint8_t *bytes, size_t capacity, const ath_
                         const int32_t *shape_of, int32_t *steps, const double *source, double *moved, double *rest)
 {
     ath_coder coder;
-    rest_layer layer = {coarse, before, steps, mesh, slack, moved, shape_of};
+    rest_layer layer = {branches, branch_count, step, rest, coarse, before, steps, mesh, slack, moved, shape_of};
     copy_pose(branches, branch_count, source, moved);
     coder_start(&coder, bytes, capacity);
-    return written(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, source, rest));
+    ((rest_model *)model)->layer = layer;
+    start_rest(&coder, (rest_model *)model);
+    return written(&coder, code_rest(&coder, (rest_model *)model, source, 0));
 }
 
 int32_t ath_find_copies(const ath_branch *branches, int32_t branch_count, const double *pose, double step, double slack,
@@ -141,10 +143,10 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
 int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
                          const uint32_t *counts, const int32_t *corners)
 {
-    ath_coder coder;
-    coder_start(&coder, bytes, capacity);
-    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, (uint32_t *)counts, (int32_t *)corners);
-    return written(&coder, code_faces(&coder, (faces_model *)memory, &faces));
+    faces_model *model = (faces_model *)memory;
+    start_faces(model, shape, vertex_count, (uint32_t *)counts, (int32_t *)corners);
+    coder_start(&model->coder, bytes, capacity);
+    return written(&model->coder, code_faces(model, 0));
 }
 
 int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count, const double *times)

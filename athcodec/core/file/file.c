@@ -207,7 +207,8 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
     if (result != ATH_OK || shape.is_derived) return result;
     if (!ath_fits(memory, memory_bytes, ath_polygons_size(file)))
         return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
-    return why->code = ath_decode_faces(memory, body, &shape, file->info.vertex_count, counts, corners);
+    ath_start_faces(memory, body, &shape, file->info.vertex_count, counts, corners);
+    return why->code = ath_decode_faces(memory, 0);
 }
 
 /* Counts the parts, nodes and exact vertices of a level, and fills the parts unless `parts` is null. */

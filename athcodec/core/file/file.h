@@ -14,6 +14,7 @@ typedef struct {
     ath_node *nodes; /* first layer only */
     double *rest;    /* null: it has the rest pose of the layer before */
     int32_t *rest_steps;
+    double *bases;        /* plan.bases once they are filled */
     uint64_t bases_count; /* 0: it has the bases of the layer before, or they are not known yet */
     int32_t rest_known;
 } ath_layer;
@@ -48,7 +49,18 @@ struct ath_file {
     double
         *waves[ATH_WAVE_KINDS][ATH_SEGMENT_FRAMES + 1]; /* by kind and number of frames; null: no segment needs them */
     uint64_t bases_count;
+    /* What a part of opening hands on to the next ones; `opened` of them are done. */
+    int32_t opened, *corners; /* corners, counts: of the polygons of `shape` */
+    uint32_t *counts;
+    ath_polygons shape;
+    ath_limits limits;
+    ath_fault_info fault;
+    ath_rest_head rest_head;
+    ath_bytes rest_body;
     int32_t built_level;       /* level up to which `bases` are filled; -1: none */
+    int32_t is_reading;        /* 1: a layer's rest pose is read in part */
+    int32_t next_piece;        /* where filling the bases that come next goes on */
+    int32_t next_waves;        /* where filling the waves goes on, by number of frames and kind */
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
     int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */
@@ -93,8 +105,10 @@ ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && 
 
 /* ---- rest poses and waves ---- */
 
-/* Reads REST: the reference pose, or which mesh of the host's it is. */
-int ath_read_reference(ath_file *file, ath_fault_info *fault);
+/* Does one of ATH_REST_PARTS parts of reading REST: the reference pose, or which mesh of the host's it is. Returns ATH_OK
+ * when it is done, or ATH_MORE. */
+enum { ATH_REST_PARTS = 5 + MESH_PARTS };
+int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault);
 /* Completes what follows from the reference pose. */
 void ath_know_rest(ath_file *file);
 /* Return the waves of a segment's stems, and those of the maps of its nodes. */

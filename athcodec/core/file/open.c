@@ -181,29 +181,31 @@ static int count_coded(ath_file *file, ath_fault_info *fault)
     return ATH_OK;
 }
 
-static int check_depth(const ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int check_depth(const ath_file *file, ath_fault_info *fault)
 {
     int32_t deepest = 0;
     for (int32_t b = 0; b < file->info.branch_count; b++) deepest = ath_max(deepest, file->branches[b].depth);
-    if ((uint32_t)deepest < limits->hierarchy_depth) return ATH_OK;
+    if ((uint32_t)deepest < file->limits.hierarchy_depth) return ATH_OK;
     fault->field = ATH_FIELD_HIERARCHY_DEPTH;
     fault->found = (double)deepest + 1;
-    fault->most = (double)limits->hierarchy_depth;
+    fault->most = (double)file->limits.hierarchy_depth;
     return fault->code = ATH_LIMIT_EXCEEDED;
 }
 
-static int read_hierarchy(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int read_hierarchy(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
     ath_bytes chunk;
-    int result = ath_load(file, ATH_HIERARCHY, &chunk, fault);
+    int result = check_memory(header, &file->limits, (uint64_t)file->longest, fault);
+    if (result == ATH_OK) result = count_coded(file, fault);
+    if (result == ATH_OK) result = ath_load(file, ATH_HIERARCHY, &chunk, fault);
     if (result != ATH_OK) return result;
     memset(file->branches, 0, (size_t)branch_count * sizeof *file->branches);
     result = ath_decode_hierarchy(file->model, chunk.bytes, chunk.size, branch_count, vertex_count, file->branches,
                                   file->branch_source, file->vertex_source);
     if (result != ATH_OK) return result;
-    return check_depth(file, limits, fault);
+    return check_depth(file, fault);
 }
 
 static void build_plan(ath_file *file)
@@ -377,25 +379,39 @@ static int check_levels(const ath_file *file, ath_fault_info *fault)
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
 }
 
-static int read_prelude(ath_file *file, const ath_limits *limits, ath_fault_info *fault)
+static int read_plan(ath_file *file, ath_fault_info *fault)
 {
-    int result = read_clips(file, fault);
-    if (result == ATH_OK) result = check_memory(&file->header, limits, (uint64_t)file->longest, fault);
-    if (result == ATH_OK) result = count_coded(file, fault);
-    if (result == ATH_OK) result = read_hierarchy(file, limits, fault);
-    if (result != ATH_OK) return result;
+    int result;
     build_plan(file);
     file->info.node_count = file->plan.node_count;
     file->info.depth_levels = ath_min(file->info.level_count, ath_level_of(&file->header, file->plan.height + 1) + 1);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
     plan_levels(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
-    if ((result = check_joins(file, fault)) != ATH_OK) return result;
-    plan_layers(file);
-    if ((result = ath_read_reference(file, fault)) != ATH_OK) return result;
-    if ((result = read_time(file, fault)) != ATH_OK) return result;
-    if (!file->info.rest_is_host) ath_know_rest(file);
-    return ATH_OK;
+    if ((result = check_joins(file, fault)) == ATH_OK) plan_layers(file);
+    return result;
+}
+
+int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)
+{
+    const int32_t first = 3, last = first + ATH_REST_PARTS; /* the parts that read REST, and the one behind them */
+    ath_fault_info *why = &file->fault;
+    int result = file->opened > last ? ATH_OK : ATH_MORE;
+    while (result == ATH_MORE && (!cost || *cost > 0)) {
+        int32_t part = file->opened; /* in the order of FORMAT.md, "Opening" */
+        result = part == 0      ? read_clips(file, why)
+                 : part == 1    ? read_hierarchy(file, why)
+                 : part == 2    ? read_plan(file, why)
+                 : part == last ? read_time(file, why)
+                                : ath_read_reference(file, part - first, cost, why);
+        if (result != ATH_OK) continue;
+        if (part == last && !file->info.rest_is_host) ath_know_rest(file);
+        ath_spend(cost, ath_max(file->info.vertex_count, file->info.frame_count));
+        if (file->opened++ < last) result = ATH_MORE;
+    }
+    why->code = result == ATH_MORE ? ATH_OK : result;
+    if (fault) *fault = *why;
+    return result;
 }
 
 /* Parses the front into the file after checking that it fits into the memory. */
@@ -423,18 +439,24 @@ static int read_front(ath_file *file, size_t memory_bytes, const uint8_t *bytes,
     return ATH_OK;
 }
 
-int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
-             ath_fault_info *fault)
+int ath_open_start(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+                   ath_fault_info *fault)
 {
     ath_limits chosen = limits_or_default(limits);
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     ath_file *file = (ath_file *)memory;
     if (!ath_fits(memory, memory_bytes, sizeof *file)) return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
     int result = read_front(file, memory_bytes, bytes, available, &chosen, why);
-    if (result == ATH_OK) {
-        ath_feed(file, bytes, 0, available);
-        result = read_prelude(file, &chosen, why);
-    }
     why->code = result;
-    return result;
+    if (result != ATH_OK) return result;
+    ath_feed(file, bytes, 0, available);
+    file->limits = chosen;
+    return ATH_MORE;
+}
+
+int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available, const ath_limits *limits,
+             ath_fault_info *fault)
+{
+    int result = ath_open_start(memory, memory_bytes, bytes, available, limits, fault);
+    return result == ATH_MORE ? ath_open_within((ath_file *)memory, 0, fault) : result;
 }

@@ -15,71 +15,85 @@ static void take_numbers(ath_file *file)
     if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
 }
 
-/* Decodes polygons behind what building the mesh needs of its scratch memory. */
-static int read_polygons(ath_file *file, ath_bytes chunk, ath_polygons *shape, uint32_t **counts, int32_t **corners)
+/* Begins to decode polygons behind what building the mesh needs of its scratch memory. */
+static int start_polygons(ath_file *file, ath_bytes chunk)
 {
+    ath_polygons *shape = &file->shape;
     int32_t vertex_count = (int32_t)file->header.vertex_count, *work = file->mesh.work;
     size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
     ath_bytes body;
     int result = ath_parse_polygons(chunk, shape, &body);
     if (result != ATH_OK) return result;
     if (shape->is_derived || !ath_serves_rest(shape, vertex_count)) return ATH_BAD_CHUNK;
-    *corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
-    *counts = shape->is_mixed ? (uint32_t *)(void *)(*corners + shape->corner_count) : 0;
-    return ath_decode_faces(work, body, shape, vertex_count, *counts, *corners);
+    file->corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
+    file->counts = shape->is_mixed ? (uint32_t *)(void *)(file->corners + shape->corner_count) : 0;
+    ath_start_faces(work, body, shape, vertex_count, file->counts, file->corners);
+    return ATH_OK;
 }
 
-/* Reads which vertices share a place from the front of the body of REST, and FACES. */
-static int read_mesh(ath_file *file, int32_t welded, ath_bytes *body, ath_fault_info *fault)
+/* Reads the head of REST. Which vertices share a place follows it. */
+static int read_head(ath_file *file, ath_fault_info *fault)
 {
-    ath_bytes chunk, welds;
-    ath_polygons shape;
-    uint32_t *counts;
-    int32_t *corners = 0;
-    int result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
-    if (result == ATH_OK && welded) {
-        result = ath_load(file, ATH_REST, &chunk, fault);
-        if (result == ATH_OK) result = ath_parse_welds(body, &welds);
-        if (result == ATH_OK) result = read_polygons(file, welds, &shape, &counts, &corners);
-        if (result == ATH_OK && shape.corner_count < file->header.vertex_count) result = ATH_BAD_CHUNK;
-        if (result == ATH_OK) ath_load(file, ATH_FACES, &chunk, fault);
-    }
-    if (result != ATH_OK) return fault->code = result;
-    ath_weld_mesh(&file->mesh, corners, file->vertex_source);
-    result = read_polygons(file, chunk, &shape, &counts, &corners);
-    if (result != ATH_OK) return fault->code = result;
-    ath_build_mesh(&file->mesh, &shape, counts, corners, file->vertex_source);
-    return ath_load(file, ATH_REST, &chunk, fault);
-}
-
-int ath_read_reference(ath_file *file, ath_fault_info *fault)
-{
-    const ath_header *header = &file->header;
-    ath_bytes chunk, body;
-    ath_rest_head head;
+    ath_rest_head *head = &file->rest_head;
+    ath_bytes chunk;
     int result = ath_load(file, ATH_REST, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_rest(chunk, &head, &body);
-    if (result == ATH_OK && head.connected) result = read_mesh(file, head.welded, &body, fault);
+    if (result == ATH_OK) result = ath_parse_rest(chunk, head, &file->rest_body);
+    if (result != ATH_OK || !head->connected) return result;
+    file->connected = &file->mesh;
+    result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
+    if (result != ATH_OK || !head->welded) return result;
+    result = ath_load(file, ATH_REST, &chunk, fault);
+    if (result == ATH_OK) result = ath_parse_welds(&file->rest_body, &chunk);
+    return result == ATH_OK ? start_polygons(file, chunk) : result;
+}
+
+static int read_welds(ath_file *file, int32_t *cost, ath_fault_info *fault)
+{
+    int welded = file->rest_head.welded;
+    ath_bytes chunk;
+    int result = welded ? ath_decode_faces(file->mesh.work, cost) : ATH_OK;
+    if (result == ATH_OK && welded && file->shape.corner_count < file->header.vertex_count) return ATH_BAD_CHUNK;
     if (result != ATH_OK) return result;
-    file->connected = head.connected ? &file->mesh : 0;
-    memcpy(file->info.origin, head.origin, sizeof head.origin);
-    file->info.rest_is_float64 = head.is_float64;
-    file->info.rest_is_host = head.is_host;
-    file->rest_is_exact = head.exact || head.is_host;
+    ath_weld_mesh(&file->mesh, file->corners, file->vertex_source);
+    result = ath_load(file, ATH_FACES, &chunk, fault);
+    return result == ATH_OK ? start_polygons(file, chunk) : result;
+}
+
+static int start_pose(ath_file *file, ath_fault_info *fault)
+{
+    const ath_rest_head *head = &file->rest_head;
+    ath_bytes chunk, body = file->rest_body;
+    int result = ath_load(file, ATH_REST, &chunk, fault);
+    if (result != ATH_OK) return result;
+    memcpy(file->info.origin, head->origin, sizeof head->origin);
+    file->info.rest_is_float64 = head->is_float64;
+    file->info.rest_is_host = head->is_host;
+    file->rest_is_exact = head->exact || head->is_host;
     if (file->rest_is_exact && has_source_rest(file)) return ATH_BAD_CHUNK;
-    if (head.is_host) {
-        memcpy(file->info.host_checksum, head.host_checksum, sizeof head.host_checksum);
-    } else if (head.exact) {
-        result =
-            ath_decode_exact_rest(file->model, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                  file->connected, head.is_float64, file->source_rest);
+    memcpy(file->info.host_checksum, head->host_checksum, sizeof head->host_checksum);
+    if (head->exact && !head->is_host) {
+        result = ath_decode_exact_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count,
+                                       file->connected, head->is_float64, file->source_rest);
         take_numbers(file);
-    } else {
-        result = ath_decode_rest(file->model, body.bytes, body.size, file->branches, (int32_t)header->branch_count,
-                                 head.step, file->connected, 0, 0, file->rest_steps, file->rest);
+    } else if (!head->is_host) {
+        ath_start_rest(file->model, body, file->branches, file->info.branch_count, head->step, file->connected, 0, 0,
+                       file->rest_steps, file->rest);
         if (!has_source_rest(file)) file->source_rest = 0;
     }
     return result;
+}
+
+int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault)
+{
+    int has_mesh = file->rest_head.connected;
+    if (part == 0) return read_head(file, fault);
+    if (part == 1 && has_mesh) return read_welds(file, cost, fault);
+    if (part == 2 && has_mesh) return ath_decode_faces(file->mesh.work, cost);
+    if (part == 3 + MESH_PARTS) return start_pose(file, fault);
+    if (part == 4 + MESH_PARTS && !file->rest_is_exact) return ath_decode_rest(file->model, cost);
+    if (part < 3 + MESH_PARTS && has_mesh)
+        ath_build_mesh(&file->mesh, part - 3, &file->shape, file->counts, file->corners, file->vertex_source);
+    return ATH_OK;
 }
 
 void ath_know_rest(ath_file *file)
@@ -219,6 +233,7 @@ int ath_read_rest(ath_file *file, ath_fault_info *fault)
     ath_fault_info unwanted, *why = fault ? fault : &unwanted;
     why->code = ATH_OK;
     if (!has_source_rest(file)) return ATH_OK;
+    file->is_reading = 0; /* the memory of a pose that is being read serves this one */
     why->code = read_source_rest(file, why);
     file->source_rest_known = why->code == ATH_OK;
     return why->code;

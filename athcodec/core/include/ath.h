@@ -214,6 +214,19 @@ ATH_API int ath_front(const uint8_t *bytes, size_t available, const ath_limits *
 ATH_API int ath_open(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
                      const ath_limits *limits, ath_fault_info *fault);
 
+/* These do the work of ath_open, ath_refine_size and ath_refine in slices: each runs steps until their cost exceeds *cost,
+ * in the unit of ath_prepare_within, and subtracts it. ATH_MORE: call it again before any other function that changes the
+ * file or its bytes. A step costs at most 98304, or 1 for each vertex or frame of the file, or 16 for each vertex of one
+ * branch; a lossless rest pose is one step. ath_open_start reads the front and returns ATH_MORE, or an error of ath_open;
+ * ath_open_within reads the rest and finds its faults. Without ath_build, ath_refine_within from level 0 on does its work,
+ * in memory that ath_refine_size_within adds. */
+ATH_API int ath_open_start(void *memory, size_t memory_bytes, const uint8_t *bytes, size_t available,
+                           const ath_limits *limits, ath_fault_info *fault);
+ATH_API int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault);
+ATH_API int ath_refine_size_within(ath_file *file, int32_t level, size_t *memory_bytes, int32_t *cost,
+                                   ath_fault_info *fault);
+ATH_API int ath_refine_within(ath_file *file, int32_t level, void *memory, size_t memory_bytes, int32_t *cost);
+
 /* Gives the rest pose to a file whose info.rest_is_host is 1: the mesh that the file was made for. `xyz` points to
  * `vertex_count` positions of three floats, `stride` bytes apart, at any alignment; a vertex buffer will do. They are
  * the source's numbers in its order, units and axes, as loaded: not scaled or turned, and bit for bit the same, except

@@ -4,7 +4,7 @@
  *     #define ATH_PLAYER_IMPLEMENTATION      in one C or C++ file, before the include
  *     #include "ath_player.h"
  *
- *     ath_player_open, ath_player_close      open all of a file or a prefix of it
+ *     ath_player_open, ath_player_close      open all of a file or a prefix of it, at once or in slices
  *     ath_player_positions, _matrices        get what to draw of a clip at a time and level
  *     ath_player_faded_positions             do the same during a fade from level to level
  *     ath_player_blended_positions           blend several clips by weights
@@ -20,7 +20,8 @@
  * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. For
  * downloads that grow, and to decide yourself what is in memory, use ath.h.
  *
- * Time. A call that shows something prepares segments for its budget, about 2 ms, and at most one step of ath.h more.
+ * Time. A call that shows something builds levels and prepares segments for its budget, about 2 ms, and at most one step
+ * of ath.h more. Opening takes longer, unless you choose options.in_slices.
  * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. If
  * there is none, it prepares level 0 at once. If the level is prepared for only one of two frames, that one is held.
  *
@@ -50,11 +51,13 @@ typedef struct ath_player_options {
     const void *host_mesh;    /* see ath_set_host_mesh; null: none */
     size_t host_stride;
     int32_t host_vertex_count;
+    int32_t in_slices; /* 1: ath_player_open only begins to open the file, and ath_player_ahead goes on with it */
 } ath_player_options;
 
 /* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
  * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
- * ATH_WRONG_HOST_MESH. */
+ * ATH_WRONG_HOST_MESH. ATH_MORE, with options->in_slices: leave the mesh in place, and call nothing but ath_player_ahead and ath_player_close, until
+ * ath_player_ahead no longer returns ATH_MORE; it may return these errors, too. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
 /* Closes a player, which may be null. End its jobs before. */
@@ -145,7 +148,8 @@ int ath_player_endless_positions(ath_player *player, ath_player_endless *play, d
  * Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
 int ath_player_ahead(ath_player *player, int32_t vertex_frames);
 
-/* Returns the first of these preparations as a job; null: nothing is left to do, or there is no memory. */
+/* Returns the first of these preparations as a job. Null: nothing is left to do, there is no memory, or its level is
+ * still being built, by ATH_PLAYER_BUDGET with each call. */
 ath_player_job *ath_player_begin(ath_player *player);
 /* Runs a job for a budget, on any thread. Returns ATH_MORE until it is done. */
 int ath_player_run(ath_player_job *job, int32_t vertex_frames);
@@ -226,7 +230,10 @@ struct ath_player {
     uint64_t calls, prepared;
     int32_t budget, left; /* of each call, and what is left of it in this one */
     int32_t dropped;      /* jobs that were dropped for others since one was done */
-    int32_t deepest;      /* deepest level that is built */
+    int32_t deepest;      /* deepest level of the file */
+    int32_t built;        /* deepest level whose bases are built; -1 until the file is open */
+    size_t *sizes;        /* bytes of a segment at each level */
+    int32_t refused;      /* the error that keeps a level from being built, else ATH_OK */
     int32_t track_count;
     ath_player_track tracks[ATH_BLEND_CLIPS];
     void *blending;  /* scratch memory of blends; null: no blend was shown */
@@ -282,39 +289,45 @@ static void *ath_player_memory_of(ath_player_entry *entry) { return (char *)entr
 
 /* ---- opening ---- */
 
-/* Builds what the segments share at each level, as far as its bytes are there. */
-static int ath_player_refine(ath_player *p)
+/* Builds what the segments share up to a level, for a budget. Jobs, which prepare levels that are built, do not look at
+ * what this changes. */
+static int ath_player_refine(ath_player *p, int32_t level, int32_t *budget)
 {
-    for (int32_t level = 0; level < p->info.level_count; level++) {
+    while (p->built < level) {
+        int32_t left = *budget;
         size_t size;
-        int result = ath_refine_size(p->file, level, &size, &p->fault);
-        if (result == ATH_MISSING) return ATH_OK;
-        if (result != ATH_OK) return result;
+        if (p->refused != ATH_OK) return p->refused;
+        if (left <= 0) return ATH_MORE;
+        int result = ath_refine_size_within(p->file, p->built + 1, &size, &left, &p->fault);
         void *memory = size > 0 ? ath_player_block_of(p, size) : NULL;
         if (size > 0 && !memory) return ATH_NO_MEMORY;
-        result = ath_refine(p->file, level, memory, size);
-        if (result != ATH_OK) return result;
-        p->deepest = level;
+        if (result != ATH_OK && result != ATH_MORE) return p->refused = result;
+        if (result == ATH_OK) result = ath_refine_within(p->file, p->built + 1, memory, size, &left);
+        p->prepared += (uint64_t)((int64_t)*budget - left);
+        if (*budget != ATH_PLAYER_EXACT) *budget = left;
+        if (result == ATH_OK) p->built++;
     }
     return ATH_OK;
 }
 
-static int ath_player_build(ath_player *p, const uint8_t *bytes, size_t size, size_t file_size)
+/* Goes on with opening for a budget, and then builds level 0. */
+static int ath_player_build(ath_player *p, int32_t *budget)
 {
     const ath_player_options *own = &p->options;
-    void *memory = ath_player_block_of(p, file_size);
-    if (!memory) return ATH_NO_MEMORY;
-    int result = ath_open(memory, file_size, bytes, size, own->limits, &p->fault);
-    if (result != ATH_OK) return result;
-    p->file = (ath_file *)memory;
-    ath_get_info(p->file, &p->info);
-    if (p->info.rest_is_host && own->host_mesh)
-        result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
-    if (result != ATH_OK) return result;
-    size_t build = ath_build_size(p->file);
-    if (!(memory = ath_player_block_of(p, build))) return ATH_NO_MEMORY;
-    result = ath_build(p->file, memory, build);
-    return result == ATH_OK ? ath_player_refine(p) : result;
+    int32_t before = *budget;
+    int result = p->sizes ? ATH_OK : ath_open_within(p->file, before != ATH_PLAYER_EXACT ? budget : NULL, &p->fault);
+    p->prepared += (uint64_t)((int64_t)before - *budget);
+    if (result == ATH_OK && !p->sizes) {
+        ath_get_info(p->file, &p->info);
+        p->deepest = p->info.level_count - 1;
+        if (p->info.rest_is_host && own->host_mesh)
+            result = ath_set_host_mesh(p->file, own->host_mesh, own->host_stride, own->host_vertex_count, &p->fault);
+        if (result != ATH_OK) return result;
+        p->sizes = (size_t *)ath_player_block_of(p, (size_t)p->info.level_count * sizeof *p->sizes);
+        if (!p->sizes) return ATH_NO_MEMORY;
+        for (int32_t level = 0; level <= p->deepest; level++) p->sizes[level] = ath_segment_size(p->file, level);
+    }
+    return result == ATH_OK ? ath_player_refine(p, 0, budget) : result;
 }
 
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
@@ -323,6 +336,7 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
     ath_player_options own;
     ath_fault_info why;
     size_t front, file_size;
+    int32_t exactly = ATH_PLAYER_EXACT;
     memset(&own, 0, sizeof own);
     if (options) own = *options;
     if (own.cache_bytes == 0) own.cache_bytes = (size_t)64 << 20;
@@ -335,14 +349,17 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
     memset(p, 0, sizeof *p);
     p->options = own;
     p->budget = ATH_PLAYER_BUDGET;
-    result = ath_player_build(p, bytes, size, file_size);
+    p->built = -1;
+    p->file = (ath_file *)ath_player_block_of(p, file_size);
+    result = p->file ? ath_open_start(p->file, file_size, bytes, size, own.limits, &p->fault) : ATH_NO_MEMORY;
+    if (result == ATH_MORE && !own.in_slices) result = ath_player_build(p, &exactly);
     if (fault) *fault = p->fault;
-    if (result != ATH_OK) {
+    if (result != ATH_OK && result != ATH_MORE) {
         ath_player_close(p);
         return result;
     }
     *player = p;
-    return ATH_OK;
+    return result;
 }
 
 static void ath_player_free_jobs(ath_player *p, ath_player_job *job)
@@ -438,7 +455,7 @@ static void ath_player_retire(ath_player *p, ath_player_job *job)
 /* Begins to prepare a segment, from the end of the one that it is joined to if that is cached. */
 static int ath_player_start(ath_player *p, int32_t segment, int32_t level, ath_player_job **started)
 {
-    size_t size = ath_segment_size(p->file, level), work_size = ath_work_size(p->file);
+    size_t size = p->sizes[level], work_size = ath_work_size(p->file);
     ath_player_entry *before = ath_player_find(p, ath_joined_to(p->file, segment, level), level);
     ath_player_job *job = ath_player_idle_job(p);
     if (!job) return ATH_NO_MEMORY;
@@ -526,6 +543,7 @@ static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int
         int is_exact = *budget == ATH_PLAYER_EXACT, result = ATH_OK;
         if (job && job != p->own && !is_exact) return ATH_OK;
         if (*budget <= 0) return ATH_MORE;
+        if ((result = ath_player_refine(p, level, budget)) != ATH_OK) return result;
         if (!is_exact)
             result = ath_player_own_job(p, segment, level, &job);
         else if (!job || job != p->own)
@@ -550,7 +568,6 @@ static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int
 static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t level)
 {
     int32_t ready = ath_ready_level(p->file, segment);
-    if (ready > p->deepest) ready = p->deepest;
     return level < 0 || level > ready ? ready : level;
 }
 
@@ -569,7 +586,7 @@ static int32_t ath_player_aim(const ath_player *p, int32_t segment, int32_t leve
 {
     int32_t aim = level;
     if (ath_player_find(p, segment, level) || ath_player_job_of(p, segment, level)) return level;
-    while (aim > 0 && ath_segment_size(p->file, aim) > ath_segment_size(p->file, level) / 8) aim--;
+    while (aim > 0 && p->sizes[aim] > p->sizes[level] / 8) aim--;
     return ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
 }
 
@@ -932,16 +949,18 @@ static int ath_player_wish(const ath_player *p, int32_t place, int32_t *segment,
 ath_player_job *ath_player_begin(ath_player *player)
 {
     ath_player_job *job = NULL;
-    int32_t segment, level;
-    for (int32_t i = 0; !job && ath_player_wish(player, i, &segment, &level); i++)
-        if (segment >= 0 && !ath_player_find(player, segment, level) && !ath_player_job_of(player, segment, level))
-            ath_player_start(player, segment, level, &job);
+    int32_t segment, level, budget = ATH_PLAYER_BUDGET, result = ATH_OK;
+    for (int32_t i = 0; !job && result != ATH_MORE && ath_player_wish(player, i, &segment, &level); i++)
+        if (segment >= 0 && !ath_player_find(player, segment, level) && !ath_player_job_of(player, segment, level)) {
+            result = ath_player_refine(player, level, &budget);
+            if (result == ATH_OK) ath_player_start(player, segment, level, &job);
+        }
     return job;
 }
 
 int ath_player_ahead(ath_player *player, int32_t vertex_frames)
 {
-    int result = ATH_OK;
+    int result = player->built < 0 ? ath_player_build(player, &vertex_frames) : ATH_OK;
     int32_t segment, level;
     for (int32_t i = 0; result == ATH_OK && ath_player_wish(player, i, &segment, &level); i++)
         if (segment >= 0) result = ath_player_prepare(player, segment, level, &vertex_frames);

@@ -389,47 +389,48 @@ static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece,
 
 static int is_between(int32_t level, int32_t first, int32_t last) { return first <= level && level <= last; }
 
-static void fill_modes(const ath_piece *pieces, int32_t first, int32_t stop, int32_t first_level, int32_t last_level,
-                       const double *rest, const ath_plan *before, double *work, double *bases)
+static void fill_modes(const ath_piece *pieces, int32_t p, const double *rest, const ath_plan *before, double *work,
+                       double *bases)
 {
     uint8_t gaps[ATH_PIECE_VERTICES];
-    for (int32_t p = first; p < stop; p++) {
-        const ath_piece *piece = pieces + p;
-        if (!is_between(piece->modes_level, first_level, last_level)) continue;
-        piece_gaps(piece, rest, gaps);
-        if (!take_modes(before, p, piece, gaps, bases + piece->modes))
-            cantilever(piece->count, gaps, 0.1, 0.001, piece->tip_weight, bases + piece->modes, work);
-    }
-}
-
-static void fill_sheets(ath_piece *pieces, int32_t first, int32_t stop, int32_t first_level, int32_t last_level,
-                        const double *rest, double *bases)
-{
-    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++)
-        if (piece->flags & ATH_SHEET && is_between(ath_base_level(piece), first_level, last_level)) {
-            const double *modes = bases + piece->modes;
-            double *basis = bases + piece->basis;
-            piece->rank = piece->ring > 0 ? tube(piece, rest, modes, basis) : sheet(piece, rest, modes, basis);
-        }
+    const ath_piece *piece = pieces + p;
+    piece_gaps(piece, rest, gaps);
+    if (!take_modes(before, p, piece, gaps, bases + piece->modes))
+        cantilever(piece->count, gaps, 0.1, 0.001, piece->tip_weight, bases + piece->modes, work);
 }
 
 void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *work,
                      double *bases)
 {
-    fill_modes(pieces, first, stop, 0, INT32_MAX, rest, 0, work, bases);
+    for (int32_t p = first; p < stop; p++)
+        if (pieces[p].modes_level >= 0) fill_modes(pieces, p, rest, 0, work, bases);
+}
+
+static void fill_sheet(ath_piece *piece, const double *rest, double *bases)
+{
+    const double *modes = bases + piece->modes;
+    piece->rank = (piece->ring > 0 ? tube : sheet)(piece, rest, modes, bases + piece->basis);
 }
 
 void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const double *rest, double *bases)
 {
-    for (int32_t p = first; p < stop; p++) /* rigid pieces use no basis */
-        if (!(pieces[p].flags & ATH_RIGID)) fill_sheets(pieces, p, p + 1, 0, INT32_MAX, rest, bases);
+    for (ath_piece *piece = pieces + first; piece < pieces + stop; piece++) /* rigid pieces use no basis */
+        if (piece->flags & ATH_SHEET && !(piece->flags & ATH_RIGID)) fill_sheet(piece, rest, bases);
 }
 
-void ath_basis_fill(ath_piece *pieces, int32_t piece_count, int32_t first_level, int32_t last_level, const double *rest,
-                    const ath_plan *before, double *work, double *bases)
+int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_level, int32_t last_level,
+                   const double *rest, const ath_plan *before, double *work, double *bases, int32_t *cost)
 {
-    fill_modes(pieces, 0, piece_count, first_level, last_level, rest, before, work, bases);
-    fill_sheets(pieces, 0, piece_count, first_level, last_level, rest, bases);
+    for (; *next < piece_count; ++*next) { /* a sheet shares modes with a piece before it alone */
+        ath_piece *piece = pieces + *next;
+        int has_modes = is_between(piece->modes_level, first_level, last_level);
+        int is_sheet = piece->flags & ATH_SHEET && is_between(ath_base_level(piece), first_level, last_level);
+        if (!ath_spend(cost, 1 + 4 * (has_modes + is_sheet) * piece->count * piece->count)) return ATH_MORE;
+        if (has_modes) fill_modes(pieces, *next, rest, before, work, bases);
+        if (is_sheet) fill_sheet(piece, rest, bases);
+    }
+    *next = 0;
+    return ATH_OK;
 }
 
 /* Series of cos(x) and sin(x) for 0 <= x <= pi/4. */

@@ -177,9 +177,12 @@ void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_s
     }
 }
 
-void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts, const int32_t *corners,
-                    const int32_t *vertex_source)
+void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
+                    const int32_t *corners, const int32_t *vertex_source)
 {
+    if (part == 1) join_triangles(mesh);
+    if (part == 2) order_vertices(mesh);
+    if (part > 0) return;
     int32_t *place = mesh->rank; /* not in use yet: serves as the file's number of each vertex of the source */
     uint32_t first = 0;
     mesh->corner_count = (int32_t)shape->corner_count;
@@ -191,8 +194,6 @@ void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *c
         first += count;
     }
     list_corners(mesh);
-    join_triangles(mesh);
-    order_vertices(mesh);
 }
 
 #ifdef ATH_ENCODER

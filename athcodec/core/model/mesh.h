@@ -47,9 +47,10 @@ void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uin
                     uint64_t work_bytes);
 /* Fills `same`. names: vertices of the same name, in source order, share a place; null: each has its own. */
 ATH_ENCODER_API void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_source);
-/* Builds the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
+/* Does one of MESH_PARTS parts of building the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
  * must not be in the mesh's memory. `same` is filled already. */
-ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, const ath_polygons *shape, const uint32_t *counts,
+enum { MESH_PARTS = 3 };
+ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
                                     const int32_t *corners, const int32_t *vertex_source);
 #ifdef ATH_ENCODER
 /* Returns the bytes of a mesh's memory, which ath_place_mesh begins with the struct itself. */

@@ -61,14 +61,21 @@ int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t
     return finished(&coder, valid);
 }
 
-int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
-                    double *rest)
+void ath_start_rest(void *model, ath_bytes stream, const ath_branch *branches, int32_t branch_count, double step,
+                    ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps, double *rest)
 {
-    ath_coder coder;
-    rest_layer layer = {coarse, before, steps, mesh, 0.0, 0, 0};
-    coder_start(&coder, bytes, size);
-    return finished(&coder, code_rest(&coder, (rest_model *)model, &layer, branches, branch_count, step, 0, rest));
+    rest_model *own = (rest_model *)model;
+    rest_layer layer = {branches, branch_count, step, rest, coarse, before, steps, mesh, 0.0, 0, 0};
+    coder_start(&own->coder, stream.bytes, stream.size);
+    own->layer = layer;
+    start_rest(&own->coder, own);
+}
+
+int ath_decode_rest(void *model, int32_t *cost)
+{
+    rest_model *own = (rest_model *)model;
+    int valid = code_rest(&own->coder, own, 0, cost);
+    return valid == ATH_MORE ? ATH_MORE : finished(&own->coder, valid);
 }
 
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
@@ -94,13 +101,18 @@ size_t ath_faces_memory(int32_t vertex_count)
     return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
 }
 
-int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                      int32_t *corners)
 {
-    ath_coder coder;
-    coder_start(&coder, stream.bytes, stream.size);
-    faces_list faces = faces_of((faces_model *)memory, shape, vertex_count, counts, corners);
-    return finished(&coder, code_faces(&coder, (faces_model *)memory, &faces));
+    start_faces((faces_model *)memory, shape, vertex_count, counts, corners);
+    coder_start(&((faces_model *)memory)->coder, stream.bytes, stream.size);
+}
+
+int ath_decode_faces(void *memory, int32_t *cost)
+{
+    faces_model *model = (faces_model *)memory;
+    int valid = code_faces(model, cost);
+    return valid == ATH_MORE ? ATH_MORE : finished(&model->coder, valid);
 }
 
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times)

@@ -12,21 +12,23 @@ size_t ath_prelude_model_size(void);
 /* branches: zero on entry. */
 int ath_decode_hierarchy(void *model, const uint8_t *bytes, size_t size, int32_t branch_count, int32_t vertex_count,
                          ath_branch *branches, int32_t *branch_source, int32_t *vertex_source);
-/* mesh: null unless the pose is connected. coarse, before: integers and positions of the layer before; null for the
+/* Begins to decode a rest pose, which ath_decode_rest goes on with for a budget (null: none) while it returns ATH_MORE.
+ * mesh: null unless the pose is connected. coarse, before: integers and positions of the layer before; null for the
  * first layer. steps: filled with the integers; may be null. */
-int ath_decode_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches, int32_t branch_count,
-                    double step, ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps,
-                    double *rest);
+void ath_start_rest(void *model, ath_bytes stream, const ath_branch *branches, int32_t branch_count, double step,
+                    ath_mesh *mesh, const int32_t *coarse, const double *before, int32_t *steps, double *rest);
+int ath_decode_rest(void *model, int32_t *cost);
 /* Decodes the source's rest pose about the reference pose, both less the origin. turns: scratch, branch_count x 9. */
 int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                            int32_t branch_count, double step, const double *reference, double *turns, double *rest);
 /* Decodes positions as stored, floats or (is_float64) doubles, with the origin. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest);
-/* Decodes corners in source order. memory: ath_faces_memory bytes. counts: null unless shape->is_mixed is 1. */
+/* The same for corners in source order. memory: ath_faces_memory bytes. counts: null unless shape->is_mixed is 1. */
 ATH_ENCODER_API size_t ath_faces_memory(int32_t vertex_count);
-int ath_decode_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
                      int32_t *corners);
+int ath_decode_faces(void *memory, int32_t *cost);
 /* Times are finite. The caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);
 /* rank x frames integers; ATH_MOST_SAMPLE stands for 1. */

@@ -21,10 +21,25 @@ enum {
     FACE_RUNS = 16,
     FACE_PLACES = 5, /* first, second, third, later corners, and those where two open sides agree */
     FACE_COUNTS_BITS = 6,
-    FACE_FAR_MEAN = 1024
+    FACE_FAR_MEAN = 1024,
+    FACE_COST = 8 /* vertex-frames */
 };
 
+/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
+ * none. The next face is `face`; it begins at corner `first`, that before it, of `count` corners, at `previous`. */
 typedef struct {
+    const ath_polygons *shape;
+    uint32_t *counts; /* null if all faces have as many corners */
+    int32_t *corners;
+    int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
+    int32_t bound;
+    uint32_t most; /* most corners of a face */
+    uint32_t face, first, previous, count;
+} faces_list;
+
+typedef struct {
+    ath_coder coder;
+    faces_list list;
     ath_context repeats[FACE_RUNS];                            /* by how long the repetition has held */
     ath_context guessed[FACE_GUESSES][FACE_PLACES][FACE_WAYS]; /* by how the corner before was coded */
     ath_context is_recent[FACE_PLACES], recent[FACE_PLACES][1 << FACE_RECENT_BITS];
@@ -36,31 +51,18 @@ typedef struct {
     int32_t next, way;      /* highest vertex so far + 1; how the last corner was coded */
 } faces_model;
 
-/* The polygons that are coded. Vertices are 0 to bound - 1. before, after: the ends of each vertex's open sides; -1:
- * none. */
-typedef struct {
-    const ath_polygons *shape;
-    uint32_t *counts; /* null if all faces have as many corners */
-    int32_t *corners;
-    int32_t (*before)[FACE_SIDES], (*after)[FACE_SIDES];
-    int32_t bound;
-    uint32_t most; /* most corners of a face */
-} faces_list;
-
-/* memory: a model, then the open sides of each vertex. The types of vertices and counts bound their values. */
-static faces_list faces_of(faces_model *memory, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
-                           int32_t *corners)
+/* The open sides of each vertex stand behind the model. The types of vertices and counts bound their values. */
+static void start_faces(faces_model *model, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
+                        int32_t *corners)
 {
-    int32_t (*before)[FACE_SIDES] = (int32_t (*)[FACE_SIDES])(void *)(memory + 1);
+    int32_t (*before)[FACE_SIDES] = (int32_t (*)[FACE_SIDES])(void *)(model + 1), (*after)[FACE_SIDES];
     int32_t bits = ath_bits_of_type(shape->count_type), bound = ath_vertices_of_type(shape->index_type, vertex_count);
-    uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX;
-    faces_list faces = {shape, counts, corners, before, before + vertex_count, bound, most};
-    return faces;
-}
-
-static void faces_model_init(faces_model *model)
-{
+    uint32_t most = shape->is_mixed && bits < 31 ? (1u << bits) - 1 : UINT32_MAX, count = counts ? 3 : shape->columns;
+    faces_list list = {shape, counts, corners, before, after = before + vertex_count, bound, most, 0, 0, 0, count};
     memset(model, 0, sizeof *model);
+    model->list = list;
+    for (size_t v = 0; v < (size_t)bound; v++)
+        for (int32_t s = 0; s < FACE_SIDES; s++) before[v][s] = after[v][s] = -1;
     for (int32_t i = 0; i < FACE_RUNS; i++) context_init(&model->repeats[i], 60000);
     for (int32_t g = 0; g < FACE_GUESSES; g++)
         for (int32_t j = 0; j < FACE_PLACES; j++)
@@ -246,22 +248,22 @@ static uint32_t code_face_count(ath_coder *coder, faces_model *model, uint32_t b
     return count;
 }
 
-static int code_faces(ath_coder *coder, faces_model *model, const faces_list *faces)
+/* Returns 1; 0: the stream is not valid; ATH_MORE: the budget is spent. */
+static int code_faces(faces_model *model, int32_t *cost)
 {
-    uint32_t first = 0, previous = 0, count = faces->shape->columns, left = faces->shape->corner_count;
-    faces_model_init(model);
-    for (size_t v = 0; v < (size_t)faces->bound; v++)
-        for (int32_t s = 0; s < FACE_SIDES; s++) faces->before[v][s] = faces->after[v][s] = -1;
-    if (faces->counts) count = 3;
-    for (uint32_t f = 0; f < faces->shape->face_count; f++) {
-        if (faces->counts)
-            count = faces->counts[f] = code_face_count(coder, model, count, ENCODING ? faces->counts[f] : 0);
-        if (count > left || count > faces->most || !code_face(coder, model, faces, first, count, previous)) return 0;
-        left -= count;
-        if (count > 0) previous = first;
-        first += count;
+    ath_coder *coder = &model->coder;
+    faces_list *faces = &model->list;
+    for (; faces->face < faces->shape->face_count; faces->face++) {
+        uint32_t *own = faces->counts ? faces->counts + faces->face : 0, first = faces->first;
+        if (!ath_spend(cost, FACE_COST)) return ATH_MORE;
+        if (own) faces->count = *own = code_face_count(coder, model, faces->count, ENCODING ? *own : 0);
+        if (faces->count > faces->shape->corner_count - first || faces->count > faces->most
+            || !code_face(coder, model, faces, first, faces->count, faces->previous))
+            return 0;
+        if (faces->count > 0) faces->previous = first;
+        faces->first += faces->count;
     }
-    return left == 0;
+    return faces->first == faces->shape->corner_count;
 }
 
 #endif

@@ -16,6 +16,9 @@ enum { REST_RUN = 32, REST_BASES = REST_RUN * (REST_RUN + 1) * (2 * REST_RUN + 1
 /* A layer's rest pose and what it is coded about. A refinement knows the integers (`coarse`) and positions (`before`)
  * of the layer before, three per vertex. Integers of a run's modes stand with its vertices. */
 typedef struct {
+    const ath_branch *branches;
+    int32_t branch_count;
+    double step, *rest;
     const int32_t *coarse; /* null: this is no refinement */
     const double *before;
     int32_t *steps; /* filled for the next layer; may be null */
@@ -33,7 +36,11 @@ typedef struct {
 } rest_vertices;
 
 typedef struct {
-    number_model bent; /* steps of single vertices of SOURCE_REST */
+    ath_coder coder; /* of a stream that is decoded for budgets */
+    rest_layer layer;
+    int32_t has_copies, next; /* next: the branch to code, or the place in the mesh's order */
+    int32_t shape, filled;    /* last branch whose role is a shape; vertices of a mesh filled from their places */
+    number_model bent;        /* steps of single vertices of SOURCE_REST */
     uint32_t bent_mean[3];
     union {
         coefficient_model modes;
@@ -299,36 +306,39 @@ static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t 
     return 1;
 }
 
+enum { VERTEX_COST = 16 }; /* vertex-frames that coding a vertex takes */
+
 /* Codes vertices in the order of the mesh about their neighbours. A vertex without known neighbours is coded as on a
  * stem, since the places of all vertices before it are known. */
-static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
-                               int32_t branch_count, int has_copies, double step, const double *source, double *rest)
+static int code_connected_rest(ath_coder *coder, rest_model *model, const double *source, int32_t *cost)
 {
+    const rest_layer *layer = &model->layer;
+    const ath_branch *branches = layer->branches;
     ath_mesh *mesh = layer->mesh;
-    int32_t shape = -1, filled = 0; /* the last branch whose role is a shape; vertices filled from their places */
-    for (int32_t v = 0; v < mesh->vertex_count; v++) mesh->from[v] = -1;
-    for (int32_t t = 0; t < mesh->place_count; t++) {
-        int32_t v = mesh->order[t];
+    double *rest = layer->rest;
+    for (; model->next < mesh->place_count; model->next++) {
+        int32_t t = model->next, v = mesh->order[t];
+        if (!ath_spend(cost, VERTEX_COST)) return ATH_MORE;
         if (mesh->from[v] == OF_COPY) continue;
-        const ath_branch *branch = branch_of(branches, branch_count, v);
+        const ath_branch *branch = branch_of(branches, layer->branch_count, v);
         rest_predictor *predictor = &single_of(model, branch)->connected;
-        double step_here = rest_step(branch, step);
+        double step_here = rest_step(branch, layer->step);
         rest_ring ring;
         rest_guess at;
         rest_ring_of(mesh, rest, v, &ring);
         if (ring.base < 0) {
-            fill_places(mesh, filled, v, rest);
-            filled = v;
+            fill_places(mesh, model->filled, v, rest);
+            model->filled = v;
         }
-        if (has_copies && ring.base < 0 && is_untouched(mesh, branch, v, t)) {
+        if (model->has_copies && ring.base < 0 && is_untouched(mesh, branch, v, t)) {
             int32_t b = (int32_t)(branch - branches);
             int32_t role = code_part(coder, model, layer, branches, b, step_here, source, rest);
             if (role < 0) return 0;
-            if (role == SHAPE_PART) shape = b;
+            if (role == SHAPE_PART) model->shape = b;
             for (int32_t i = 0; role == COPY_PART && i < branch->count; i++) mesh->from[v + i] = OF_COPY;
             if (role == COPY_PART) continue;
         }
-        if (branch == branches + shape) step_here = SHAPE_FINER * step_here;
+        if (branch == branches + model->shape) step_here = SHAPE_FINER * step_here;
         double unit = LATTICE_UNIT * step_here;
         mesh->from[v] = ring.base;
         if (ring.base < 0) {
@@ -338,7 +348,7 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const rest_l
         rest_look_beside(predictor, mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
         code_expected_vertex(coder, model, layer, branch, predictor, &at, v, unit, source, rest);
     }
-    fill_places(mesh, filled, mesh->vertex_count, rest);
+    fill_places(mesh, model->filled, mesh->vertex_count, rest);
     return 1;
 }
 
@@ -355,19 +365,30 @@ static void take_along(const ath_branch *branches, const ath_branch *branch, con
     }
 }
 
-static int code_rest(ath_coder *coder, rest_model *model, const rest_layer *layer, const ath_branch *branches,
-                     int32_t branch_count, double step, const double *source, double *rest)
+/* The layer is filled in already. */
+static void start_rest(ath_coder *coder, rest_model *model)
 {
-    int has_copies = !layer->coarse;
+    const rest_layer *layer = &model->layer;
     rest_model_init(model, layer->coarse != 0);
-    if (has_copies) has_copies = coder_bit(coder, &model->copies.any, layer->shape_of != 0);
-    if (layer->mesh)
-        return code_connected_rest(coder, model, layer, branches, branch_count, has_copies, step, source, rest);
-    for (int32_t b = 0; b < branch_count && !model->modes.invalid; b++) {
-        double own = rest_step(branches + b, step);
+    model->has_copies = !layer->coarse && coder_bit(coder, &model->copies.any, layer->shape_of != 0);
+    model->shape = -1;
+    model->next = model->filled = 0;
+    for (int32_t v = 0; layer->mesh && v < layer->mesh->vertex_count; v++) layer->mesh->from[v] = -1;
+}
+
+/* Returns 1; 0: the stream is not valid; ATH_MORE: the budget is spent. */
+static int code_rest(ath_coder *coder, rest_model *model, const double *source, int32_t *cost)
+{
+    const rest_layer *layer = &model->layer;
+    const ath_branch *branches = layer->branches;
+    double *rest = layer->rest;
+    if (layer->mesh) return code_connected_rest(coder, model, source, cost);
+    for (; model->next < layer->branch_count && !model->modes.invalid; model->next++) {
+        int32_t b = model->next, role = PLAIN_PART;
+        double own = rest_step(branches + b, layer->step);
+        if (!ath_spend(cost, VERTEX_COST * branches[b].count)) return ATH_MORE;
         if (ENCODING) take_along(branches, branches + b, source, layer->moved, rest);
-        int32_t role = PLAIN_PART;
-        if (has_copies) role = code_part(coder, model, layer, branches, b, own, layer->moved, rest);
+        if (model->has_copies) role = code_part(coder, model, layer, branches, b, own, layer->moved, rest);
         if (role < 0) return 0;
         if (role == COPY_PART) continue;
         if (role == SHAPE_PART) own = SHAPE_FINER * own;
