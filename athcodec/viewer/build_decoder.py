@@ -40,6 +40,7 @@ SMALL = (
     "mesh.c",
     "open.c",
     "plan.c",
+    "predict.c",
     "ranges.c",
     "refine.c",
     "refuse.c",
