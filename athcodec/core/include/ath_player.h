@@ -56,8 +56,9 @@ typedef struct ath_player_options {
 
 /* Opens a file, of which `size` bytes are there: at least its prelude. options, fault: may be null. If it fails,
  * *player is null, and the result is an error of the file, ATH_MISSING, ATH_NO_MEMORY, ATH_NEEDS_HOST_MESH or
- * ATH_WRONG_HOST_MESH. ATH_MORE, with options->in_slices: leave the mesh in place, and call nothing but ath_player_ahead and ath_player_close, until
- * ath_player_ahead no longer returns ATH_MORE; it may return these errors, too. */
+ * ATH_WRONG_HOST_MESH. With options->in_slices it returns ATH_MORE: leave the mesh in place, and call nothing but
+ * ath_player_ahead and ath_player_close, until ath_player_ahead no longer returns ATH_MORE; it may return these errors,
+ * too. */
 int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, const ath_player_options *options,
                     ath_fault_info *fault);
 /* Closes a player, which may be null. End its jobs before. */
