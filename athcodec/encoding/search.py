@@ -79,6 +79,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     best_level_steps: ("steps of levels", 0.2),
     best_freedom: ("freedom of rigid parts", 0.2),
     forms.best_forms: ("forms", 0.4),
+    forms.best_forms_again: ("forms", 0.1),
     rotations.still_if_smaller: ("branches whose bending turns nothing", 0.4),
     rotations.best_rotations: ("rotations", 0.4),
     rotations.fast_rotations: ("rotations", 1.0),
@@ -220,6 +221,7 @@ class Search:
             forms.best_forms,
             rotations.best_rotations,
             learned_bases.best_bases,
+            forms.best_forms_again,
             learned_pieces.best_pieces_in_any_basis,
         ]
         work = self.trials.work

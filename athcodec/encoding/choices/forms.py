@@ -54,6 +54,11 @@ def best_forms(settings: Settings, trials: Trials) -> Settings:
     return replace(trials.cheapest(tried), rotation_step_factors=settings.rotation_step_factors)
 
 
+def best_forms_again(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the best forms once time bases are known."""
+    return best_forms(settings, trials)
+
+
 def in_each_basis(settings: Settings, trials: Trials) -> list[Settings]:
     """Return the settings and, on short stems, the same without rotations in each form."""
     if float(np.median(trials.source.hierarchy.stem_count)) > SHORT_STEM:

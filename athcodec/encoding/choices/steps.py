@@ -10,7 +10,7 @@ from athcodec.encoding.choices.forms import in_each_basis
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
-WALKS = 2  # Largest number of walks of both steps.
+WALKS = 3  # Largest number of walks of both steps.
 LONGEST_WALK = 10  # Grid points that a walk moves at most.
 STEP_FACTOR, REST_STEP_FACTOR = 1.15, 1.4  # Ratios of neighbouring grid points.
 FINE_FACTOR, FINE_REST_FACTOR = 1.04, 1.12  # Factors of a search at effort "best".
