@@ -455,9 +455,10 @@ class EncodingJob:
         start = search.trials.start
         is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
         prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
-        saves = SEARCH_SAVES if work.fits(search.trials.work_of_trial) else 1.0
-        if prediction is not None and prediction.bytes < saves * unsearched:
-            return self._predicted(prediction.choice)
+        if prediction is not None and prediction.bytes < unsearched:
+            with work.trying("transformed motion"):
+                if prediction.bytes < SEARCH_SAVES * unsearched or not work.fits(search.trials.work_of_trial):
+                    return self._predicted(prediction.choice)
         try:
             choices, prelude = search.decide()
             if prediction is not None and prediction.bytes < share * search.cost:
