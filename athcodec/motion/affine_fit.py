@@ -33,7 +33,10 @@ class Differences:
     @classmethod
     def of(cls, frames: np.ndarray, pieces: Pieces, xi: float | None) -> Differences:
         """Return both measures of frames (3,k,N), seen from the origin of the pieces."""
-        return Fit(pieces, frames, np.inf if xi is None else xi).differences
+        shape = frames.shape[1], len(pieces.first)
+        measured = cls(np.empty(shape), np.zeros(shape[1]), np.zeros(shape[1], np.int32))
+        Fit(pieces, frames, measured, np.inf if xi is None else xi)
+        return measured
 
     def __or__(self, other: Differences) -> Differences:
         """Return the LAD of the pieces with their GADs."""
@@ -132,16 +135,17 @@ class Pieces:
 class Fit:
     """The affine maps x -> linear (x - rest centroid) + centroid of all pieces in k frames.
 
-    linear and inverse are (k,n,3,3), centroid (k,n,3), all seen from the origin of the pieces. differences: how far the
-    residuals are from their base places.
+    linear and inverse are (k,n,3,3), centroid (k,n,3), all seen from the origin of the pieces. measured: filled with
+    how far the residuals are from their base places; None: nobody asks.
     """
 
-    def __init__(self, pieces: Pieces, frames: np.ndarray, xi: float = np.inf) -> None:
+    def __init__(
+        self, pieces: Pieces, frames: np.ndarray, measured: Differences | None = None, xi: float = np.inf
+    ) -> None:
         self.pieces, self.frames = pieces, np.ascontiguousarray(frames, np.float64)
         (_, count, vertices), stems, n = frames.shape, len(pieces.stems) - 1, len(pieces.first)
         self.linear, self.inverse = np.empty((2, count, n, 3, 3))
         self.centroid, work = np.empty((count, n, 3)), np.empty(12 * (stems + 1) + 9 * n)
-        self.differences = Differences(np.empty((count, n)), np.zeros(n), np.zeros(n, np.int32))
         lib.ath_fit(
             vertices,
             count,
@@ -155,7 +159,7 @@ class Fit:
             address(self.frames, np.float64, 0),
             xi,
             *(address(array, np.float64, 0) for array in (work, self.linear, self.inverse, self.centroid)),
-            *(array.ctypes.data for array in vars(self.differences).values()),
+            *((None,) * 3 if measured is None else (array.ctypes.data for array in vars(measured).values())),
         )
 
     def matrices(self) -> np.ndarray:

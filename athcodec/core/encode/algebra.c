@@ -323,9 +323,10 @@ void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int
             if (link[3] == 0) memcpy(map, R, 9 * sizeof *map);
             invert(map, inverse + 9 * p);
             if (link[4]) ath_nearest_rotation(map, rotations + 9 * p);
-            mean[(size_t)t * (size_t)piece_count + (size_t)p] =
-                measure_piece(N, N * (size_t)frames, (size_t)stems[first], (size_t)stems[stop], inverse + 9 * p, own,
-                              centre, rest, x, xi, largest + p, most_beyond + p);
+            if (mean)
+                mean[(size_t)t * (size_t)piece_count + (size_t)p] =
+                    measure_piece(N, N * (size_t)frames, (size_t)stems[first], (size_t)stems[stop], inverse + 9 * p,
+                                  own, centre, rest, x, xi, largest + p, most_beyond + p);
         }
     }
 }

@@ -80,12 +80,12 @@ ATH_ENCODER_API const char *ath_layout(int32_t index, size_t *offset, size_t *si
 /* Returns the bytes of scratch memory that any of the writers below needs as `model`. */
 ATH_ENCODER_API size_t ath_model_size(void);
 
-/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid; and measures residuals: their mean distance
- * from the rest pose in each frame, the largest, and the most vertices beyond xi in a frame (from those given). stems:
- * first vertices, and the number of all. order: pieces, each behind its parent. links, 5 per piece: first and last stem +
- * 1, parent or -1, rank, and whether others inherit its rotation. shapes, 21 per piece: centroid, principal axes and
- * pseudo-inverse of the rest pose. rest: 3 x vertices; positions: 3 x frames x vertices. work: 12 x (stem_count + 1) + 9
- * x piece_count. */
+/* Fills the maps of pieces in each frame: matrix, its inverse, and centroid; and where `mean` is not null, measures
+ * residuals: their mean distance from the rest pose in each frame, the largest, and the most vertices beyond xi in a frame
+ * (from those given). stems: first vertices, and the number of all. order: pieces, each behind its parent. links, 5 per
+ * piece: first and last stem + 1, parent or -1, rank, and whether others inherit its rotation. shapes, 21 per piece:
+ * centroid, principal axes and pseudo-inverse of the rest pose. rest: 3 x vertices; positions: 3 x frames x vertices.
+ * work: 12 x (stem_count + 1) + 9 x piece_count. */
 ATH_ENCODER_API void ath_fit(int32_t vertex_count, int32_t frames, int32_t stem_count, const int64_t *stems,
                              int32_t piece_count, const int64_t *order, const int64_t *links, const double *shapes,
                              const double *rest, const double *positions, double xi, double *work, double *linear,
