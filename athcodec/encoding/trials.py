@@ -174,7 +174,7 @@ class Trials:
         of_sample = settings.of_segment(sample.whole_loop)
         levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
         segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
-        segment.analyse(sample.positions, of_sample.rounding, None, None, bent)
+        segment.analyse(sample.positions, of_sample.rounding, bent=bent)
         return segment
 
     def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
