@@ -51,8 +51,9 @@ LEAST_THREADED = 16 << 20  # Bytes of a segment from which a clip of one segment
 WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
 WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
-LEAST_SAMPLED, SPARSE = 256, 16  # Vertices from which one of so many is enough if it takes enough corrections.
-ENOUGH, ENOUGH_SHARE = 2000, 0.015  # Corrections that show the bytes of all, and more for each vertex in a frame.
+LEAST_SAMPLED, SPARSE = 256, 16  # Vertices from which one of so many is enough if many frames are to be corrected.
+SPREAD = 512  # Vertices all over the plant of which frames beyond the limit are counted.
+MANY, MANY_SHARE = 8000, 0.06  # Frames of vertices beyond the limit that are many, and more for each that is coded.
 SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 positions.
 
 
@@ -756,17 +757,17 @@ def code_stems(
 def _some_corrections(
     prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray
 ) -> tuple[Corrections, np.ndarray]:
-    """Return the corrections of a sample, and its vertices: fewer if they take many."""
-
-    def corrections(part: int) -> tuple[Corrections, np.ndarray]:
-        return sampled_corrections(prelude.plan, prelude.origin, settings, decoded, positions, part)
-
-    least, few = 1 if len(decoded) < SAMPLED else 2, None
-    if len(decoded) >= LEAST_SAMPLED:
-        few = corrections(SPARSE)
-        enough = ENOUGH + ENOUGH_SHARE * len(decoded) * decoded.shape[2]
-        least = max(least, 1 << int(SPARSE * len(few[0].rows) / enough).bit_length() >> 1)
-    return few if few is not None and least >= SPARSE else corrections(least)
+    """Return the corrections of a sample, and its vertices: fewer if many frames lie beyond the limit."""
+    plan, count, part = prelude.plan, len(decoded), 1 if len(decoded) < SAMPLED else 2
+    if count >= LEAST_SAMPLED:
+        spread = np.arange(0, count, -(-count // SPREAD))
+        errors = decoded[spread] - positions[spread] - prelude.origin[:, None]
+        limit = settings.limit if np.isscalar(settings.limit) else settings.limit[spread, None]
+        beyond = np.mean((np.square(errors).sum(axis=1) > np.square(limit)).sum(axis=1))
+        most = MANY + MANY_SHARE * decoded[:, 0].size
+        while part < SPARSE and beyond * len(plan.sample(part).vertices) > most:
+            part *= 2
+    return sampled_corrections(plan, prelude.origin, settings, decoded, positions, part)
 
 
 def sampled_corrections(
