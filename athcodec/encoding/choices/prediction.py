@@ -22,7 +22,7 @@ from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
-from athcodec.encoding.progress import PREDICTION, Work
+from athcodec.encoding.progress import PREDICTION, REST, Work
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segment_samples import SegmentSample, typical_segments
 from athcodec.encoding.settings import Choice, Settings
@@ -88,9 +88,13 @@ def best_prediction(
     alone is tried."""
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
-    by_ratio = cache(lambda ratio: _settings(source, ath, bound, ratio * limit))
-    samples = _samples(source)
+    samples, vertices = _samples(source), source.clip.vertex_count
     preludes: dict[float, CodedPrelude] = {}
+
+    @cache
+    def by_ratio(ratio: float) -> Settings:
+        work.add(REST * vertices)
+        return _settings(source, ath, bound, ratio * limit)
 
     def prelude_of(settings: Settings) -> CodedPrelude:
         if settings.rest_step not in preludes:
@@ -101,7 +105,7 @@ def best_prediction(
         settings = by_ratio(way.rest_ratio)
         stepped = replace(settings, step=_largest_step(way.error_share * settings.limit, way.lattice))
         choice = Choice(stepped, stepped, None, predicted=way.lattice, error_share=way.error_share)
-        work.add(PREDICTION * source.clip.vertex_count * sum(sample.positions.shape[2] for sample in samples))
+        work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(settings)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
@@ -127,6 +131,7 @@ def best_prediction(
         found = coded(Way(USUAL_REST_RATIO))
         return found if found.bytes < most_bytes else None
     some = by_ratio(USUAL_REST_RATIO)
+    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
     try:
         if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
