@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -98,6 +99,7 @@ def _ways(end: End, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
 
 
+@cache
 def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the shares of the jump and of the change of slope that a join adds to its frames, (width,) each."""
     width, is_sloped = join % SLOPED, join >= SLOPED
@@ -106,6 +108,12 @@ def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
     jumps = np.where(u < 0.5, 1.0 - 2.0 * u * u, 2.0 * left * left)
     slopes = width * np.where(u < TURN, u - (0.5 + TURN) * u * u, (0.5 + TURN) * left * left)
     return jumps, slopes if is_sloped else np.zeros(width)
+
+
+@cache
+def _bends_of(join: int) -> list[np.ndarray]:
+    """Return the second differences of both shares, from the last frame before the seam on."""
+    return [np.diff(np.pad(share, 2), 2) for share in _shares(join)]
 
 
 def apply_join(end: End, positions: np.ndarray, join: int) -> None:
@@ -235,8 +243,7 @@ def best_join(
 
     def cost(join: int) -> float:
         shares = _shares(join)
-        moves = [np.diff(np.pad(share, 2), 2) for share in shares]
-        joined = np.sqrt(changes.by(*moves))
+        joined = np.sqrt(changes.by(*_bends_of(join)))
         tick = float((joined / natural[: len(joined)]).max()) if usual > 0 else 0.0
         after = errors.by(*shares)
         beyond = max(0.0, float(after.max(initial=0.0)) ** 0.5 / largest - 1.0) if largest > 0 else 0.0
