@@ -266,13 +266,17 @@ ATH_INLINE void place_frame(int32_t t, const placing_terms *terms, const placed_
         out[k * T + t] = c[k * T] + (R[0] * x[0] + R[T] * x[1] + R[2 * T] * x[2]);
 }
 
-/* Puts rows of PLACED_FRAMES positions into frames, and prefetches the memory behind them, which the next ones fill. */
+/* Prefetches the memory behind rows of positions in a frame, which the next ones fill. */
+ATH_INLINE void expect_rows(int32_t rows, const float *out)
+{
+    for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 16)
+        ath_expect_write((uintptr_t)out + ((size_t)rows + behind - 1) * sizeof *out);
+}
+
+/* Puts rows of PLACED_FRAMES positions into frames. */
 ATH_INLINE void put_into_frames(int32_t rows, const double *from, int32_t row_size, const double *added, float *out,
                                 size_t frame_size)
 {
-    for (size_t t = 0; t < PLACED_FRAMES; t++)
-        for (size_t behind = 16; behind <= 3 * PLACED_VERTICES; behind += 16)
-            ath_expect_write((uintptr_t)out + (t * frame_size + (size_t)rows + behind - 1) * sizeof *out);
     for (int32_t r = 0; rows >= ATH_LANES && r < rows; r += ATH_LANES) {
         int32_t row = ath_min(r, rows - ATH_LANES);
         for (size_t t = 0; t < PLACED_FRAMES; t += ATH_LANES)
@@ -307,13 +311,16 @@ ATH_HOT static void place(const ath_plan *plan, const ath_motion *motion, const 
         for (int32_t start = 0; T >= PLACED_FRAMES && start < T; start += PLACED_FRAMES) {
             int32_t t = ath_min(start, T - PLACED_FRAMES), row_size = kept ? T : PLACED_FRAMES;
             double *moved = kept ? out + t : tile;
-            for (int32_t i = 0; i < count; i++) add_terms(t, &terms, &vertices, i, sums[i]);
+            float *first = to ? to->first + (size_t)t * to->frame_size + 3 * at[0] : 0;
+            for (int32_t i = 0; i < count; i++) {
+                if (to && i < PLACED_FRAMES) expect_rows(3 * count, first + (size_t)i * to->frame_size);
+                add_terms(t, &terms, &vertices, i, sums[i]);
+            }
             for (int32_t from = 0; from < PLACED_FRAMES; from += ATH_LANES)
                 move_vertices(T, kept ? at : places, count, R + t + from, c + t + from, sums, from, moved + from,
                               row_size);
             if (to)
-                put_into_frames(3 * count, moved + (kept ? 3 * at[0] * T : 0), row_size, added,
-                                to->first + (size_t)t * to->frame_size + 3 * at[0], to->frame_size);
+                put_into_frames(3 * count, moved + (kept ? 3 * at[0] * T : 0), row_size, added, first, to->frame_size);
         }
         for (int32_t t = 0; T < PLACED_FRAMES && t < T; t++)
             for (int32_t i = 0; i < count; i++) {
