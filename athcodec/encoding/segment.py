@@ -333,6 +333,12 @@ class Source:
             positions.setflags(write=False)
         return positions
 
+    def sharing(self, segment: int, positions: np.ndarray) -> np.ndarray:
+        """Return positions of a segment, which are not read again while they are in use if they are all of it."""
+        if positions.shape[2] == self.frames_of(segment):
+            self._held[segment] = positions
+        return positions
+
     @cached_property
     def _all_positions(self) -> np.ndarray:
         """Positions of the only segment, which a search asks for again and again."""

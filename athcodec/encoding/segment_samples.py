@@ -23,6 +23,7 @@ class SegmentSample:
     positions: np.ndarray  # (N, 3, T), in file order.
     frames: float  # Number of frames of the clip that the segment stands for.
     whole_loop: bool = False  # Whether the segment is all of a loop.
+    segment: int = 0  # Number of the segment.
 
     @property
     def scale(self) -> float:
@@ -30,14 +31,14 @@ class SegmentSample:
         return self.frames / self.positions.shape[2]
 
     def of_plant(self, sample: PlantSample) -> SegmentSample:
-        """Return the segment of a part of the plant."""
-        return replace(self, positions=self.positions[sample.vertices])
+        """Return the segment of a part of the plant, whose source goes on with these positions."""
+        return replace(self, positions=sample.source.sharing(self.segment, self.positions[sample.vertices]))
 
 
 def samples_of(source: Source) -> list[SegmentSample]:
     """Return the typical segments with their positions."""
     return [
-        SegmentSample(_middle(source.positions(segment)), frames, source.is_whole_loop(segment))
+        SegmentSample(_middle(source.positions(segment)), frames, source.is_whole_loop(segment), segment)
         for segment, frames in typical_segments(source)
     ]
 
