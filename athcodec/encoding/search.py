@@ -127,7 +127,7 @@ class Search:
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
-        expected = trial * expected_trials(effort, search.trials.is_layered, search._is_small)
+        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search._is_small)
         work.expected = work.expected or min(expected, work.allowed)
         return search
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from threading import Lock
 
@@ -38,6 +37,7 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.time_bases import TimeComponents
 from athcodec.errors import BoundError
+from athcodec.files.threads import ThreadPool
 
 LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are learned from.
 PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
@@ -113,16 +113,16 @@ class Trials:
         fitting = self._fitting(keys)
         tried = list({key: settings for settings, key in zip(candidates, keys) if key in fitting}.values())
         by_prelude = {settings.prelude_key: settings for settings in tried}
-        with ThreadPoolExecutor(thread_count(self.jobs, self.source)) as pool:
-            list(pool.map(self._keeps_bound, by_prelude.values()))
-            # Learning is done in order, because the first candidate of a kind decides what all like it learn.
-            for settings in filter(self._keeps_bound, tried):
-                if any(settings.learned_bases):
-                    self._learn_time(settings)
-                if settings.learned_pieces is not None:
-                    self._learn_modes(settings)
-            for _ in pool.map(self.cost, tried):
-                self.work.report()
+        pool = ThreadPool(thread_count(self.jobs, self.source))
+        list(pool.ordered(self._keeps_bound, by_prelude.values(), pool.jobs))
+        # Learning is done in order, because the first candidate of a kind decides what all like it learn.
+        for settings in filter(self._keeps_bound, tried):
+            if any(settings.learned_bases):
+                self._learn_time(settings)
+            if settings.learned_pieces is not None:
+                self._learn_modes(settings)
+        for _ in pool.ordered(self.cost, tried, pool.jobs):
+            self.work.report()
         return [self._known[key][0] if key in fitting else math.inf for key in keys]
 
     def _fitting(self, keys: Sequence[tuple]) -> set[tuple]:
