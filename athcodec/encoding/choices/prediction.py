@@ -89,17 +89,15 @@ def best_prediction(
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
     samples, vertices = _samples(source), source.clip.vertex_count
-    preludes: dict[float, CodedPrelude] = {}
 
     @cache
     def by_ratio(ratio: float) -> Settings:
         work.add(REST * vertices)
         return _settings(source, ath, bound, ratio * limit)
 
-    def prelude_of(settings: Settings) -> CodedPrelude:
-        if settings.rest_step not in preludes:
-            preludes[settings.rest_step] = CodedPrelude(source, ath, settings, predicted=True)
-        return preludes[settings.rest_step]
+    @cache
+    def prelude_of(ratio: float) -> CodedPrelude:
+        return CodedPrelude(source, ath, by_ratio(ratio), predicted=True)
 
     def coded(way: Way) -> FoundPrediction:
         settings = by_ratio(way.rest_ratio)
@@ -107,7 +105,7 @@ def best_prediction(
         choice = Choice(stepped, stepped, None, predicted=way.lattice, error_share=way.error_share)
         work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
         try:
-            prelude = prelude_of(settings)
+            prelude = prelude_of(way.rest_ratio)
             parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
         except BoundError:
             return FoundPrediction(way, choice, math.inf, False)
@@ -133,7 +131,7 @@ def best_prediction(
     some = by_ratio(USUAL_REST_RATIO)
     work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
     try:
-        if sum(_begun(prelude_of(some), some, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(prelude_of(USUAL_REST_RATIO), some, sample) for sample in samples) > TOO_MANY * most_bytes:
             return None
     except BoundError:
         return None
