@@ -29,9 +29,7 @@ from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials, distinct
 
 LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
-REFINEMENTS_MAX_GAIN = (
-    1.05  # Largest gain of settings that suit refinements better than the single layer that trials code.
-)
+REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
 SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
 NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
