@@ -260,7 +260,7 @@ class Trials:
             plan = self.prelude(settings).plan
             levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
-            self.work.add(self.work_of(progress.ANALYSIS + progress.COMPONENT * longest))
+            self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
             self.work.add(progress.EIGENVECTOR * longest**3 * len(levels) * len(self.samples))
             learned = [
                 time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
@@ -276,7 +276,7 @@ class Trials:
             plan, count = uncoded_plan(self.source, self.ath, settings), len(self.source.segments)
             chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             frames = sum(self.source.frames_of(segment) for segment in chosen)
-            self.work.add(progress.LEARNING * self.source.clip.vertex_count * frames)
+            self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)
             self._components[key] = components(
                 plan, (analyse_finely(plan, settings, self.source.positions(segment), bent=True) for segment in chosen)
             )
