@@ -87,6 +87,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     learned_pieces.best_pieces: ("learned modes", 0.8),
     learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.8),
     best_steps: ("steps", 0.8),
+    learned_pieces.learned_about_other_pose: ("learned modes", 0.8),
     finer_steps: ("finer steps", 1.0),
     calm_parts: ("calm parts", 0.5),
     best_slack: ("precision of the rest pose", 0.5),
@@ -231,7 +232,9 @@ class Search:
     @cached_property
     def at_best_step(self) -> Settings:
         """The same at the best steps."""
-        return self.at_first_step if self.effort == "fast" else self._after([best_steps], self.at_first_step)
+        return self.at_first_step if self.effort == "fast" else self._after(
+            [best_steps, learned_pieces.learned_about_other_pose], self.at_first_step
+        )
 
     @cached_property
     def best(self) -> Settings:
@@ -333,8 +336,11 @@ class Search:
             shape_of=start.shape_of,
             loose=start.loose,
             learned_pieces=None,
+            learned_coded=False,
         )
-        return like if settings.learned_pieces is None else learned_pieces.best_pieces(like, trials)
+        if settings.learned_pieces is None:
+            return like
+        return learned_pieces.learned_anew(learned_pieces.best_pieces(like, trials), trials)
 
     @cached_property
     def of_sample(self) -> Search | None:

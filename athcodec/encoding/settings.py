@@ -16,12 +16,12 @@ BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SH
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
 OF_PRELUDE = "rest_step rest_slack connected_rest welded_rest lags shape_of forms still layer free_rigid".split()
 OF_MOTION = (
-    "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces".split()
-)
+    "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces learned_coded"
+).split()
 # Fields that a large plant takes from its sample as they are.
 OF_SAMPLE = (
-    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic".split()
-)
+    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic learned_coded"
+).split()
 OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry for each branch.
 
 
@@ -55,6 +55,7 @@ class Settings:
     common_basis: bool = False  # Whether the levels with learned time bases share one.
     learned_pieces: np.ndarray | None = None  # (P,) bool: pieces that have learned modes; None: no piece has.
     learned_saving: float | None = None  # Factor by which the bits of pieces had to shrink for learned modes.
+    learned_coded: bool = False  # Whether modes are learned about the coded rest pose, and take its rounding back.
     periodic: bool = False  # Whether waves over time are periodic, in loops that are one segment.
     usual_change: float = np.inf  # Change of velocity in a usual frame where segments meet, length per frame squared.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.

@@ -271,9 +271,10 @@ class Trials:
 
     def _learn_modes(self, settings: Settings) -> Components:
         """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
-        key = _before_modes(settings)
+        coded, count = settings.learned_coded, len(self.source.segments)
+        key = _before_modes(settings) + (settings.prelude_key if coded else ())
         if key not in self._components:
-            plan, count = uncoded_plan(self.source, self.ath, settings), len(self.source.segments)
+            plan = self.prelude(settings).plan if coded else uncoded_plan(self.source, self.ath, settings)
             chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)

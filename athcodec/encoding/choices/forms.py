@@ -48,9 +48,9 @@ def best_forms(settings: Settings, trials: Trials) -> Settings:
     tried = plain = candidates(settings, trials)
     if not any(settings.rotation_step_factors) and not trials.without(Feature.ROTATIONS):
         costs = trials.costs(plain)
-        tried = plain + [
-            candidate.with_rotations(1) for candidate, cost in zip(plain, costs) if cost <= GIVE_UP_RATIO * min(costs)
-        ]
+        promising = [plain[i] for i in np.argsort(costs, kind="stable") if costs[i] <= GIVE_UP_RATIO * min(costs)]
+        turned = [candidate.with_rotations(1) for candidate in promising]
+        tried = plain + turned[:1] if trials.cost(turned[0]) > 1.5 * min(costs) else plain + turned
     return replace(trials.cheapest(tried), rotation_step_factors=settings.rotation_step_factors)
 
 

@@ -8,13 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from athcodec.encoding import progress
+from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.forms import in_each_basis
+from athcodec.encoding.choices.steps import walked
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import estimated_bits
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
+
+FINER_REST = 0.36  # Factor on the step of a rest pose whose rounding learned modes no longer describe.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
@@ -44,7 +48,23 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
-    return trials.cheapest([best_pieces(start, trials) for start in starts])
+    return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
+
+
+def learned_anew(settings: Settings, trials: Trials, rest_factor: float = 1.0) -> Settings:
+    """Return the settings with modes learned about the rest pose as it is coded, whose rounding they then describe, or
+    before that, whichever is smaller. rest_factor: on the step of a rest pose whose rounding they do not describe."""
+    if settings.learned_pieces is None or trials.is_layered or trials.source.reference_is_exact:
+        return settings
+    step = settings.rest_step * rest_factor if settings.learned_coded else trials.start.rest_step
+    other = replace(settings, learned_coded=not settings.learned_coded, rest_step=qz.single(step))
+    return trials.cheapest([settings, other])
+
+
+def learned_about_other_pose(settings: Settings, trials: Trials) -> Settings:
+    """Return the same at the best steps."""
+    best = learned_anew(settings, trials, FINER_REST)
+    return settings if best is settings else walked(best, trials)
 
 
 def pieces_that_save(

@@ -13,6 +13,7 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
+HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 FAST_FACTORS = ROTATION_FACTORS[:2]  # The factors that a fast search tries.
 
 
@@ -49,6 +50,9 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
         return settings
     uniform = candidates(settings, factors)
     if math.inf in trials.costs(uniform):
+        return trials.cheapest([settings, *uniform])
+    unturned, *turned = trials.costs(uniform)
+    if min(turned) > HOPELESS_RATIO * unturned:
         return trials.cheapest([settings, *uniform])
     per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
