@@ -375,7 +375,7 @@ class CodedMotion:
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
         self._level_0, self._largest_bound = layers.level_0, layers.each[-1].settings.largest_bound
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
-        self._bases = _TimeBases(layers.each[-1], positions) if self._layered else None
+        self._prelude, self._bases = prelude, _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
         self.flaws: list[tuple[float, float]] = []
@@ -413,7 +413,10 @@ class CodedMotion:
     def _first(self, layer: Layer) -> SegmentMotion:
         """Code the levels of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
-        bases = self._bases.first(layer) if self._bases else learned_bases(plan, settings, self.positions)
+        if self._bases:
+            bases = self._bases.first(layer)
+        else:
+            bases = learned_bases(self._prelude.uncoded_plan, settings, self.positions)
         segment, decoded = analyse(plan, self._output, settings, self.positions, layer.modes, bases)
         stems, _ = stem_streams(segment, settings, bases)
         self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}

@@ -388,8 +388,7 @@ def plain_settings(source: Source, levels: int, bound: float, step: float, rest_
 
 
 def uncoded_plan(source: Source, ath: Ath, settings: Settings) -> Plan:
-    """Return the plan on the rest pose before it is coded. Poses and modes are learned on it, because they would else
-    describe the rounding of the coded pose as well."""
+    """Return the plan on the rest pose before it is coded."""
     branches = branch_records(source.hierarchy, ath, settings)
     plan = Plan(branches, source.hierarchy.vertex_count, source.pool, layer=settings.layer)
     plan.set_rest(source.rest)
@@ -402,6 +401,7 @@ class CodedPrelude:
     def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False, bases: bool = True):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
+        self._of = source, ath, settings
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.shape_of = settings.shape_of
@@ -410,6 +410,12 @@ class CodedPrelude:
         self.hierarchy_stream = streams.encode_hierarchy(branches, hierarchy.branch_source, hierarchy.vertex_source)
         self.source_rest = code_source_rest(source, branches, self.plan.rest, settings.bound)
         self.prelude_bytes = len(self.hierarchy_stream) + len(self.rest_chunk.stream) + len(self.source_rest)
+
+    @cached_property
+    def uncoded_plan(self) -> Plan:
+        """The plan on the rest pose before it is coded. Modes and time bases are learned on it, because they would else
+        describe the rounding of the coded pose as well."""
+        return uncoded_plan(*self._of)
 
     @property
     def output(self) -> tuple[np.ndarray, np.dtype]:
@@ -754,7 +760,7 @@ def code_stems(
     """Return the streams of the stems of a single layer and the corrections that keep the limit, of a sample if there
     are many vertices. bases: None: to be learned."""
     if bases is None:
-        bases = learned_bases(prelude.plan, settings, positions)
+        bases = learned_bases(prelude.uncoded_plan, settings, positions)
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     return Coded(segment, stems, *_some_corrections(prelude, settings, decoded, positions), heads)

@@ -30,7 +30,6 @@ from athcodec.encoding.segment import (
     level_streams,
     thread_count,
     time_components,
-    uncoded_plan,
 )
 from athcodec.encoding.segment_samples import SegmentSample
 from athcodec.encoding.settings import Settings
@@ -257,7 +256,7 @@ class Trials:
         asked first for them: they hardly depend on the step."""
         key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic
         if key not in self._time_components:
-            plan = self.prelude(settings).plan
+            plan = self.prelude(settings).uncoded_plan
             levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
@@ -274,7 +273,8 @@ class Trials:
         coded, count = settings.learned_coded, len(self.source.segments)
         key = _before_modes(settings) + (settings.prelude_key if coded else ())
         if key not in self._components:
-            plan = self.prelude(settings).plan if coded else uncoded_plan(self.source, self.ath, settings)
+            prelude = self.prelude(settings)
+            plan = prelude.plan if coded else prelude.uncoded_plan
             chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)
