@@ -39,7 +39,7 @@ SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that 
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 TIGHT = 2.0  # Work, in usual searches, below which time bases are tried before forms and rotations.
-POSE_TRIALS = 24  # Trials that another reference pose takes, beside those of steps that it has to leave.
+POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
 

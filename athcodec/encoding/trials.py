@@ -148,7 +148,8 @@ class Trials:
         with self._lock:
             if key not in self._seen_preludes:  # A prelude that was dropped depends on the order of threads.
                 self._seen_preludes.add(key)
-                self.work.add(progress.POSE * self.source.clip.vertex_count)
+                squares = float(np.square(prelude.plan.pieces["count"]).sum())
+                self.work.add(progress.POSE * self.source.clip.vertex_count + progress.PIECE * squares)
             self._preludes[key] = prelude
             while len(self._preludes) > PRELUDES_KEPT:
                 self._preludes.pop(next(iter(self._preludes)))
