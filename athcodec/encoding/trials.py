@@ -257,7 +257,8 @@ class Trials:
         asked first for them: they hardly depend on the step."""
         key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic
         if key not in self._time_components:
-            plan = self.prelude(settings).uncoded_plan
+            prelude = self.prelude(settings)
+            plan = prelude.plan if self.is_layered else prelude.uncoded_plan
             levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
