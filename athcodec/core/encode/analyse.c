@@ -62,7 +62,8 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
                            int32_t *quantised)
 {
     static const double least[2] = {1.1, 0.9};
-    int32_t busy[ATH_SEGMENT_FRAMES + 4] = {0}; /* integers that are not 0, by k + 2 */
+    int32_t busy[ATH_SEGMENT_FRAMES + 4]; /* integers that are not 0, by k + 2 */
+    memset(busy, 0, ((size_t)rank + 4) * sizeof *busy);
     for (int32_t i = 0; i < 3 * T; i += T)
         for (int32_t k = 0; k < rank; k++) busy[k + 2] += quantised[i + k] != 0;
     for (int32_t axis = 0; axis < 3; axis++)
@@ -98,33 +99,35 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they lean already, and
- * the cost of a step. */
+/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they are off, how far
+ * they lean already, and the cost of a step. */
 typedef struct {
     int32_t k[ATH_SEGMENT_FRAMES];
     double parts[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES], pull[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES];
-    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
+    double off[ATH_SEGMENT_FRAMES], lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
 } end_integers;
 
 /* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
- * where segments meet. units: the exact values less the prediction; row: the integers. The gain, in squared steps, is
- * the change of the integer's own error and of those of the ends. */
-ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                                const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+ * where segments meet. units: the exact values less the prediction; row: the integers, all 0 from `most_rank` on, as
+ * predicted ones are. The gain, in squared steps, is the change of the integer's own error and of those of the ends. */
+ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, int32_t most_rank, double step,
+                                const ath_rounding *rounding, const double *row, const double *units,
+                                const int32_t *predicted, int32_t *quantised)
 {
     enum { LEAST_FRAMES = 8, PARTS = 2 * ATH_END_PARTS };
     static const double least = 1e-3, emptied = 0.25; /* extra gain for an integer that becomes 0 */
     end_integers found;
     double left[PARTS], own[PARTS];
-    int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
+    int32_t rank = row_extent(quantised, most_rank), count = 0;
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
     for (int32_t i = 0; i < PARTS; i++) left[i] /= step;
-    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+    for (int32_t k = 0; k < most_rank; k++) {
         double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
         if (quantised[k] == 0 && value == 0.0) continue;
         both_ends(stream->temporal + (size_t)k * (size_t)T, T, own);
         found.k[count] = k;
+        found.off[count] = units[k] - (double)quantised[k];
         found.cost[count] = 1.0;
         for (int32_t i = 0; i < PARTS; i++) {
             left[i] -= value * own[i];
@@ -136,11 +139,13 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
     }
     for (int32_t turned = 0; turned < rank; turned++) {
         double most = least;
-        int32_t chosen = -1, by = 0;
-        for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
-        for (int32_t i = 0; i < PARTS; i++)
-            for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
+        int32_t chosen = -1, by = 0, any = 0;
         for (int32_t c = 0; c < count; c++) {
+            found.lean[c] = found.off[c];
+            for (int32_t i = 0; i < PARTS; i++) found.lean[c] += found.pull[i][c] * left[i];
+            any |= 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied > least;
+        }
+        for (int32_t c = 0; c < count && any; c++) {
             int32_t q = quantised[found.k[c]];
             if (q == 0 || 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied <= most) continue;
             for (int32_t d = -1; d <= 1; d += 2) {
@@ -153,6 +158,7 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
         }
         if (chosen < 0) return;
         quantised[found.k[chosen]] += by;
+        found.off[chosen] = units[found.k[chosen]] - (double)quantised[found.k[chosen]];
         for (int32_t i = 0; i < PARTS; i++) left[i] -= by * found.parts[i][chosen];
     }
 }
@@ -176,7 +182,7 @@ ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double
     }
     drop_lone_ones(T, longest, units, predicted, quantised);
     for (int32_t axis = 0; axis < 3; axis++)
-        settle_ends(stream, T, steps[axis], rounding, track + axis * T, units[axis],
+        settle_ends(stream, T, longest, steps[axis], rounding, track + axis * T, units[axis],
                     predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
     for (int32_t axis = 0; axis < 3; axis++)
