@@ -55,8 +55,8 @@ def best_forms(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_forms_again(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with the best forms once time bases are known."""
-    return best_forms(settings, trials)
+    """Return the settings with the best forms once rotations and time bases are known."""
+    return trials.cheapest(candidates(settings, trials))
 
 
 def in_each_basis(settings: Settings, trials: Trials) -> list[Settings]:
