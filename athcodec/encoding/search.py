@@ -334,7 +334,10 @@ class Search:
             loose=start.loose,
             learned_pieces=None,
         )
-        return like if settings.learned_pieces is None else learned_pieces.best_pieces(like, trials)
+        if settings.learned_pieces is None:
+            return like
+        [(pieces, _)] = learned_pieces.pieces_that_save(like, trials, [settings.learned_saving])
+        return replace(like, learned_pieces=pieces)
 
     @cached_property
     def of_sample(self) -> Search | None:
