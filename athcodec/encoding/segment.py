@@ -766,7 +766,7 @@ def _some_corrections(
     """Return the corrections of a sample, and its vertices: fewer if many frames lie beyond the limit."""
     plan, count, part = prelude.plan, len(decoded), 1 if len(decoded) < SAMPLED else 2
     if count >= LEAST_SAMPLED:
-        spread = np.arange(0, count, -(-count // SPREAD))
+        spread = slice(0, None, -(-count // SPREAD))
         errors = decoded[spread] - positions[spread] - prelude.origin[:, None]
         limit = settings.limit if np.isscalar(settings.limit) else settings.limit[spread, None]
         beyond = np.mean((np.square(errors).sum(axis=1) > np.square(limit)).sum(axis=1))
