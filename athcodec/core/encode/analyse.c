@@ -163,9 +163,10 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, int32_t mos
     }
 }
 
-/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track. */
-ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                               double *track, const int32_t *predicted, int32_t *quantised)
+/* Quantises a track of three axes about its prediction, if there is one. Returns where the zeros begin. */
+ATH_HOT static int32_t quantise_track(const ath_stream *stream, int32_t T, const double steps[3],
+                                      const ath_rounding *rounding, const double *track, const int32_t *predicted,
+                                      int32_t *quantised)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -185,15 +186,27 @@ ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double
         settle_ends(stream, T, longest, steps[axis], rounding, track + axis * T, units[axis],
                     predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
+    return longest;
+}
+
+/* Does the same, and replaces the track by the decoded one. */
+static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                       double *track, const int32_t *predicted, int32_t *quantised)
+{
+    int32_t longest = quantise_track(stream, T, steps, rounding, track, predicted, quantised);
     for (int32_t axis = 0; axis < 3; axis++)
         ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
 }
 
+/* shown: whether the decoded track is wanted. */
 static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                            double *track, const int32_t *predicted, int32_t *quantised)
+                            double *track, const int32_t *predicted, int32_t *quantised, int shown)
 {
     double steps[3] = {step, step, step};
-    code_track(stream, T, steps, rounding, track, predicted, quantised);
+    if (shown)
+        code_track(stream, T, steps, rounding, track, predicted, quantised);
+    else
+        quantise_track(stream, T, steps, rounding, track, predicted, quantised);
 }
 
 static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
@@ -362,7 +375,8 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
     if (before) ath_predict_shift(motion, piece, before, scratch, rows);
-    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift);
+    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift,
+                    1);
     ath_move_point(T, scratch->track, scratch->at.point);
 }
 
@@ -458,12 +472,13 @@ static ath_piece_before piece_before(const ath_motion *motion, const ath_motion 
     return before;
 }
 
-/* Returns the vertices as decoded. */
+/* Returns the vertices as decoded; null unless they are shown or other pieces hang on them. */
 static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                    int32_t p, const ath_scratch *scratch, const ath_motion *coarse,
-                                   const double *source, const ath_rounding *rounding)
+                                   const double *source, const ath_rounding *rounding, int shown)
 {
     const ath_piece *piece = plan->pieces + p;
+    shown |= piece->attach_cache >= 0;
     ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
     ath_piece_before before;
     int32_t T = motion->frames;
@@ -482,8 +497,9 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
     for (int32_t r = 0; r < ath_rank(piece); r++)
         code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
                         scratch->rows + (size_t)r * 3 * (size_t)T,
-                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
-    return ath_pose_rows(plan, motion, p, &rows, scratch);
+                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T),
+                        shown);
+    return shown ? ath_pose_rows(plan, motion, p, &rows, scratch) : 0;
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
@@ -496,7 +512,8 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
         if (bent && piece->flags & ATH_RIGID && piece->attach_cache < 0) continue;
-        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding);
+        const double *placed =
+            analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding, positions != 0);
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
@@ -574,8 +591,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
-    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
+        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T), 0);
+    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T), 0);
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
