@@ -95,6 +95,7 @@ class Source:
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Segments of each clip of the file.
     segments: list[tuple[int, int]] = field(init=False)  # Segments of all clips.
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # Positions by segment.
+    _only: list[np.ndarray] = field(init=False, repr=False, compare=False)  # Those of an only segment, once read.
 
     def __post_init__(self) -> None:
         stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # Then the error may be 0 to the last bit.
@@ -123,7 +124,7 @@ class Source:
             for start, stop in self.clip.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
-        self._held = WeakValueDictionary()
+        self._held, self._only = WeakValueDictionary(), []
 
     @property
     def has_seams(self) -> bool:
@@ -136,7 +137,7 @@ class Source:
             return self
         source = self._changed(reference=reference)
         source.clip_range_segments, source.segments = self.clip_range_segments, self.segments
-        source._held = self._held
+        source._held, source._only = self._held, self._only
         return source
 
     def in_segments(self, frames: int) -> Source:
@@ -164,8 +165,8 @@ class Source:
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
         source.still = self.still  # Frames would have to be read for it again.
-        if len(self.segments) == len(source.segments) == 1 and source.held is self.held:
-            source._all_positions = self._all_positions
+        if source.segments == self.segments and source.held is self.held:
+            source._held, source._only = self._held, self._only
         return source
 
     @property
@@ -325,25 +326,18 @@ class Source:
 
     def positions(self, segment: int) -> np.ndarray:
         """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
-        if len(self.segments) == 1:
-            return self._all_positions
         positions = self._held.get(segment)
         if positions is None:
             self._held[segment] = positions = self.relative(self.block(segment))
             positions.setflags(write=False)
+        if len(self.segments) == 1:  # A search asks for them again and again.
+            self._only[:] = [positions]
         return positions
 
     def sharing(self, segment: int, positions: np.ndarray) -> np.ndarray:
         """Return positions of a segment, which are not read again while they are in use if they are all of it."""
         if positions.shape[2] == self.frames_of(segment):
             self._held[segment] = positions
-        return positions
-
-    @cached_property
-    def _all_positions(self) -> np.ndarray:
-        """Positions of the only segment, which a search asks for again and again."""
-        positions = self.relative(self.block(0))
-        positions.setflags(write=False)
         return positions
 
 
