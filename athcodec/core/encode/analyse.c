@@ -163,10 +163,10 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, int32_t mos
     }
 }
 
-/* Quantises a track of three axes about its prediction, if there is one. Returns where the zeros begin. */
-ATH_HOT static int32_t quantise_track(const ath_stream *stream, int32_t T, const double steps[3],
-                                      const ath_rounding *rounding, const double *track, const int32_t *predicted,
-                                      int32_t *quantised)
+/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track if that is
+ * shown. */
+ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
+                               double *track, const int32_t *predicted, int32_t *quantised, int shown)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -186,27 +186,15 @@ ATH_HOT static int32_t quantise_track(const ath_stream *stream, int32_t T, const
         settle_ends(stream, T, longest, steps[axis], rounding, track + axis * T, units[axis],
                     predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
-    return longest;
-}
-
-/* Does the same, and replaces the track by the decoded one. */
-static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                       double *track, const int32_t *predicted, int32_t *quantised)
-{
-    int32_t longest = quantise_track(stream, T, steps, rounding, track, predicted, quantised);
-    for (int32_t axis = 0; axis < 3; axis++)
+    for (int32_t axis = 0; axis < 3 && shown; axis++)
         ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
 }
 
-/* shown: whether the decoded track is wanted. */
 static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
                             double *track, const int32_t *predicted, int32_t *quantised, int shown)
 {
     double steps[3] = {step, step, step};
-    if (shown)
-        code_track(stream, T, steps, rounding, track, predicted, quantised);
-    else
-        quantise_track(stream, T, steps, rounding, track, predicted, quantised);
+    code_track(stream, T, steps, rounding, track, predicted, quantised, shown);
 }
 
 static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
@@ -429,7 +417,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);
         ath_into_axes(T, &turning, scratch->track);
         if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
-        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
+        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
         ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
     }
