@@ -251,8 +251,7 @@ class Source:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
-        limits = bound * self.weights - self.held_error
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in limits])
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.held_error])
 
     def unweighted_limit(self, bound: float) -> float:
         """Return what decoded positions of any vertex are held to if weights do not count."""
@@ -522,10 +521,12 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
-    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]), (pieces["low_modes"], rows, pieces["level"])):
+    for low, high, at in (
+        (0 * rows, pieces["low_modes"], pieces["low_level"]),
+        (pieces["low_modes"], rows, pieces["level"]),
+    ):
         for piece in np.flatnonzero((at == level) & (rows > 0)):
-            start = low if np.isscalar(low) else low[piece]
-            slots.append(segment.plan.first_rows[piece] + np.arange(start, high[piece]))
+            slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     return _moments(segment, (*parts, segment.tracks[segment.plan.base_level == level]))
