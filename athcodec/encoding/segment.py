@@ -62,8 +62,7 @@ def thread_count(jobs: int | None, source: Source) -> int:
     small clips would mostly wait for each other."""
     if len(source.segments) == 1 and source.segment_bytes < LEAST_THREADED:
         return jobs or 1
-    fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
-    return jobs or max(1, min(default_jobs(), fit))
+    return jobs or max(1, min(default_jobs(), WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)))
 
 
 @dataclass
@@ -489,8 +488,7 @@ def _thin_branches(source: Source) -> np.ndarray:
     steps = np.zeros(len(rest))
     steps[1:] = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     steps[first] = 0.0
-    way = np.add.reduceat(steps, first)
-    return way <= 1.3 * stem_sizes(source)
+    return np.add.reduceat(steps, first) <= 1.3 * stem_sizes(source)
 
 
 @dataclass(frozen=True)
@@ -521,10 +519,8 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
-    for low, high, at in (
-        (0 * rows, pieces["low_modes"], pieces["low_level"]),
-        (pieces["low_modes"], rows, pieces["level"]),
-    ):
+    few = pieces["low_modes"]
+    for low, high, at in ((0 * few, few, pieces["low_level"]), (few, rows, pieces["level"])):
         for piece in np.flatnonzero((at == level) & (rows > 0)):
             slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
