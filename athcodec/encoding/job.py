@@ -501,8 +501,7 @@ class EncodingJob:
     def _is_short(self, decided: _Decided) -> bool:
         """Return whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
         options = self.options
-        is_whole = len(decided.layers.each) == 1
-        if not is_whole or decided.ath.height == 0 or options.tam is not None:
+        if len(decided.layers.each) > 1 or decided.ath.height == 0 or options.tam is not None:
             return False
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
@@ -515,8 +514,7 @@ class EncodingJob:
 
     def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
-        is_out = self.options.tam or Feature.PREDICTED in self.options.without
-        if is_out:
+        if self.options.tam or Feature.PREDICTED in self.options.without:
             return None
         return best_prediction(
             self._long_segments, bound, most_bytes, work, self.options.smoothness, self.predicts_as_usual

@@ -110,12 +110,12 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
         numbers[rings] *= ~(across[rings, None] & faint)
         kept = np.cumprod((lengths > qz.LEAST_MODE * least) & numbers.any(axis=2), axis=1) > 0
         counts[pieces] = kept.sum(axis=1)
-        learned.append((pieces[np.nonzero(kept)[0]], numbers[kept]))
-    integers = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32)
-    piece = np.repeat(np.arange(len(counts)), counts)
-    for pieces, numbers in learned:
+        piece, mode = np.nonzero(kept)
+        learned.append((pieces[piece], mode, numbers[kept]))
+    integers, first = np.zeros((int(counts.sum()), 3, SHAPE_MODES), np.int32), np.cumsum(counts) - counts
+    for pieces, modes, numbers in learned:
         size = numbers.shape[1] // 3
-        integers[np.isin(piece, pieces), :, :size] = numbers.reshape(-1, size, 3).transpose(0, 2, 1)
+        integers[first[pieces] + modes, :, :size] = numbers.reshape(-1, size, 3).transpose(0, 2, 1)
     return _with_duals(counts, integers.reshape(-1, LEARNED_NUMBERS))
 
 

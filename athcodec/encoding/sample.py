@@ -63,8 +63,6 @@ class PlantSample:
             reference=None if source.reference is None else source.reference[self.vertices],
         )
         sample.segments, sample.repeats = source.segments, source.repeats
-        if len(source.segments) == 1:
-            sample._all_positions = source.positions(0)[self.vertices]
         return sample
 
     def like(self, settings: Settings) -> Settings:

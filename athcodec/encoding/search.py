@@ -146,10 +146,8 @@ class Search:
         start, own = trials.start, trials.start.in_learned_bases()
         if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
             return False
-        for other in (start, replace(own, common_basis=True)):
-            if trials.costs([own])[0] > OWN_BASES_SHARE * trials.costs([other])[0]:
-                return False
-        return True
+        others = start, replace(own, common_basis=True)
+        return all(trials.costs([own])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
 
     def keep_work_of_maps(self) -> None:
         """Leave the work of choosing maps of coarse levels, which comes last and is always done."""
@@ -211,9 +209,8 @@ class Search:
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         if self.effort == "fast":
-            return self._after(
-                [best_level_steps, rotations.fast_rotations, learned_bases.best_waves], self.trials.start
-            )
+            fast = [best_level_steps, rotations.fast_rotations, learned_bases.best_waves]
+            return self._after(fast, self.trials.start)
         choices: list[Choose] = [
             best_freedom,
             rotations.still_if_smaller,
@@ -340,7 +337,8 @@ class Search:
         )
         if settings.learned_pieces is None:
             return like
-        return learned_pieces.learned_anew(learned_pieces.best_pieces(like, trials), trials)
+        [(pieces, _)] = learned_pieces.pieces_that_save(like, trials, [settings.learned_saving])
+        return learned_pieces.learned_anew(replace(like, learned_pieces=pieces), trials)
 
     @cached_property
     def of_sample(self) -> Search | None:

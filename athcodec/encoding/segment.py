@@ -62,8 +62,7 @@ def thread_count(jobs: int | None, source: Source) -> int:
     small clips would mostly wait for each other."""
     if len(source.segments) == 1 and source.segment_bytes < LEAST_THREADED:
         return jobs or 1
-    fit = WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)
-    return jobs or max(1, min(default_jobs(), fit))
+    return jobs or max(1, min(default_jobs(), WORK_BYTES // (SEGMENT_WORK * source.segment_bytes)))
 
 
 @dataclass
@@ -95,6 +94,7 @@ class Source:
     clip_range_segments: list[list[tuple[int, int]]] = field(init=False)  # Segments of each clip of the file.
     segments: list[tuple[int, int]] = field(init=False)  # Segments of all clips.
     _held: WeakValueDictionary[int, np.ndarray] = field(init=False, repr=False, compare=False)  # Positions by segment.
+    _only: list[np.ndarray] = field(init=False, repr=False, compare=False)  # Those of an only segment, once read.
 
     def __post_init__(self) -> None:
         stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # Then the error may be 0 to the last bit.
@@ -123,7 +123,7 @@ class Source:
             for start, stop in self.clip.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
-        self._held = WeakValueDictionary()
+        self._held, self._only = WeakValueDictionary(), []
 
     @property
     def has_seams(self) -> bool:
@@ -136,7 +136,7 @@ class Source:
             return self
         source = self._changed(reference=reference)
         source.clip_range_segments, source.segments = self.clip_range_segments, self.segments
-        source._held = self._held
+        source._held, source._only = self._held, self._only
         return source
 
     def in_segments(self, frames: int) -> Source:
@@ -164,8 +164,8 @@ class Source:
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
         source.still = self.still  # Frames would have to be read for it again.
-        if len(self.segments) == len(source.segments) == 1 and source.held is self.held:
-            source._all_positions = self._all_positions
+        if source.segments == self.segments and source.held is self.held:
+            source._held, source._only = self._held, self._only
         return source
 
     @property
@@ -250,8 +250,7 @@ class Source:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
-        limits = bound * self.weights - self.held_error
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in limits])
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.held_error])
 
     def unweighted_limit(self, bound: float) -> float:
         """Return what decoded positions of any vertex are held to if weights do not count."""
@@ -325,25 +324,18 @@ class Source:
 
     def positions(self, segment: int) -> np.ndarray:
         """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
-        if len(self.segments) == 1:
-            return self._all_positions
         positions = self._held.get(segment)
         if positions is None:
             self._held[segment] = positions = self.relative(self.block(segment))
             positions.setflags(write=False)
+        if len(self.segments) == 1:  # A search asks for them again and again.
+            self._only[:] = [positions]
         return positions
 
     def sharing(self, segment: int, positions: np.ndarray) -> np.ndarray:
         """Return positions of a segment, which are not read again while they are in use if they are all of it."""
         if positions.shape[2] == self.frames_of(segment):
             self._held[segment] = positions
-        return positions
-
-    @cached_property
-    def _all_positions(self) -> np.ndarray:
-        """Positions of the only segment, which a search asks for again and again."""
-        positions = self.relative(self.block(0))
-        positions.setflags(write=False)
         return positions
 
 
@@ -502,8 +494,7 @@ def _thin_branches(source: Source) -> np.ndarray:
     steps = np.zeros(len(rest))
     steps[1:] = np.linalg.norm(np.diff(rest, axis=0), axis=1)
     steps[first] = 0.0
-    way = np.add.reduceat(steps, first)
-    return way <= 1.3 * stem_sizes(source)
+    return np.add.reduceat(steps, first) <= 1.3 * stem_sizes(source)
 
 
 @dataclass(frozen=True)
@@ -534,10 +525,10 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
     if level is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
-    for low, high, at in ((0, pieces["low_modes"], pieces["low_level"]), (pieces["low_modes"], rows, pieces["level"])):
+    few = pieces["low_modes"]
+    for low, high, at in ((0 * few, few, pieces["low_level"]), (few, rows, pieces["level"])):
         for piece in np.flatnonzero((at == level) & (rows > 0)):
-            start = low if np.isscalar(low) else low[piece]
-            slots.append(segment.plan.first_rows[piece] + np.arange(start, high[piece]))
+            slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
     return _moments(segment, (*parts, segment.tracks[segment.plan.base_level == level]))
@@ -772,7 +763,7 @@ def _some_corrections(
     """Return the corrections of a sample, and its vertices: fewer if many frames lie beyond the limit."""
     plan, count, part = prelude.plan, len(decoded), 1 if len(decoded) < SAMPLED else 2
     if count >= LEAST_SAMPLED:
-        spread = np.arange(0, count, -(-count // SPREAD))
+        spread = slice(0, None, -(-count // SPREAD))
         errors = decoded[spread] - positions[spread] - prelude.origin[:, None]
         limit = settings.limit if np.isscalar(settings.limit) else settings.limit[spread, None]
         beyond = np.mean((np.square(errors).sum(axis=1) > np.square(limit)).sum(axis=1))

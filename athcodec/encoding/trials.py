@@ -255,11 +255,12 @@ class Trials:
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int | None, TimeComponents]]]:
         """Return the components of the samples over time, of each level and of all, and the step of the trial that
         asked first for them: they hardly depend on the step."""
-        key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic
+        only_common = self.is_layered and settings.common_basis
+        key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic, only_common
         if key not in self._time_components:
             prelude = self.prelude(settings)
             plan = prelude.plan if self.is_layered else prelude.uncoded_plan
-            levels = [*(level for level in range(self.levels) if plan.has_stems(level)), None]
+            levels = [*(level for level in range(self.levels) if plan.has_stems(level) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
             self.work.add(progress.EIGENVECTOR * longest**3 * len(levels) * len(self.samples))

@@ -62,7 +62,8 @@ static void drop_lone_ones(int32_t T, int32_t rank, double units[3][ATH_SEGMENT_
                            int32_t *quantised)
 {
     static const double least[2] = {1.1, 0.9};
-    int32_t busy[ATH_SEGMENT_FRAMES + 4] = {0}; /* integers that are not 0, by k + 2 */
+    int32_t busy[ATH_SEGMENT_FRAMES + 4]; /* integers that are not 0, by k + 2 */
+    memset(busy, 0, ((size_t)rank + 4) * sizeof *busy);
     for (int32_t i = 0; i < 3 * T; i += T)
         for (int32_t k = 0; k < rank; k++) busy[k + 2] += quantised[i + k] != 0;
     for (int32_t axis = 0; axis < 3; axis++)
@@ -98,33 +99,35 @@ static void both_ends(const double *row, int32_t T, double parts[2 * ATH_END_PAR
     end_parts(row, T, -1, parts + ATH_END_PARTS);
 }
 
-/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they lean already, and
- * the cost of a step. */
+/* Integers that may be rounded the other way: their parts at the ends, plain and weighted, how far they are off, how far
+ * they lean already, and the cost of a step. */
 typedef struct {
     int32_t k[ATH_SEGMENT_FRAMES];
     double parts[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES], pull[2 * ATH_END_PARTS][ATH_SEGMENT_FRAMES];
-    double lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
+    double off[ATH_SEGMENT_FRAMES], lean[ATH_SEGMENT_FRAMES], cost[ATH_SEGMENT_FRAMES];
 } end_integers;
 
 /* Rounds integers of a row the other way if that brings its ends closer, whose errors are the largest and are seen
- * where segments meet. units: the exact values less the prediction; row: the integers. The gain, in squared steps, is
- * the change of the integer's own error and of those of the ends. */
-ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                                const double *row, const double *units, const int32_t *predicted, int32_t *quantised)
+ * where segments meet. units: the exact values less the prediction; row: the integers, all 0 from `most_rank` on, as
+ * predicted ones are. The gain, in squared steps, is the change of the integer's own error and of those of the ends. */
+ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, int32_t most_rank, double step,
+                                const ath_rounding *rounding, const double *row, const double *units,
+                                const int32_t *predicted, int32_t *quantised)
 {
     enum { LEAST_FRAMES = 8, PARTS = 2 * ATH_END_PARTS };
     static const double least = 1e-3, emptied = 0.25; /* extra gain for an integer that becomes 0 */
     end_integers found;
     double left[PARTS], own[PARTS];
-    int32_t rank = row_extent(quantised, stream->temporal_rank), count = 0;
+    int32_t rank = row_extent(quantised, most_rank), count = 0;
     if (T < LEAST_FRAMES || rank == 0 || rounding->ends[0] == 0.0) return;
     both_ends(row, T, left);
     for (int32_t i = 0; i < PARTS; i++) left[i] /= step;
-    for (int32_t k = 0; k < stream->temporal_rank; k++) {
+    for (int32_t k = 0; k < most_rank; k++) {
         double value = (double)(quantised[k] + (predicted ? predicted[k] : 0));
         if (quantised[k] == 0 && value == 0.0) continue;
         both_ends(stream->temporal + (size_t)k * (size_t)T, T, own);
         found.k[count] = k;
+        found.off[count] = units[k] - (double)quantised[k];
         found.cost[count] = 1.0;
         for (int32_t i = 0; i < PARTS; i++) {
             left[i] -= value * own[i];
@@ -136,11 +139,13 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
     }
     for (int32_t turned = 0; turned < rank; turned++) {
         double most = least;
-        int32_t chosen = -1, by = 0;
-        for (int32_t c = 0; c < count; c++) found.lean[c] = units[found.k[c]] - (double)quantised[found.k[c]];
-        for (int32_t i = 0; i < PARTS; i++)
-            for (int32_t c = 0; c < count; c++) found.lean[c] += found.pull[i][c] * left[i];
+        int32_t chosen = -1, by = 0, any = 0;
         for (int32_t c = 0; c < count; c++) {
+            found.lean[c] = found.off[c];
+            for (int32_t i = 0; i < PARTS; i++) found.lean[c] += found.pull[i][c] * left[i];
+            any |= 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied > least;
+        }
+        for (int32_t c = 0; c < count && any; c++) {
             int32_t q = quantised[found.k[c]];
             if (q == 0 || 2.0 * absolute(found.lean[c]) - found.cost[c] + emptied <= most) continue;
             for (int32_t d = -1; d <= 1; d += 2) {
@@ -153,13 +158,15 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, double step
         }
         if (chosen < 0) return;
         quantised[found.k[chosen]] += by;
+        found.off[chosen] = units[found.k[chosen]] - (double)quantised[found.k[chosen]];
         for (int32_t i = 0; i < PARTS; i++) left[i] -= by * found.parts[i][chosen];
     }
 }
 
-/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track. */
+/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track if that is
+ * shown. */
 ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                               double *track, const int32_t *predicted, int32_t *quantised)
+                               double *track, const int32_t *predicted, int32_t *quantised, int shown)
 {
     double units[3][ATH_SEGMENT_FRAMES];
     int32_t longest = 0;
@@ -176,18 +183,18 @@ ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double
     }
     drop_lone_ones(T, longest, units, predicted, quantised);
     for (int32_t axis = 0; axis < 3; axis++)
-        settle_ends(stream, T, steps[axis], rounding, track + axis * T, units[axis],
+        settle_ends(stream, T, longest, steps[axis], rounding, track + axis * T, units[axis],
                     predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
-    for (int32_t axis = 0; axis < 3; axis++)
+    for (int32_t axis = 0; axis < 3 && shown; axis++)
         ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
 }
 
 static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                            double *track, const int32_t *predicted, int32_t *quantised)
+                            double *track, const int32_t *predicted, int32_t *quantised, int shown)
 {
     double steps[3] = {step, step, step};
-    code_track(stream, T, steps, rounding, track, predicted, quantised);
+    code_track(stream, T, steps, rounding, track, predicted, quantised, shown);
 }
 
 static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
@@ -356,7 +363,8 @@ static void code_shift(const ath_motion *motion, const ath_piece *piece, const a
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
     if (before) ath_predict_shift(motion, piece, before, scratch, rows);
-    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift);
+    code_even_track(base, T, ath_shift_step(piece, base), rounding, scratch->track, rows->predicted_shift, rows->shift,
+                    1);
     ath_move_point(T, scratch->track, scratch->at.point);
 }
 
@@ -409,7 +417,7 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);
         ath_into_axes(T, &turning, scratch->track);
         if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
-        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation);
+        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
         ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
     }
@@ -452,12 +460,13 @@ static ath_piece_before piece_before(const ath_motion *motion, const ath_motion 
     return before;
 }
 
-/* Returns the vertices as decoded. */
+/* Returns the vertices as decoded; null unless they are shown or other pieces hang on them. */
 static const double *analyse_piece(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
                                    int32_t p, const ath_scratch *scratch, const ath_motion *coarse,
-                                   const double *source, const ath_rounding *rounding)
+                                   const double *source, const ath_rounding *rounding, int shown)
 {
     const ath_piece *piece = plan->pieces + p;
+    shown |= piece->attach_cache >= 0;
     ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
     ath_piece_before before;
     int32_t T = motion->frames;
@@ -476,8 +485,9 @@ static const double *analyse_piece(const ath_plan *plan, const ath_motion *motio
     for (int32_t r = 0; r < ath_rank(piece); r++)
         code_even_track(ath_mode_stream(motion, piece, r), T, ath_row_step(motion, piece, &rows, r), rounding,
                         scratch->rows + (size_t)r * 3 * (size_t)T,
-                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T));
-    return ath_pose_rows(plan, motion, p, &rows, scratch);
+                        rows.predicted_modes ? ath_row(rows.predicted_modes, r, T) : 0, ath_row(rows.modes, r, T),
+                        shown);
+    return shown ? ath_pose_rows(plan, motion, p, &rows, scratch) : 0;
 }
 
 void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
@@ -490,7 +500,8 @@ void ath_analyse(const ath_plan *plan, const ath_motion *motion, const ath_integ
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
         if (bent && piece->flags & ATH_RIGID && piece->attach_cache < 0) continue;
-        const double *placed = analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding);
+        const double *placed =
+            analyse_piece(plan, motion, integers, p, &scratch, &coarse, source, rounding, positions != 0);
         if (positions)
             ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
@@ -568,8 +579,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
-        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T));
-    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T));
+        code_even_track(&stream, T, step, rounding, tracks + r * 3 * T, 0, ath_row(rows->rows, r, T), 0);
+    if (free_base) code_even_track(&stream, T, step, rounding, tracks + 9 * T, 0, ath_row(rows->rows, 3, T), 0);
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,

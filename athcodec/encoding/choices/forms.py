@@ -15,7 +15,7 @@ from athcodec.encoding.segment_samples import SegmentSample
 from athcodec.encoding.settings import BEAM, Settings
 from athcodec.encoding.trials import Trials, distinct
 
-GIVE_UP_RATIO = 1.3  # A form whose file is larger than the smallest by this factor is not tried with rotations.
+GIVE_UP_RATIO = 1.3  # Forms are not tried with rotations where they, or the best with them, are so many times as large.
 SHORT_STEM = 3  # Vertices of a median stem up to which learned modes can stand for whole stems.
 
 
@@ -48,15 +48,16 @@ def best_forms(settings: Settings, trials: Trials) -> Settings:
     tried = plain = candidates(settings, trials)
     if not any(settings.rotation_step_factors) and not trials.without(Feature.ROTATIONS):
         costs = trials.costs(plain)
-        promising = [plain[i] for i in np.argsort(costs, kind="stable") if costs[i] <= GIVE_UP_RATIO * min(costs)]
-        turned = [candidate.with_rotations(1) for candidate in promising]
-        tried = plain + turned[:1] if trials.cost(turned[0]) > 1.5 * min(costs) else plain + turned
+        most, turned = GIVE_UP_RATIO * min(costs), plain[int(np.argmin(costs))].with_rotations(1)
+        tried = [*plain, turned]
+        if trials.costs([turned])[0] <= most:
+            tried += [candidate.with_rotations(1) for candidate, cost in zip(plain, costs) if cost <= most]
     return replace(trials.cheapest(tried), rotation_step_factors=settings.rotation_step_factors)
 
 
 def best_forms_again(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with the best forms once time bases are known."""
-    return best_forms(settings, trials)
+    """Return the settings with the best forms once rotations and time bases are known."""
+    return trials.cheapest(candidates(settings, trials))
 
 
 def in_each_basis(settings: Settings, trials: Trials) -> list[Settings]:

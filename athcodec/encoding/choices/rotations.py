@@ -56,6 +56,6 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
         return trials.cheapest([settings, *uniform])
     per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
-    others = (0,) * (settings.levels - 1)
-    roots = [replace(settings, rotation_step_factors=(factor, *others)) for factor in factors if factor]
+    others, roots_turn = (0,) * (settings.levels - 1), trials.prelude(settings).plan.has_stems(0)
+    roots = [replace(settings, rotation_step_factors=(factor, *others)) for factor in factors if factor and roots_turn]
     return trials.cheapest([settings, mixed, *roots, *uniform])
