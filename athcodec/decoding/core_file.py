@@ -151,20 +151,15 @@ class Segment:
     If the segment is `gone`, its positions went to an array of the caller's, and only its end may be used.
     """
 
-    def __init__(self, size: int):
-        self.memory, self._kept, self.gone = aligned(size), aligned(0), False
+    kept = np.empty(0, np.uint8)
 
-    @property
-    def pointer(self) -> int:
-        return self.memory.ctypes.data
+    def __init__(self, size: int):
+        self.memory, self.gone = aligned(size), False
+        self.pointer: int = self.memory.ctypes.data
 
     @property
     def kept_pointer(self) -> int | None:
-        return self._kept.ctypes.data if len(self._kept) else None
-
-    def keep(self, kept: np.ndarray) -> None:
-        self._kept = aligned(len(kept))
-        self._kept[:] = kept
+        return self.kept.ctypes.data if len(self.kept) else None
 
 
 class Work:
@@ -172,10 +167,7 @@ class Work:
 
     def __init__(self, size: int):
         self.memory = aligned(size)
-
-    @property
-    def pointer(self) -> int:
-        return self.memory.ctypes.data
+        self.pointer: int = self.memory.ctypes.data
 
 
 class File:
@@ -448,7 +440,8 @@ class File:
         else:
             result = lib.ath_prepare_onward(*place, before.pointer, before.kept_pointer, level, *rooms)
         if result == OK:
-            self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
+            if len(keeping):
+                self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
             if joined_to is not None:
                 self._check(lib.ath_follow(work.pointer, joined_to.pointer))
             into.gone = to is not None and lib.ath_prepare_to(work.pointer, to.ctypes.data) == OK
@@ -456,11 +449,11 @@ class File:
         if result != OK:
             lib.ath_work_fault(work.pointer, byref(fault))
         self._check(result, fault)
-        into.keep(keeping[: lib.ath_kept_size(keeping.ctypes.data)])
+        into.kept = keeping[: lib.ath_kept_size(keeping.ctypes.data) if len(keeping) else 0].copy()
 
     def _room_to_keep(self, level: int, segment: Segment) -> np.ndarray:
         most = min(lib.ath_keep_size(self._file, level), len(segment.memory) // KEPT_SHARE)
-        return aligned(max(most, ALIGNMENT))
+        return aligned(max(most, ALIGNMENT)) if most else Segment.kept
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fill `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
