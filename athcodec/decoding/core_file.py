@@ -185,7 +185,6 @@ class File:
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self.has_rest = not self.info.rest_is_host
-        self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
         self._refined = -1  # The deepest level whose segments have what they share.
         self.poses_read = -1  # The deepest level whose reference pose the core has read.
@@ -209,14 +208,6 @@ class File:
             result = lib.ath_set_host_mesh(self._file, mesh.ctypes.data, mesh.strides[0], len(mesh), byref(fault))
             self._check(result, fault)
             self.has_rest = True
-
-    def build(self) -> None:
-        """Compute the bases that all segments share, unless that is done."""
-        with self._building:
-            if self._build is None:
-                memory = aligned(lib.ath_build_size(self._file))
-                self._check(lib.ath_build(self._file, memory.ctypes.data, len(memory)))
-                self._build = memory
 
     def refine(self, level: int) -> None:
         """Compute what the segments share at a level, unless that is done."""
@@ -426,13 +417,11 @@ class File:
         joined_to: Segment | None = None,
         to: np.ndarray | None = None,
     ) -> None:
-        """Decode a segment at a level, from the beginning or from a segment of which goes_on() is true.
+        """Decode a segment at a refined level, from the beginning or from a segment of which goes_on() is true.
 
         `joined_to` is the segment that it is joined to, if that is ready at the level. `to` is a contiguous array of
         the file's type, which gets the positions if the core can write there (`into.gone`).
         """
-        self.build()
-        self.refine(level)
         fault, keeping = Fault(), self._room_to_keep(level, into)
         place, rooms = (work.pointer, len(work.memory), self._file), (into.pointer, len(into.memory))
         if before is None:

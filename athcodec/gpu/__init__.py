@@ -55,7 +55,7 @@ class GpuFile:
         self.core.feed(self._bytes, 0)
         if host_mesh is not None:
             self.core.set_host_mesh(host_mesh)
-        self.core.build()
+        self.core.refine(0)
         self._work = core_file.Work(self.core.work_size())
 
     @property
