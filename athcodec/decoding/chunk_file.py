@@ -146,8 +146,7 @@ class ChunkFile:
 
     @cached_property
     def _index(self) -> np.ndarray:
-        """Places in the file's table of all chunks but those of unknown kinds."""
-        return np.flatnonzero(KNOWN_KINDS[self.core.chunks()["kind"]])
+        return np.flatnonzero(KNOWN_KINDS[self.core.chunks()["kind"]])  # Chunks of unknown kinds are left out.
 
     @cached_property
     def _table(self) -> np.ndarray:

@@ -56,11 +56,8 @@ class GpuFile:
         if host_mesh is not None:
             self.core.set_host_mesh(host_mesh)
         self.core.refine(0)
+        self._file = self.core.pointer
         self._work = core_file.Work(self.core.work_size())
-
-    @property
-    def _file(self) -> int:
-        return self.core.pointer
 
     def level(self, level: int) -> np.ndarray:
         """Words of a level's block, uint32."""
