@@ -137,8 +137,8 @@ class CoreError(Exception):
 def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
     """Return, from the first bytes of a file, how many bytes ath_open needs at least, how much memory it then takes (0:
     not known yet), and what is missing. Raises CoreError."""
-    array, size, memory, fault = as_bytes(data), c_size_t(), c_size_t(), Fault()
-    result = lib.ath_front(array.ctypes.data, len(array), byref(limits), byref(size), byref(memory), byref(fault))
+    size, memory, fault = c_size_t(), c_size_t(), Fault()
+    result = lib.ath_front(data, len(data), byref(limits), byref(size), byref(memory), byref(fault))
     if result not in (OK, MISSING):
         raise CoreError(result, fault)
     return size.value, memory.value, fault
