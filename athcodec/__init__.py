@@ -81,7 +81,8 @@ def __getattr__(name: str) -> Any:
         return import_module(f"athcodec.{name}")
     for module, names in _LAZY.items():
         if name in names:
-            return getattr(import_module(f"athcodec.{module}"), name)
+            # The next look-up finds the name in the package itself.
+            return globals().setdefault(name, getattr(import_module(f"athcodec.{module}"), name))
     raise AttributeError(f"module 'athcodec' has no attribute {name!r}")
 
 

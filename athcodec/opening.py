@@ -68,7 +68,7 @@ def open(
     ((150, 1400, 3), 'm', 1)
     """
     mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
-    mesh = None if mesh_path is not None else cast(HostMesh | None, host_mesh)
+    mesh = None if mesh_path is not None else cast("HostMesh | None", host_mesh)
     file = AthFile(
         path, strict=strict, allow_partial=allow_partial, limits=limits, host_mesh=mesh, gltf_motion=gltf_motion
     )

@@ -106,7 +106,7 @@ class AthFile(StaticData, SegmentDecoder):
         self.frame_count: int = info.frame_count
         self.max_error_bound: float = info.max_error
         self.dtype = np.dtype(np.float64 if info.is_float64 else np.float32)
-        self.origin = np.array(info.origin)
+        self.origin = np.array(info.origin[:])
         try:
             if host_mesh is None and self.needs_host_mesh:
                 host_mesh = getattr(self.source, "host_mesh", None)

@@ -59,7 +59,6 @@ class ChunkFile:
             if strict and self.available_length != self.file_length:
                 refused = TrailingBytes if self.complete else Truncated
                 raise refused(f"file: got {self.available_length} bytes; expected {self.file_length}")
-            self._set_table()
             self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
         except BaseException:
             self.close()
@@ -145,10 +144,13 @@ class ChunkFile:
 
     # ---- chunks ----
 
-    def _set_table(self) -> None:
-        table = self.core.chunks()
-        self._index = np.flatnonzero(KNOWN_KINDS[table["kind"]])  # Chunks of unknown kinds are left out.
-        self._table = table[self._index]
+    @cached_property
+    def _index(self) -> np.ndarray:
+        return np.flatnonzero(KNOWN_KINDS[self.core.chunks()["kind"]])  # Chunks of unknown kinds are left out.
+
+    @cached_property
+    def _table(self) -> np.ndarray:
+        return self.core.chunks()[self._index]
 
     @cached_property
     def chunks(self) -> list[Chunk]:

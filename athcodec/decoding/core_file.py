@@ -137,8 +137,8 @@ class CoreError(Exception):
 def front(data: bytes, limits: Limits) -> tuple[int, int, Fault]:
     """Return, from the first bytes of a file, how many bytes ath_open needs at least, how much memory it then takes (0:
     not known yet), and what is missing. Raises CoreError."""
-    array, size, memory, fault = as_bytes(data), c_size_t(), c_size_t(), Fault()
-    result = lib.ath_front(array.ctypes.data, len(array), byref(limits), byref(size), byref(memory), byref(fault))
+    size, memory, fault = c_size_t(), c_size_t(), Fault()
+    result = lib.ath_front(data, len(data), byref(limits), byref(size), byref(memory), byref(fault))
     if result not in (OK, MISSING):
         raise CoreError(result, fault)
     return size.value, memory.value, fault
@@ -151,20 +151,15 @@ class Segment:
     If the segment is `gone`, its positions went to an array of the caller's, and only its end may be used.
     """
 
-    def __init__(self, size: int):
-        self.memory, self._kept, self.gone = aligned(size), aligned(0), False
+    kept = np.empty(0, np.uint8)
 
-    @property
-    def pointer(self) -> int:
-        return self.memory.ctypes.data
+    def __init__(self, size: int):
+        self.memory, self.gone = aligned(size), False
+        self.pointer: int = self.memory.ctypes.data
 
     @property
     def kept_pointer(self) -> int | None:
-        return self._kept.ctypes.data if len(self._kept) else None
-
-    def keep(self, kept: np.ndarray) -> None:
-        self._kept = aligned(len(kept))
-        self._kept[:] = kept
+        return self.kept.ctypes.data if len(self.kept) else None
 
 
 class Work:
@@ -172,10 +167,7 @@ class Work:
 
     def __init__(self, size: int):
         self.memory = aligned(size)
-
-    @property
-    def pointer(self) -> int:
-        return self.memory.ctypes.data
+        self.pointer: int = self.memory.ctypes.data
 
 
 class File:
@@ -193,7 +185,6 @@ class File:
         self.info = Info()
         lib.ath_get_info(self._file, byref(self.info))
         self.has_rest = not self.info.rest_is_host
-        self._build: np.ndarray | None = None
         self._refinements: list[np.ndarray] = []
         self._refined = -1  # The deepest level whose segments have what they share.
         self.poses_read = -1  # The deepest level whose reference pose the core has read.
@@ -217,14 +208,6 @@ class File:
             result = lib.ath_set_host_mesh(self._file, mesh.ctypes.data, mesh.strides[0], len(mesh), byref(fault))
             self._check(result, fault)
             self.has_rest = True
-
-    def build(self) -> None:
-        """Compute the bases that all segments share, unless that is done."""
-        with self._building:
-            if self._build is None:
-                memory = aligned(lib.ath_build_size(self._file))
-                self._check(lib.ath_build(self._file, memory.ctypes.data, len(memory)))
-                self._build = memory
 
     def refine(self, level: int) -> None:
         """Compute what the segments share at a level, unless that is done."""
@@ -434,13 +417,11 @@ class File:
         joined_to: Segment | None = None,
         to: np.ndarray | None = None,
     ) -> None:
-        """Decode a segment at a level, from the beginning or from a segment of which goes_on() is true.
+        """Decode a segment at a refined level, from the beginning or from a segment of which goes_on() is true.
 
         `joined_to` is the segment that it is joined to, if that is ready at the level. `to` is a contiguous array of
         the file's type, which gets the positions if the core can write there (`into.gone`).
         """
-        self.build()
-        self.refine(level)
         fault, keeping = Fault(), self._room_to_keep(level, into)
         place, rooms = (work.pointer, len(work.memory), self._file), (into.pointer, len(into.memory))
         if before is None:
@@ -448,7 +429,8 @@ class File:
         else:
             result = lib.ath_prepare_onward(*place, before.pointer, before.kept_pointer, level, *rooms)
         if result == OK:
-            self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
+            if len(keeping):
+                self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
             if joined_to is not None:
                 self._check(lib.ath_follow(work.pointer, joined_to.pointer))
             into.gone = to is not None and lib.ath_prepare_to(work.pointer, to.ctypes.data) == OK
@@ -456,11 +438,11 @@ class File:
         if result != OK:
             lib.ath_work_fault(work.pointer, byref(fault))
         self._check(result, fault)
-        into.keep(keeping[: lib.ath_kept_size(keeping.ctypes.data)])
+        into.kept = keeping[: lib.ath_kept_size(keeping.ctypes.data) if len(keeping) else 0].copy()
 
     def _room_to_keep(self, level: int, segment: Segment) -> np.ndarray:
         most = min(lib.ath_keep_size(self._file, level), len(segment.memory) // KEPT_SHARE)
-        return aligned(max(most, ALIGNMENT))
+        return aligned(max(most, ALIGNMENT)) if most else Segment.kept
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
         """Fill `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -519,7 +519,7 @@ class Decoder:
         shown = np.empty((len(frames), *self.shape[1:]), dtype if dtype in SHOWN_TYPES else self.dtype)
 
         def rows(segment: int) -> slice:
-            return slice(*np.searchsorted(frames, self.segments[segment - self.clip.first_segment]))
+            return slice(*(bisect_left(frames, edge) for edge in self.segments[segment - self.clip.first_segment]))
 
         def show(segment: int, ready: core_file.Segment) -> None:
             for row in range(rows(segment).start, rows(segment).stop):
@@ -539,16 +539,17 @@ class Decoder:
                         show(segments.start, ready)
         return shown.astype(dtype, copy=False)[of_frames]
 
-    @cached_property
-    def _starts(self) -> np.ndarray:
-        """The first frame of each segment."""
-        return np.array([start for start, _ in self.segments])
-
     def _runs_of(self, frames: np.ndarray) -> Iterator[range]:
         """Yield the segments of the file that hold these ascending frames, in runs without a gap."""
-        needed = np.unique(np.searchsorted(self._starts, frames, side="right") - 1) + self.clip.first_segment
-        for run in np.split(needed, np.flatnonzero(np.diff(needed) > 1) + 1) if len(needed) else ():
-            yield range(int(run[0]), int(run[-1]) + 1)
+        run, read = range(0), 0
+        while read < len(frames):
+            segment = self._segment_of(int(frames[read]))
+            if run and segment > run.stop:
+                yield self._in_file(run)
+            run = range(run.start if run and segment == run.stop else segment, segment + 1)
+            read = bisect_left(frames, self.segments[segment][1], read)
+        if run:
+            yield self._in_file(run)
 
     def _checked_run(self, frames: int | slice | None) -> tuple[int, int]:
         """Return the first frame of a run with step 1, and the frame behind its last one."""

@@ -141,7 +141,8 @@ class FileTables(ChunkFile):
     @cached_property
     def _first_lacking(self) -> int:
         """The first level that is incomplete or damaged."""
-        return int(self._table["level"][self._is_late].min(initial=self._damaged_from))
+        late = () if self.complete else self._table["level"][self._is_late].tolist()
+        return min([self._damaged_from, *late])
 
     @property
     def deepest(self) -> int:

@@ -135,7 +135,6 @@ class SegmentDecoder(ChunkFile):
         needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
-        self.core.build()
         self.core.refine(level)
 
     def _missing(

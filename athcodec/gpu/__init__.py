@@ -55,12 +55,9 @@ class GpuFile:
         self.core.feed(self._bytes, 0)
         if host_mesh is not None:
             self.core.set_host_mesh(host_mesh)
-        self.core.build()
+        self.core.refine(0)
+        self._file = self.core.pointer
         self._work = core_file.Work(self.core.work_size())
-
-    @property
-    def _file(self) -> int:
-        return self.core.pointer
 
     def level(self, level: int) -> np.ndarray:
         """Words of a level's block, uint32."""

@@ -46,11 +46,14 @@
 #define ATH_RESTRICT restrict
 #endif
 
-/* Prefetches memory that will be written soon. The address may be invalid. */
+/* Prefetches memory that will be written soon. The address may be invalid. Long chains of operations run a few at a time
+ * where one chain leaves the processor waiting, and alone where the code has to be small. */
 #if defined(__GNUC__) && (defined(__x86_64__) || defined(__aarch64__))
 #define ath_expect_write(address) __builtin_prefetch((const void *)(address), 1)
+enum { ATH_CHAINS = 4 };
 #else
 #define ath_expect_write(address) ((void)(address))
+enum { ATH_CHAINS = 1 };
 #endif
 
 #if defined(__STDC_HOSTED__) && __STDC_HOSTED__

@@ -547,17 +547,19 @@ static mode mode_at(int32_t frames, int32_t k, double h, const mode_order *order
 }
 
 /* Solves 2 frames h = pi k - 2 phase(h). A step takes about ten bits off the error, with few frames two. */
-static mode find_mode(int32_t frames, int32_t k, const mode_order *order)
+static void find_modes(int32_t frames, int32_t first, int32_t count, const mode_order *order, mode *modes)
 {
-    double h = PI * ((double)k - 0.5) / (double)(2 * frames);
-    mode own = mode_at(frames, k, h, order);
-    for (int32_t step = 0; step < MODE_STEPS; step++) {
-        double next = (0.5 * PI * (double)k - atan_of(own.slope)) / (double)frames;
-        if (next == h) break;
-        h = next;
-        own = mode_at(frames, k, h, order);
+    double h[ATH_CHAINS];
+    for (int32_t i = 0; i < count; i++) h[i] = PI * ((double)(first + i) - 0.5) / (double)(2 * frames);
+    for (int32_t step = 0, moved = 1; moved && step <= MODE_STEPS; step++) {
+        for (int32_t i = 0; i < count; i++) modes[i] = mode_at(frames, first + i, h[i], order);
+        moved = 0;
+        for (int32_t i = 0; i < count; i++) {
+            double next = (0.5 * PI * (double)(first + i) - atan_of(modes[i].slope)) / (double)frames;
+            moved |= next != h[i];
+            h[i] = next;
+        }
     }
-    return own;
 }
 
 static void unit_length(int32_t frames, double *wave)
@@ -568,27 +570,40 @@ static void unit_length(int32_t frames, double *wave)
     for (int32_t t = 0; t < frames; t++) wave[t] = wave[t] * scale;
 }
 
-static void mode_wave(int32_t frames, int32_t k, const mode_order *order, double *wave)
+/* Fills `count` waves side by side, of which each step waits for the one before. */
+static void mode_waves(int32_t frames, int32_t first, int32_t count, const mode_order *order, double *waves)
 {
-    mode own = find_mode(frames, k, order);
-    double sign = k % 2 == 0 ? 1.0 : -1.0, cosine = 1.0 / ath_sqrt(1.0 + own.slope * own.slope);
-    double sine = own.slope * cosine;
-    double c = own.cosine * cosine - own.sine * sine, s = own.sine * cosine + own.cosine * sine;
-    double turn_c = 1.0 - 2.0 * own.sine * own.sine, turn_s = 2.0 * own.sine * own.cosine;
-    complex_number edge = {sine * order->edge.re, sine * order->edge.im}, decay = times(own.decay, own.decay);
-    edge = times(times(edge, own.apart), own.decay);
-    for (int32_t t = 0; t < frames; t++) {
-        wave[t] = edge.re;
-        edge = times(edge, decay);
+    double c[ATH_CHAINS], s[ATH_CHAINS], turn_c[ATH_CHAINS], turn_s[ATH_CHAINS];
+    complex_number edge[ATH_CHAINS], decay[ATH_CHAINS];
+    mode modes[ATH_CHAINS];
+    find_modes(frames, first, count, order, modes);
+    for (int32_t i = 0; i < count; i++) {
+        const mode *own = modes + i;
+        double cosine = 1.0 / ath_sqrt(1.0 + own->slope * own->slope), sine = own->slope * cosine;
+        c[i] = own->cosine * cosine - own->sine * sine;
+        s[i] = own->sine * cosine + own->cosine * sine;
+        turn_c[i] = 1.0 - 2.0 * own->sine * own->sine;
+        turn_s[i] = 2.0 * own->sine * own->cosine;
+        complex_number side = {sine * order->edge.re, sine * order->edge.im};
+        edge[i] = times(times(side, own->apart), own->decay);
+        decay[i] = times(own->decay, own->decay);
     }
-    for (int32_t t = 0; 2 * t < frames; t++) {
-        double x = c + (wave[t] + sign * wave[frames - 1 - t]), turned = c * turn_c - s * turn_s;
-        wave[frames - 1 - t] = sign * x;
-        wave[t] = x;
-        s = s * turn_c + c * turn_s;
-        c = turned;
-    }
-    unit_length(frames, wave);
+    for (int32_t t = 0; t < frames; t++)
+        for (int32_t i = 0; i < count; i++) {
+            waves[i * frames + t] = edge[i].re;
+            edge[i] = times(edge[i], decay[i]);
+        }
+    for (int32_t t = 0; 2 * t < frames; t++)
+        for (int32_t i = 0; i < count; i++) {
+            double *low = waves + i * frames + t, *high = low + frames - 1 - 2 * t;
+            double sign = (first + i) % 2 == 0 ? 1.0 : -1.0, x = c[i] + (*low + sign * *high);
+            double turned = c[i] * turn_c[i] - s[i] * turn_s[i];
+            *high = sign * x;
+            *low = x;
+            s[i] = s[i] * turn_c[i] + c[i] * turn_s[i];
+            c[i] = turned;
+        }
+    for (int32_t i = 0; i < count; i++) unit_length(frames, waves + i * frames);
 }
 
 /* Fills polynomial k about the middle, orthogonal to those before: 1, t, t^2. */
@@ -608,13 +623,10 @@ void ath_waves(int32_t frames, int32_t kind, double *waves)
         periodic_waves(frames, waves);
         return;
     }
-    int32_t polynomials = kind == ATH_BEAM ? 2 : 3;
-    for (int32_t k = 0; k < frames; k++) {
-        if (k < polynomials)
-            polynomial_wave(frames, k, waves + k * frames);
-        else
-            mode_wave(frames, k, kind == ATH_BEAM ? &SECOND : &THIRD, waves + k * frames);
-    }
+    int32_t k = 0, polynomials = ath_min(frames, kind == ATH_BEAM ? 2 : 3);
+    for (; k < polynomials; k++) polynomial_wave(frames, k, waves + k * frames);
+    for (; k < frames; k += ATH_CHAINS)
+        mode_waves(frames, k, ath_min(ATH_CHAINS, frames - k), kind == ATH_BEAM ? &SECOND : &THIRD, waves + k * frames);
 }
 
 double ath_tan_of_half(double x)
