@@ -229,9 +229,9 @@ class Search:
     @cached_property
     def at_best_step(self) -> Settings:
         """The same at the best steps."""
-        return self.at_first_step if self.effort == "fast" else self._after(
-            [best_steps, learned_pieces.learned_about_other_pose], self.at_first_step
-        )
+        if self.effort == "fast":
+            return self.at_first_step
+        return self._after([best_steps, learned_pieces.learned_about_other_pose], self.at_first_step)
 
     @cached_property
     def best(self) -> Settings:

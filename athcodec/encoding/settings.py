@@ -20,7 +20,8 @@ OF_MOTION = (
 ).split()
 # Fields that a large plant takes from its sample as they are.
 OF_SAMPLE = (
-    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic learned_coded"
+    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic "
+    "learned_coded"
 ).split()
 OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry for each branch.
 

@@ -17,7 +17,6 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
-
 FINER_REST = 0.36  # Factor on the step of a rest pose whose rounding learned modes no longer describe.
 
 
@@ -62,7 +61,7 @@ def learned_anew(settings: Settings, trials: Trials, rest_factor: float = 1.0) -
 
 
 def learned_about_other_pose(settings: Settings, trials: Trials) -> Settings:
-    """Return the same at the best steps."""
+    """Return the same at the best steps: those of the other way to learn are walked to again."""
     best = learned_anew(settings, trials, FINER_REST)
     return settings if best is settings else walked(best, trials)
 
