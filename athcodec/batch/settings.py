@@ -44,14 +44,8 @@ READING = (
     "unit",
     "up_axis",
 )
-SHAPING = (
-    "hierarchy",
-    "loop",
-    "loop_blend",
-    "endless",
-    "strength",
-    "heading",
-)  # These settings change a clip before it is encoded.
+# These settings change a clip before it is encoded.
+SHAPING = ("hierarchy", "loop", "loop_blend", "endless", "strength", "heading")
 
 Settings = dict[str, Any]
 

@@ -31,15 +31,8 @@ from bench.codecs.program import (
 
 NAME = "simple (differences, zstd)"
 LAYOUTS = ("T,N,3", "N,T,3", "3,T,N", "3,N,T")
-FINER = (
-    1.0,
-    0.999,
-    0.99,
-    0.95,
-    0.9,
-    0.7,
-    0.5,
-)  # Factors of the grid's step, for when rounding to float32 breaks the bound.
+# Factors of the grid's step, for when rounding to float32 breaks the bound.
+FINER = (1.0, 0.999, 0.99, 0.95, 0.9, 0.7, 0.5)
 FEW_NUMBERS = 300_000  # up to which every setup is tried at the final level
 FINALISTS = 4
 QUICK_LEVEL, LEVEL = 3, 19
