@@ -14,13 +14,12 @@ import athcodec
 from athcodec.arrays import clip_of
 from athcodec.decoding.file_tables import Level
 from athcodec.metrics import MotionMeter, level_meters
-from bench import plots
 from bench.clips import add_clips, add_effort, add_ladder, add_rel_error, add_segment_frames, encoded
 from bench.tables import table
 
 SAMPLES = ("leafed", "fern", "grass")
 MOST = 2.0  # The encoder keeps the second differences of levels below so many times the source's.
-SHEET_LEVEL, SHEET_FRAMES, SHEET_VERTICES = 1, 4, 1500
+SHEET_LEVEL, SHEET_FRAMES, SHEET_VERTICES, SHEET_DPI = 1, 4, 1500, 110
 
 NOTE = """
 d2: second difference over frames of the error, in bounds of the level: the largest error that it promises, at least
@@ -72,7 +71,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                     if row["over source"] > MOST
                 ]
     if args.sheet:
-        plots.save(_sheet(loops, args.before), args.sheet)
+        _sheet(loops, args.before).savefig(args.sheet, metadata={"Software": None})
     return {"tables": tables, "broken": broken}
 
 
@@ -138,8 +137,15 @@ def _around(positions: np.ndarray) -> np.ndarray:
 
 def _sheet(loops: list[tuple[str, str, np.ndarray]], before: Path | None) -> Any:
     """Paths of vertices over the wrap, the step from the last frame to the first in red; a column for each clip."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise SystemExit('--sheet: matplotlib is not installed: pip install "athcodec[bench]"') from None
     rows = 1 + (before is not None)
-    figure, axes = plots.pyplot((5 * len(loops), 5 * rows), rows, len(loops))()
+    figure = Figure(figsize=(5 * len(loops), 5 * rows), dpi=SHEET_DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, len(loops))
     for (stem, name, now), cells in zip(loops, np.reshape(axes, (rows, len(loops))).T, strict=True):
         shown = [("", now)]
         if before:
