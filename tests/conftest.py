@@ -24,9 +24,8 @@ from athcodec.encoding.features import Feature
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
-sys.path.append(
-    str(Path(__file__).resolve().parent.parent)
-)  # for bench, which is not installed; athcodec stays the installed one
+# The tests import bench, which is not installed; athcodec stays the installed one.
+sys.path.append(str(Path(__file__).resolve().parent.parent))
 
 WEBGPU_FLAGS = [
     "--no-sandbox",

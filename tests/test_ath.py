@@ -347,9 +347,8 @@ def tam(distances: list[np.ndarray], thresholds: Thresholds) -> list[bool]:
 
 @pytest.mark.parametrize(("xi", "lam"), [(np.inf, 0), (0.36, 0), (0.25, 2), (0.2, 6), (0.1, 48)])
 def test_a_survey_accepts_what_tam_accepts_by_its_definition(xi, lam, monkeypatch):
-    monkeypatch.setattr(
-        "athcodec.encoding.survey._WORK_VERTICES", 5 * 48
-    )  # frames in several portions, the worst within
+    # The frames come in several portions, with the worst one within.
+    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 5 * 48)
     clip = bushy_clip(noise=0.1)
     swell = np.sin(np.linspace(0, np.pi, FRAMES))
     clip.positions[:] = clip.rest + (clip.positions - clip.rest) * swell[:, None, None]

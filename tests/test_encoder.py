@@ -342,9 +342,8 @@ def test_a_clip_is_read_in_blocks_and_segments_only(tmp_path, monkeypatch):
 def peak_memory(clip: MotionClip, folder) -> int:
     tracemalloc.start()
     try:
-        athcodec.encode(
-            clip, folder / "s.ath", segment_frames=32, effort="fast", jobs=1
-        )  # how far threads run ahead differs from run to run
+        # There is one job, because how far threads run ahead differs from run to run.
+        athcodec.encode(clip, folder / "s.ath", segment_frames=32, effort="fast", jobs=1)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

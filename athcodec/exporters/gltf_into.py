@@ -46,9 +46,8 @@ from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
 
-SHARE_OF_TWINS = (
-    1 / 8
-)  # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
+# Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
+SHARE_OF_TWINS = 1 / 8
 ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"

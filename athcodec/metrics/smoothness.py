@@ -55,9 +55,8 @@ class SmoothnessMeter(Meter):
         self._bound, self._loop = np.asarray(bound, np.float64), loop
         self._square = 0.0
         self._points = self._added = 0
-        self._first = self._last = np.empty(
-            (2, 0, 0, 3)
-        )  # The last frames of source and decoded positions, two at most.
+        # The last frames of source and decoded positions, two at most.
+        self._first = self._last = np.empty((2, 0, 0, 3))
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
         both = np.stack([reference, decoded])

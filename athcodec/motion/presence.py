@@ -78,9 +78,8 @@ def parts_hidden_far_away(clip: Any) -> list[str]:
     copies = clip.attributes.get("part_copies", np.ones_like(counts))
     found = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
     starts = np.cumsum(counts) - counts
-    low, high = (
-        np.full((2, len(names) + 1, 3), np.inf) * np.array([1, -1])[:, None, None]
-    )  # The last row is what is shown.
+    # The last row is what is shown.
+    low, high = np.full((2, len(names) + 1, 3), np.inf) * np.array([1, -1])[:, None, None]
     for start, block in clip.blocks():
         for frame, positions in enumerate(block, start):
             is_shown = np.ones(len(positions), bool)

@@ -52,9 +52,8 @@ from athcodec.sources.scene_objects import (
 from athcodec.sources.timing import warn_of_missed
 
 MAX_FRAMES = 1 << 24
-READ = frozenset(
-    ("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape")
-)  # Prims whose types need no note when they are not read.
+# Types of prims that need no note when they are not read.
+READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
 PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")

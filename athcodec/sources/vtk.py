@@ -345,9 +345,8 @@ class _Vtu:
         if form == "ascii":
             self._budget.need(TEXT_BYTES * len(element.text or ""), element.get("Name", "points"))
             words = (element.text or "").split()
-            with np.errstate(
-                over="ignore", invalid="ignore"
-            ):  # Values that do not fit are refused where they are used.
+            # Values that do not fit are refused where they are used.
+            with np.errstate(over="ignore", invalid="ignore"):
                 return np.array(words, np.float64 if dtype.kind == "f" else np.int64).astype(dtype)
         if form == "binary":
             data = self._decoded((element.text or "").strip().encode())

@@ -89,9 +89,8 @@ class glTF2ExportUserExtension:
 
         def set_vertices(attribute, edges_points=False):
             found = creator.attributes_edges_points if edges_points else creator.attributes
-            data = np.asarray(creator.blender_idxs, np.float32)[
-                :, None
-            ]  # exact: meshes of more vertices have no export
+            # The numbers are exact in float32: meshes of more vertices have no export.
+            data = np.asarray(creator.blender_idxs, np.float32)[:, None]
             found[VERTEX] = {"data": data, "data_type": "SCALAR", "component_type": FLOAT}
 
         kind = {"blender_data_type": "FLOAT", "blender_domain": "POINT", "len": 1, "type": np.float32}
