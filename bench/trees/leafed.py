@@ -129,15 +129,8 @@ def _spray() -> Species:
 
 def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
     """The stems as splines, their motion twice over: leaves settle in the first round."""
-    bare = Skeleton(
-        nodes,
-        plant.position,
-        plant.parent,
-        plant.branch,
-        plant.branch_parent,
-        plant.radius,
-        np.arange(len(nodes)) / fps,
-    )
+    time = np.arange(len(nodes)) / fps
+    bare = Skeleton(nodes, plant.position, plant.parent, plant.branch, plant.branch_parent, plant.radius, time)
     splines = _Splines(bare, FINER)
     rest, moved = splines.apply(bare.rest).astype(np.float32), splines.apply(nodes).astype(np.float32)
     parent = np.full(splines.count, -1)

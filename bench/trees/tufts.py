@@ -97,6 +97,12 @@ def grass(blades: int, height: float, frames: int, winds: Mapping[str, float], s
     )
 
 
+def _skeleton(plant: Plant, nodes: np.ndarray, radius: np.ndarray, fps: float) -> Skeleton:
+    """The plant with nodes at these places in each frame, and stems of this radius."""
+    rest, time = plant.position.astype(np.float32), np.arange(len(nodes)) / fps
+    return Skeleton(nodes, rest, plant.parent, plant.branch, plant.branch_parent, radius, time)
+
+
 class _Ribbons:
     """Two vertices across each node of a blade, that end in a point."""
 
@@ -112,7 +118,7 @@ class _Ribbons:
         carrier[:, 0] += 1  # a foot's own element lies on the ground
         self.carrier = carrier.ravel()
         self.branch = np.repeat(np.arange(blades), 2 * (1 + count))
-        skeleton = self._skeleton(plant.position[None].astype(np.float32), 1.0)
+        skeleton = _skeleton(plant, plant.position[None].astype(np.float32), plant.radius, 1.0)
         tangent = skeleton.direction(skeleton.rest, self.carrier).reshape(blades, 1 + count, 3)
         side = np.repeat(arch.side[:, None], 1 + count, axis=1)
         out = np.cross(side, tangent)
@@ -123,20 +129,8 @@ class _Ribbons:
         self.faces = (first + [0, 1, 3, 2]).reshape(-1, 4)
         self.uv = leaf_uv(share, rng.integers(0, SHADES, blades))
 
-    def _skeleton(self, nodes: np.ndarray, fps: float) -> Skeleton:
-        plant = self.plant
-        return Skeleton(
-            nodes,
-            plant.position.astype(np.float32),
-            plant.parent,
-            plant.branch,
-            plant.branch_parent,
-            plant.radius,
-            np.arange(len(nodes)) / fps,
-        )
-
     def clip(self, nodes: np.ndarray, fps: float) -> MotionClip:
-        skeleton = self._skeleton(nodes, fps)
+        skeleton = _skeleton(self.plant, nodes, self.plant.radius, fps)
         return MotionClip(
             positions=self._at(skeleton, nodes),
             time=skeleton.time,
@@ -214,15 +208,7 @@ class _Fern:
         self.frames, self.fps = len(nodes), fps
         twice = np.concatenate([nodes, nodes])
         drawn = np.where(plant.radius > 2 * arch.radius.max(), 2.2, 1.5 / arch.radius.max() * plant.radius)
-        self.skeleton = Skeleton(
-            twice,
-            plant.position.astype(np.float32),
-            plant.parent,
-            plant.branch,
-            plant.branch_parent,
-            drawn * arch.radius.max(),
-            np.arange(len(twice)) / fps,
-        )
+        self.skeleton = _skeleton(plant, twice, drawn * arch.radius.max(), fps)
         self.tubes = Tubes(self.skeleton, RACHIS_SIDES)
         self.pinnae = _Pinnae(self.skeleton, arch, rng)
         self.shade = np.repeat(rng.integers(0, SHADES, len(arch.foot)), len(self.pinnae.node) // len(arch.foot))
