@@ -14,6 +14,7 @@ from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
 from athcodec.encoding import layers, search
 from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.features import Feature
+from athcodec.encoding.segment import CodedPrelude
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from spec.document import File
@@ -79,6 +80,15 @@ def test_a_shared_basis_makes_files_smaller(tmp_path, monkeypatch):
     monkeypatch.setitem(search.CHOICES, none, ("time bases", 1.0))
     monkeypatch.setattr(learned_bases, "candidates", lambda settings, trials: [])
     assert shared < 0.9 * athcodec.encode(clip, tmp_path / "waves.ath", **options).bytes
+
+
+def test_time_bases_do_not_describe_the_rounding_of_the_rest_pose(tmp_path, monkeypatch):
+    def size() -> int:
+        return athcodec.encode(hit_by_a_gust(), tmp_path / "a.ath", rel_error=1e-2, ladder="none").bytes
+
+    learned_before_rounding = size()
+    monkeypatch.setattr(CodedPrelude, "uncoded_plan", property(lambda prelude: prelude.plan))
+    assert learned_before_rounding < 0.95 * size()
 
 
 def sum_of_shapes(count: int = 5, side: int = 20, frames: int = 120) -> athcodec.MotionClip:
