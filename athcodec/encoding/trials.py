@@ -258,7 +258,7 @@ class Trials:
         only_common = self.is_layered and settings.common_basis
         key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic, only_common
         if key not in self._time_components:
-            prelude = self.prelude(settings)
+            prelude = self.prelude(settings)  # Layers learn about the coded pose of the last one.
             plan = prelude.plan if self.is_layered else prelude.uncoded_plan
             levels = [*(level for level in range(self.levels) if plan.has_stems(level) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
