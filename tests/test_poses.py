@@ -11,10 +11,12 @@ from plants import diagonal, distance
 
 import athcodec
 from athcodec.decoding import container as ct
+from athcodec.encoding.choices import learned_pieces
 from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.search import Search
 from athcodec.errors import BadChecksum, Truncated
 from bench.odd.bending import scanned_tree
+from bench.odd.grass import grass
 
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 
@@ -57,6 +59,17 @@ def test_the_pose_that_is_chosen_makes_the_smaller_file(fraction, most, tmp_path
     chosen = size()
     monkeypatch.setattr(Search, "about_best_reference", lambda search: search)
     assert chosen <= most * size()
+
+
+def test_modes_of_short_stems_take_the_rounding_of_the_rest_pose_back(tmp_path, monkeypatch):
+    def size() -> int:
+        return athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-4, ladder="none").bytes
+
+    monkeypatch.undo()  # The pose is chosen.
+    clip = grass(1, blades=300)
+    learned_either_way = size()
+    monkeypatch.setattr(learned_pieces, "learned_anew", lambda settings, trials, *_: settings)
+    assert learned_either_way < 0.97 * size()
 
 
 @pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])
