@@ -487,15 +487,25 @@ class EncodingJob:
     def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        known = (READING + SURVEY) * vertices * frames + POSES * vertices + self._coding_work(bound, frames)
+        return Work(allowed_work(vertices, frames, self.options.effort) - known - self.spent, self.report)
+
+    def _coding_work(self, bound: float, frames: int) -> float:
+        """Return the work of coding the motion of so many frames."""
         layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
         levels = int(self.source.hierarchy.branch_depth.max())
-        coding = (READING + SURVEY + MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * vertices * frames
-        coding += POSES * vertices
-        return Work(allowed_work(vertices, frames, self.options.effort) - coding - self.spent, self.report)
+        return (MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * self.clip.vertex_count * frames
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
-        """Return the best of what a search has found."""
-        layered = [self._layered(search.trials.ath, choice, prelude) for choice in choices]
+        """Return the best of what a search has found: the first of it, and others for which there is work left."""
+        trials = search.trials
+        frames = sum(trials.source.frames_of(segment) for segment, _ in typical_segments(trials.source))
+        each, coded = self._coding_work(trials.start.bound, frames), choices[:1]
+        for choice in choices[1:]:
+            if trials.work.fits(each):
+                trials.work.add(each)
+                coded.append(choice)
+        layered = [self._layered(trials.ath, choice, prelude) for choice in coded]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
     def _is_short(self, decided: _Decided) -> bool:

@@ -38,7 +38,7 @@ from athcodec.encoding.choices.joins import (
 from athcodec.encoding.choices.levels import SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
-from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, zeros
+from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, release_memory, zeros
 from athcodec.encoding.segment import (
     CodedPrelude,
     Corrections,
@@ -461,6 +461,8 @@ class CodedMotion:
     def _refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
         """Code one further level; ratio: the step of the layer before over that of this one."""
         settings, last = layer.settings, layer.plan.level_count - 1
+        self._corrected.clear()  # Levels before are finished.
+        release_memory()
         bases = self._bases.refined(layer, last, level)
         segment, decoded = analyse(
             layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio

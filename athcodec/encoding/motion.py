@@ -43,7 +43,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
-LARGE_BYTES = 2 << 20  # Bytes from which on an array has memory of its own.
+LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 
 

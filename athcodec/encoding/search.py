@@ -38,6 +38,7 @@ STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: 
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
+CLEAR_RATIO = 1.03  # Ratio of bytes, about two reference poses and at first settings, that decides between them.
 TIGHT = 2.0  # Work, in usual searches, below which time bases are tried before forms and rotations.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
@@ -262,6 +263,8 @@ class Search:
         if not self.trials.is_layered:
             return self.best
         choices = [] if self.effort == "fast" else [rotations.best_rotations, learned_pieces.best_pieces]
+        if not any(self.best.rotation_step_factors):  # What turns nothing here turns nothing in coarser steps.
+            choices = choices[1:]
         first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
         return self._after([*choices, best_node_steps], first)
 
@@ -286,9 +289,9 @@ class Search:
             yield candidate
 
     def about_best_reference(self) -> Search:
-        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file. The
-        mean pose is tried with what was chosen about the rest pose, and goes on from there; in small clips both are
-        searched up to their steps."""
+        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: at
+        first settings if these tell, else the mean pose is tried with what was chosen about the rest pose, and goes on
+        from there. In small clips both are searched up to their steps."""
         source = self.trials.source
         if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
             return self
@@ -302,6 +305,10 @@ class Search:
         work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
+        if not self._is_small:
+            of_rest, of_mean = about_rest.first_cost(), about_mean.first_cost()
+            if max(of_rest, of_mean) > CLEAR_RATIO * min(of_rest, of_mean):
+                return other if of_mean < of_rest else self
         cost = about_rest._cost_to_compare()
         if not self._is_small:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)

@@ -746,12 +746,10 @@ def code_stems(
     settings: Settings,
     positions: np.ndarray,
     learned_modes: LearnedModes | None,
-    bases: dict[int, StreamBasis] | None = None,
+    bases: dict[int, StreamBasis],
 ) -> Coded:
     """Return the streams of the stems of a single layer and the corrections that keep the limit, of a sample if there
-    are many vertices. bases: None: to be learned."""
-    if bases is None:
-        bases = learned_bases(prelude.uncoded_plan, settings, positions)
+    are many vertices."""
     segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
     return Coded(segment, stems, *_some_corrections(prelude, settings, decoded, positions), heads)

@@ -37,7 +37,9 @@ REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
 USUAL_REST_RATIO = 0.5
 REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
-TRIAL_SEGMENTS, TRIAL_FRAMES = 3, 64  # Segments of a trial, and frames of each that show whether it may pay.
+TRIAL_SEGMENTS = 3  # Segments of a trial.
+TRIAL_FRAMES, TOO_MANY = 64, 1.2  # Predicted motion is given up if so many frames promise so many times the bytes
+FEW_FRAMES, FAR_TOO_MANY = 8, 3.0  # allowed, or in long segments, in which a look at these costs little, these.
 STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
 CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
 FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
@@ -45,7 +47,6 @@ FINE = 9e-4  # Bound, in diagonals, below which second differences are held to o
 UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
 HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
-TOO_MANY = 1.2  # Predicted motion is given up if a few frames promise more than this factor on the bytes allowed.
 MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.
 MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
 LESS_ERROR = 0.9  # Largest error of level 0 with maps, over that without, that is worth their bytes.
@@ -128,11 +129,15 @@ def best_prediction(
     if usual:
         found = coded(Way(USUAL_REST_RATIO))
         return found if found.bytes < most_bytes else None
-    some = by_ratio(USUAL_REST_RATIO)
-    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
+    some, looks = by_ratio(USUAL_REST_RATIO), [(FEW_FRAMES, FAR_TOO_MANY), (TRIAL_FRAMES, TOO_MANY)]
+    if max(sample.positions.shape[2] for sample in samples) < 2 * TRIAL_FRAMES:
+        del looks[0]
     try:
-        if sum(_begun(prelude_of(USUAL_REST_RATIO), some, sample) for sample in samples) > TOO_MANY * most_bytes:
-            return None
+        for frames, too_many in looks:
+            work.add(PREDICTION * vertices * sum(min(frames, sample.positions.shape[2]) for sample in samples))
+            begun = sum(_begun(prelude_of(USUAL_REST_RATIO), some, sample, frames) for sample in samples)
+            if begun > too_many * most_bytes:
+                return None
     except BoundError:
         return None
     found = best(1.0, math.inf, lattice=True)
@@ -190,9 +195,9 @@ def _samples(source: Source) -> list[SegmentSample]:
     return [SegmentSample(block, scale * block.shape[2]) for block in positions]
 
 
-def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
-    """Return the bytes of the frames that a sample stands for, without first frames, as far as a few frames tell."""
-    some = sample.positions[:, :, :TRIAL_FRAMES]
+def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample, frames: int) -> float:
+    """Return the bytes of the frames that a sample stands for, without first frames, as far as its first ones tell."""
+    some = sample.positions[:, :, :frames]
     choice = Choice(settings, settings, None, predicted=CUBES)
     coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2] * sample.frames

@@ -14,6 +14,7 @@ from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
+HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
 FAST_FACTORS = ROTATION_FACTORS[:2]  # The factors that a fast search tries.
 
 
@@ -27,7 +28,10 @@ def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     few tracks only in frames that do not turn."""
     if trials.without(Feature.STILL):
         return settings
-    tried = [settings, *learned_bases.candidates(settings, trials)[:1], *turned_over(settings, trials)[:2]]
+    in_waves, *in_bases = turned_over(settings, trials)
+    if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
+        return settings
+    tried = [settings, *learned_bases.candidates(settings, trials)[:1], in_waves, *in_bases[:1]]
     return replace(settings, still=trials.cheapest(tried).still)
 
 
@@ -49,10 +53,8 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
     if trials.without(Feature.ROTATIONS):
         return settings
     uniform = candidates(settings, factors)
-    if math.inf in trials.costs(uniform):
-        return trials.cheapest([settings, *uniform])
-    unturned, *turned = trials.costs(uniform)
-    if min(turned) > HOPELESS_RATIO * unturned:
+    unturned, *turned = costs = trials.costs(uniform)
+    if max(costs) == math.inf or min(turned) > HOPELESS_RATIO * unturned:
         return trials.cheapest([settings, *uniform])
     per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
