@@ -533,7 +533,7 @@ class CodedMotion:
         if level == 0:
             known = self._source_end if self._loops else None
             self._source = replace(self._source, before=known if end is None else end.shown[1])
-        if end is not None and self._may_join and end.can_join and positions.shape[2] > END_FRAMES:
+        if end is not None and self._may_join and positions.shape[2] > END_FRAMES == end.positions.shape[2]:
             self._join_level(level, end, positions, layer)
         with self._corrected_as_shown(level, positions):
             own = self._source.last_shown(positions) if self._loops else None

@@ -262,9 +262,8 @@ class Search:
         """Return the settings of the first layer: the best ones if that is the only layer."""
         if not self.trials.is_layered:
             return self.best
-        choices = [] if self.effort == "fast" else [rotations.best_rotations, learned_pieces.best_pieces]
-        if not any(self.best.rotation_step_factors):  # What turns nothing here turns nothing in coarser steps.
-            choices = choices[1:]
+        turned = [rotations.best_rotations] * any(self.best.rotation_step_factors)  # Coarser steps turn no more.
+        choices: list[Choose] = [] if self.effort == "fast" else [*turned, learned_pieces.best_pieces]
         first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
         return self._after([*choices, best_node_steps], first)
 

@@ -159,14 +159,9 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
 
 def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
     """Return strength and heading of a clip's wind, from its metadata; NaN if it names none."""
-    strength, heading = metadata.get(STRENGTH), metadata.get(HEADING, 0.0)
-    numbers = [
-        float(value)
-        if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
-        else math.nan
-        for value in (strength, heading)
-    ]
-    return (numbers[0], numbers[1]) if not any(map(math.isnan, numbers)) else (math.nan, math.nan)
+    numbers = metadata.get(STRENGTH, math.nan), metadata.get(HEADING, 0.0)
+    are_known = all(isinstance(one, int | float) and not isinstance(one, bool) and abs(one) < 1e300 for one in numbers)
+    return (float(numbers[0]), float(numbers[1])) if are_known else (math.nan, math.nan)
 
 
 def looped(clip: MotionClip, blend: int = 0) -> MotionClip:

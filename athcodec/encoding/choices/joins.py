@@ -52,10 +52,6 @@ class End:
     corrections: np.ndarray
     shown: tuple[np.ndarray, np.ndarray]
 
-    @property
-    def can_join(self) -> bool:
-        return self.positions.shape[2] == END_FRAMES
-
     def of(self, some: slice) -> End:
         """Return the end of some of the vertices, as far as a join is chosen and made by it."""
         return replace(self, positions=self.positions[some], source=self.source[some])

@@ -129,11 +129,9 @@ def best_prediction(
     if usual:
         found = coded(Way(USUAL_REST_RATIO))
         return found if found.bytes < most_bytes else None
-    some, looks = by_ratio(USUAL_REST_RATIO), [(FEW_FRAMES, FAR_TOO_MANY), (TRIAL_FRAMES, TOO_MANY)]
-    if max(sample.positions.shape[2] for sample in samples) < 2 * TRIAL_FRAMES:
-        del looks[0]
+    some, are_long = by_ratio(USUAL_REST_RATIO), max(one.positions.shape[2] for one in samples) >= 2 * TRIAL_FRAMES
     try:
-        for frames, too_many in looks:
+        for frames, too_many in [(FEW_FRAMES, FAR_TOO_MANY)] * are_long + [(TRIAL_FRAMES, TOO_MANY)]:
             work.add(PREDICTION * vertices * sum(min(frames, sample.positions.shape[2]) for sample in samples))
             begun = sum(_begun(prelude_of(USUAL_REST_RATIO), some, sample, frames) for sample in samples)
             if begun > too_many * most_bytes:

@@ -15,7 +15,6 @@ from athcodec.encoding.trials import Trials
 
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
-FAST_FACTORS = ROTATION_FACTORS[:2]  # The factors that a fast search tries.
 
 
 def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) -> list[Settings]:
@@ -45,7 +44,7 @@ def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
 
 def fast_rotations(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with the best of a few factors."""
-    return best_rotations(settings, trials, FAST_FACTORS)
+    return best_rotations(settings, trials, ROTATION_FACTORS[:2])
 
 
 def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
