@@ -38,7 +38,7 @@ STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: 
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
-CLEAR_RATIO = 1.03  # Ratio of bytes, about two reference poses and at first settings, that decides between them.
+CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
 TIGHT = 2.0  # Work, in usual searches, below which time bases are tried before forms and rotations.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
@@ -288,9 +288,9 @@ class Search:
             yield candidate
 
     def about_best_reference(self) -> Search:
-        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: at
-        first settings if these tell, else the mean pose is tried with what was chosen about the rest pose, and goes on
-        from there. In small clips both are searched up to their steps."""
+        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: the
+        mean pose if it is far ahead at first settings, else it is tried with what was chosen about the rest pose, and
+        goes on from there. In small clips both are searched up to their steps."""
         source = self.trials.source
         if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
             return self
@@ -305,9 +305,10 @@ class Search:
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
         if not self._is_small:
-            of_rest, of_mean = about_rest.first_cost(), about_mean.first_cost()
-            if max(of_rest, of_mean) > CLEAR_RATIO * min(of_rest, of_mean):
-                return other if of_mean < of_rest else self
+            at_first = ((one, one.start) for one in (about_rest.trials, about_mean.trials))
+            of_rest, of_mean = (np.array([one.cost(start), one.level_costs(start).sum()]) for one, start in at_first)
+            if (of_rest > CLEAR_RATIO * of_mean).all():
+                return other
         cost = about_rest._cost_to_compare()
         if not self._is_small:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)

@@ -133,8 +133,7 @@ def best_prediction(
     try:
         for frames, too_many in [(FEW_FRAMES, FAR_TOO_MANY)] * are_long + [(TRIAL_FRAMES, TOO_MANY)]:
             work.add(PREDICTION * vertices * sum(min(frames, sample.positions.shape[2]) for sample in samples))
-            begun = sum(_begun(prelude_of(USUAL_REST_RATIO), some, sample, frames) for sample in samples)
-            if begun > too_many * most_bytes:
+            if sum(_begun(prelude_of(USUAL_REST_RATIO), some, one, frames) for one in samples) > too_many * most_bytes:
                 return None
     except BoundError:
         return None
