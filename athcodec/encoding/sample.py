@@ -61,6 +61,7 @@ class PlantSample:
             polygons=None,  # Trials go without faces.
             weights=None if source.weights is None else source.weights[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
+            whole=(source, self.vertices),
         )
         sample.segments, sample.repeats = source.segments, source.repeats
         return sample

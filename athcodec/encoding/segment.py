@@ -84,6 +84,7 @@ class Source:
     polygons: Polygons | None = None  # Polygons that the file stores as FACES.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     shapes: tuple[np.ndarray, np.ndarray] | None = None  # Details and keeps_shape of an inexact reference, if known.
+    whole: tuple[Source, np.ndarray] | None = None  # The source that this is a sample of, and its vertices there.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
@@ -326,8 +327,10 @@ class Source:
         """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
         positions = self._held.get(segment)
         if positions is None:
-            self._held[segment] = positions = self.relative(self.block(segment))
+            of_plant = self.whole and self.whole[0]._held.get(segment)
+            positions = self.relative(self.block(segment)) if of_plant is None else of_plant[self.whole[1]]
             positions.setflags(write=False)
+            self._held[segment] = positions
         if len(self.segments) == 1:  # A search asks for them again and again.
             self._only[:] = [positions]
         return positions

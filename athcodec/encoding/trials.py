@@ -59,6 +59,7 @@ class Trials:
     _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)
+    _last_modes: tuple[tuple, LearnedModes] | None = field(init=False, default=None)
     _time_components: dict[tuple, tuple[float, list]] = field(init=False, default_factory=dict)
     _preludes: dict[tuple, CodedPrelude] = field(init=False, default_factory=dict)
     _seen_preludes: set[tuple] = field(init=False, default_factory=set)
@@ -163,8 +164,12 @@ class Trials:
         """Return the modes of the pieces that the settings name, or of all pieces."""
         if settings.learned_pieces is None and not everywhere:
             return None
-        seen = self._learn_modes(settings)
-        return learn(plan, seen, settings.step, None if everywhere else settings.learned_pieces)
+        seen, pieces = self._learn_modes(settings), None if everywhere else settings.learned_pieces
+        key = id(seen), settings.step, pieces if pieces is None else pieces.tobytes()
+        if (last := self._last_modes) is not None and last[0] == key:  # Other rest poses are tried with the same modes.
+            return last[1]
+        self._last_modes = key, learn(plan, seen, settings.step, pieces)
+        return self._last_modes[1]
 
     def analysed(
         self, settings: Settings, number: int, modes: LearnedModes | None, bent: bool = False
@@ -191,6 +196,7 @@ class Trials:
     def forget_modes(self) -> None:
         """Free the components of learned modes, which take as much memory as a segment."""
         self._components.clear()
+        self._last_modes = None
 
     def _tried(self, settings: Settings) -> tuple[float, np.ndarray]:
         key = settings.key

@@ -34,6 +34,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.frames import KEPT_BYTES
 from athcodec.motion.presence import PRESENCE
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
@@ -41,6 +42,7 @@ from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import clip_of_arrays
 
 CHUNK_CACHE_BYTES = 16 << 20
+CACHE_SLOTS = 8191  # Chunks that the cache of a small dataset has places for.
 GROWTH = {
     h5py.h5z.FILTER_SHUFFLE: 1,
     h5py.h5z.FILTER_FLETCHER32: 1,
@@ -105,7 +107,7 @@ def _open(path: FilePath) -> h5py.File:
 def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
     budget = Budget(options.max_memory)
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
-    positions = _dataset(file, "positions")
+    positions = _unpacked_once(file, "positions", budget)
     if positions is None and "ABC" in file:
         raise ClipError("archive: got Alembic in HDF5, expected Alembic in Ogawa; abcconvert -toOgawa makes it")
     if positions is None:
@@ -168,6 +170,19 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise ClipError(f"{name}: got a group or an empty dataset, expected an array")
     return dataset
+
+
+def _unpacked_once(file: h5py.File, name: str, budget: Budget) -> h5py.Dataset | None:
+    """Return a dataset that is read several times: with room for all its chunks if it is small."""
+    dataset, size = _dataset(file, name), 0
+    if dataset is not None and dataset.chunks:
+        size = dataset.id.get_num_chunks() * chunk_bytes(dataset)
+    if not CHUNK_CACHE_BYTES < size <= min(KEPT_BYTES, budget.left):
+        return dataset
+    access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+    access.set_chunk_cache(CACHE_SLOTS, size, 1.0)
+    del dataset  # A dataset that is open has its cache already.
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
 
 
 def chunk_bytes(dataset: h5py.Dataset) -> int:
