@@ -17,21 +17,31 @@ ATH_INLINE int32_t quantise(double value, double dead_zone)
     return value < 0.0 ? -magnitude : magnitude;
 }
 
-/* units = the row times `count` waves, in units of a step. */
-ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, const double *row, double inverse,
-                              double *units)
+/* units = `count` waves, in units of a step, times the first half of a row plus its mirror image, or for every second
+ * wave less its mirror image; rows: both, or the whole row twice. */
+ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, int32_t frames,
+                              const double *const rows[2], double inverse, double *units)
 {
     ath_lanes sums[WAVES];
     for (int32_t k = 0; k < count; k++) lanes_set(sums + k, 0.0);
     int32_t t = 0;
-    for (; t + ATH_LANES <= T; t += ATH_LANES)
-        for (int32_t k = 0; k < count; k++) lanes_add_product(sums + k, waves + (size_t)k * (size_t)T + t, row + t);
+    for (; t + ATH_LANES <= frames; t += ATH_LANES)
+        for (int32_t k = 0; k < count; k++)
+            lanes_add_product(sums + k, waves + (size_t)k * (size_t)T + t, rows[k % 2] + t);
     for (int32_t k = 0; k < count; k++) {
         double sum[ATH_LANES];
         lanes_store(sum, sums + k);
-        for (int32_t i = t; i < T; i++) sum[0] += waves[(size_t)k * (size_t)T + i] * row[i];
+        for (int32_t i = t; i < frames; i++) sum[0] += waves[(size_t)k * (size_t)T + i] * rows[k % 2][i];
         units[k] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) * inverse;
     }
+}
+
+/* Returns whether waves are their own mirror images, every second one with the other sign: all but periodic ones. */
+static int are_mirrored(const ath_stream *stream, int32_t T)
+{
+    const double *second = stream->temporal + T, *third = second + T;
+    if (stream->root >= 0 || stream->temporal_rank < T || T < 4 || T % 2 != 0) return 0;
+    return second[0] == -second[T - 1] && third[0] == third[T - 1];
 }
 
 /* Transforms one axis over time into units of `step`. Returns the number of coefficients: at least `known`, and all
@@ -39,19 +49,26 @@ ATH_INLINE void sums_of_waves(const double *waves, int32_t count, int32_t T, con
 ATH_HOT static int32_t forward_temporal(const ath_stream *stream, int32_t T, double step, double dead_zone,
                                         int32_t known, const double *row, double *units)
 {
-    double length2, inverse = 1.0 / step;
-    sums_of_waves(row, 1, T, row, 1.0, &length2);
+    double length2, inverse = 1.0 / step, halves[2][ATH_SEGMENT_FRAMES / 2];
+    const double *whole[2] = {row, row}, *folded[2] = {halves[0], halves[1]};
+    sums_of_waves(row, 1, T, T, whole, 1.0, &length2);
     length2 *= inverse * inverse;
     double least = 0.9 * dead_zone * dead_zone, left = length2;
     int is_sharp = stream->temporal_rank == T && 1e-12 * length2 < 0.01 * least; /* a learned basis has rounded rows */
+    int32_t frames = are_mirrored(stream, T) ? T / 2 : T;
+    for (int32_t t = 0; frames < T && t < frames; t++) {
+        halves[0][t] = row[t] + row[T - 1 - t];
+        halves[1][t] = row[t] - row[T - 1 - t];
+    }
+    const double *const *rows = frames < T ? folded : whole;
     for (int32_t k = 0; k < stream->temporal_rank;) {
         if (k >= known && (k == 0 || is_sharp) && !(left > least)) return k;
         const double *waves = stream->temporal + (size_t)k * (size_t)T;
         int32_t count = k + WAVES <= stream->temporal_rank ? WAVES : 1;
         if (count == WAVES)
-            sums_of_waves(waves, WAVES, T, row, inverse, units + k);
+            sums_of_waves(waves, WAVES, T, frames, rows, inverse, units + k);
         else
-            sums_of_waves(waves, 1, T, row, inverse, units + k);
+            sums_of_waves(waves, 1, T, frames, rows + k % 2, inverse, units + k);
         for (int32_t stop = k + count; k < stop; k++) left -= units[k] * units[k];
     }
     return stream->temporal_rank;
