@@ -43,8 +43,8 @@ def walked(
 ) -> Settings:
     """Walk step and rest step in turn to the cheapest."""
     for again in range(WALKS):
-        # The first walks look further ahead: a much coarser step, or a much finer rest pose, may pay where a little of
-        # it does not.
+        # The first walks look further ahead where the nearest steps do not pay: a much coarser step, or a much finer rest
+        # pose, still may.
         coarser, finer = ([], []) if again else ([2], [-4])
         before, settings = settings, _walk(settings, trials, "step", factor, math.inf, coarser)
         if trials.source.reference_is_exact:
@@ -65,7 +65,9 @@ def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: flo
     def costs_at(exponents) -> dict[int, float]:
         return dict(zip(exponents, trials.costs([moved(exponent) for exponent in exponents])))
 
-    costs = costs_at([-1, 0, 1, *ahead])
+    costs = costs_at([-1, 0, 1])
+    if min(costs, key=costs.get) == 0:
+        costs |= costs_at(ahead)
     while True:
         best = min(costs, key=costs.get)
         wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= LONGEST_WALK]

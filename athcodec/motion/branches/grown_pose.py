@@ -32,8 +32,8 @@ def with_grown_pose(clip: MotionClip) -> MotionClip:
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
     frames = _some_frames(clip)
-    poses = itertools.chain([clip.rest], _poses(clip, frames))
-    sizes = np.array([np.linalg.norm(pose[links[:, 0]] - pose[links[:, 1]], axis=1) for pose in poses])
+    poses = (pose.T.copy() for pose in itertools.chain([clip.rest], _poses(clip, frames)))
+    sizes = np.sqrt([sum(np.square(x[links[:, 0]] - x[links[:, 1]]) for x in pose) for pose in poses])
     largest = sizes[1:].max(axis=0)
     small = (sizes < SMALL_LINK * largest).mean(axis=1)
     if small[0] <= small[1:].min() + UNGROWN:
