@@ -313,16 +313,19 @@ enum { VERTEX_COST = 16 }; /* vertex-frames that coding a vertex takes */
 static int code_connected_rest(ath_coder *coder, rest_model *model, const double *source, int32_t *cost)
 {
     const rest_layer *layer = &model->layer;
-    const ath_branch *branches = layer->branches;
+    const ath_branch *branches = layer->branches, *branch = branches;
     ath_mesh *mesh = layer->mesh;
-    double *rest = layer->rest;
+    double *rest = layer->rest, own = rest_step(branch, layer->step);
     for (; model->next < mesh->place_count; model->next++) {
         int32_t t = model->next, v = mesh->order[t];
         if (!ath_spend(cost, VERTEX_COST)) return ATH_MORE;
         if (mesh->from[v] == OF_COPY) continue;
-        const ath_branch *branch = branch_of(branches, layer->branch_count, v);
+        if (v < branch->first || v - branch->first >= branch->count) {
+            branch = branch_of(branches, layer->branch_count, v);
+            own = rest_step(branch, layer->step);
+        }
         rest_predictor *predictor = &single_of(model, branch)->connected;
-        double step_here = rest_step(branch, layer->step);
+        double step_here = own;
         rest_ring ring;
         rest_guess at;
         rest_ring_of(mesh, rest, v, &ring);

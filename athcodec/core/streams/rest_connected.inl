@@ -6,7 +6,7 @@
 #include "model/mesh.h"
 #include "streams/rest_predictor.inl"
 
-enum { CONNECTED_TERMS = 6, CONNECTED_GUESSES = 7, CONNECTED_CLASS = 4 };
+enum { CONNECTED_GUESSES = 7, CONNECTED_CLASS = 4 };
 
 /* At first, parallelograms are trusted or, if there are none, neighbours. */
 static void rest_connected_init(rest_predictor *predictor)

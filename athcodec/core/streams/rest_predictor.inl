@@ -10,6 +10,7 @@
 enum {
     REST_TERMS = 10,
     REST_OWN_TERMS = 8,
+    CONNECTED_TERMS = 6,
     REST_GUESSES = 9,
     REST_OWN_GUESSES = 7,
     REST_PHASES = 256,
@@ -210,6 +211,8 @@ ATH_HOT static void rest_learn(rest_predictor *predictor, rest_guess *at, double
     for (int32_t k = 0; k < 3; k++)
         if (at->term_count == REST_OWN_TERMS) /* Code for a constant is much faster. */
             rest_learn_axis(REST_OWN_TERMS, at->filter, at, k, noise, offset[k]);
+        else if (at->term_count == CONNECTED_TERMS)
+            rest_learn_axis(CONNECTED_TERMS, at->filter, at, k, noise, offset[k]);
         else
             rest_learn_axis(at->term_count, at->filter, at, k, noise, offset[k]);
     double most = 8.0 * at->filter->noise + 4.0;
