@@ -18,6 +18,7 @@ from athcodec.motion.hierarchy import Hierarchy
 FRAMES = 64  # Frames of a clip that are looked at.
 SMALL_LINK = 0.2  # Length of a link, over its largest in any frame, below which it is not grown.
 UNGROWN = 0.02  # Share of the links that may be small in the rest pose alone.
+GROWN = 0.75  # Mean length of all links, over their largest, that some frame of what grows reaches.
 LINKS = 20_000  # Links that are looked at, about.
 SMALL = 0.5  # Size of a part, over its largest in any frame, below which another pose shows it better.
 
@@ -39,7 +40,10 @@ def with_grown_pose(clip: MotionClip) -> MotionClip:
     if small[0] <= small[1:].min() + UNGROWN:
         return clip
     moving = largest > 0
-    best = int(frames[int(np.argmax((sizes[1:, moving] / largest[moving]).mean(axis=1)))])
+    grown = (sizes[1:, moving] / largest[moving]).mean(axis=1)
+    if grown.max() < GROWN:  # Points that wander are never all far apart.
+        return clip
+    best = int(frames[int(np.argmax(grown))])
     return clip.replace(rest=clip.block(best, best + 1)[0], rest_given=False)
 
 
