@@ -13,7 +13,7 @@ from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
 from athcodec.encoding.choices.rigid import first_rigid, loose_branches
 from athcodec.encoding.layers import layered_poses_size
-from athcodec.encoding.segment import Source, plain_settings
+from athcodec.encoding.segment import Source, plain_settings, poses_size
 from athcodec.encoding.segment_samples import SegmentSample, usual_change
 from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.shape import LENGTH_STEP
@@ -68,6 +68,8 @@ def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
     settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
     slack = source.rest_limit(float(np.min(settings.limit))) - float(np.spacing(source.largest_number))
     settings = rest.with_slack(source, ath, settings, max(slack, least))
+    tried = settings, replace(settings, rest_slack=0.0)  # What has detail moves along and may leave the bound.
+    settings = min(tried, key=rest.judge(source, ath, poses_size))
     node_steps = np.full(settings.levels, STILL_STEP * source.seen.diagonal + step)
     settings = replace(settings, step=qz.single(step), node_steps=node_steps)
     return Choice(settings, settings.coarser(ratio), None)
