@@ -220,6 +220,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_pose_nodes": (None, [*_SEGMENT, *[c_int32] * 3, c_void_p, c_int, c_void_p]),
     "ath_add_bends": (None, [c_int64, c_int32, c_int, c_void_p, c_void_p]),
     "ath_add_moments": (c_int64, [c_int64, c_int32, c_void_p, c_double, c_void_p]),
+    "ath_row_products": (None, [c_int64, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_multiply": (None, [*[c_int64] * 4, c_void_p, c_int64, c_void_p, c_int64, c_void_p]),
     "ath_decompose": (None, [c_int64, *[c_void_p] * 4]),
     "ath_solve": (None, [c_int64, c_int32, c_int32, c_void_p, c_void_p]),

@@ -47,9 +47,8 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     for segment in segments:
         frames += segment.frames
         for pieces, total in groups:
-            for part in _parts(pieces, segment.frames * total.shape[1]):
-                rows = _tracks(plan, segment, pieces[part], total.shape[1] // 3)
-                total[part] += multiply(rows, rows.transpose(0, 2, 1))
+            for part in _parts(pieces, total[:1].size):
+                total[part] += _products(plan, segment, pieces[part], total.shape[1])
         del segment  # The next segment is made after this one has been freed.
     return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
 
@@ -74,14 +73,16 @@ def _mode_weights(pieces: np.ndarray) -> np.ndarray:
     return weights[kind]
 
 
-def _tracks(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, size: int) -> np.ndarray:
-    """Return the tracks of the first modes over temporal frequency, (pieces, 3 size, frames) float64 in scene units."""
-    slots = plan.first_rows[pieces][:, None] + np.arange(size)
-    steps = np.array([stream.step for stream in segment.streams])
-    weight = _mode_weights(plan.pieces[pieces])[:, :size]
-    scale = steps[plan.pieces["level"][pieces]][:, None] * weight
-    rows = segment.coefficients[slots] * scale[:, :, None, None]
-    return rows.reshape(len(pieces), 3 * size, segment.frames)
+def _products(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, count: int) -> np.ndarray:
+    """Return products of the tracks of pieces' first modes with each other, (pieces, count, count), in squared scene
+    units."""
+    products, first = np.empty((len(pieces), count, count)), plan.first_rows[pieces]
+    rows = address(segment.coefficients, np.int32, 0)
+    lib.ath_row_products(len(pieces), first.ctypes.data, count, segment.frames, rows, products.ctypes.data)
+    steps = np.array([stream.step for stream in segment.streams])[plan.pieces["level"][pieces]]
+    scale = np.repeat(steps[:, None] * _mode_weights(plan.pieces[pieces])[:, : count // 3], 3, axis=1)
+    products *= scale[:, :, None] * scale[:, None, :]
+    return products
 
 
 def _across(pieces: np.ndarray, size: int) -> np.ndarray:

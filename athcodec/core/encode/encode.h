@@ -143,6 +143,11 @@ ATH_ENCODER_API void ath_mode_weights(const ath_piece *piece, double weights[ATH
 ATH_ENCODER_API int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *rows, double least,
                                         double *moments);
 
+/* Fills the products of each piece's `count` rows of integers, three for each mode, with each other. first: the first
+ * mode of each piece. */
+ATH_ENCODER_API void ath_row_products(int64_t pieces, const int32_t *first, int32_t count, int32_t frames,
+                                      const int32_t *rows, double *products);
+
 /* Multiplies `count` pairs of matrices, rows x inner and inner x columns. a_step, b_step: numbers from one matrix to
  * the next; 0: all pairs share one. */
 ATH_ENCODER_API void ath_multiply(int64_t count, int64_t rows, int64_t inner, int64_t columns, const double *a,

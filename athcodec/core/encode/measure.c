@@ -1,5 +1,6 @@
 /* How the encoder decodes and measures what it has coded. */
 #include "encode/encode.h"
+#include "model/lanes.h"
 
 enum { TILE = 16 }; /* vertices that are processed at once */
 
@@ -21,6 +22,31 @@ ATH_HOT int64_t ath_add_moments(int64_t count, int32_t frames, const int32_t *ro
         }
     }
     return kept;
+}
+
+ATH_HOT void ath_row_products(int64_t pieces, const int32_t *first, int32_t count, int32_t frames, const int32_t *rows,
+                              double *products)
+{
+    enum { AT_ONCE = 4 };
+    double row[ATH_SHAPE_NUMBERS][ATH_SEGMENT_FRAMES];
+    memset(row, 0, sizeof row);
+    for (int64_t p = 0; p < pieces; p++, products += count * count) {
+        const int32_t *own = rows + 3 * (size_t)first[p] * (size_t)frames;
+        for (int32_t i = 0; i < count; i++)
+            for (int32_t t = 0; t < frames; t++) row[i][t] = (double)own[i * frames + t];
+        for (int32_t i = 0; i < count; i++)
+            for (int32_t from = 0; from <= i; from += AT_ONCE) {
+                ath_lanes sums[AT_ONCE];
+                for (int32_t j = 0; j < AT_ONCE; j++) lanes_set(sums + j, 0.0);
+                for (int32_t t = 0; t < frames; t += ATH_LANES) /* rows end in zeros */
+                    for (int32_t j = 0; j < AT_ONCE; j++) lanes_add_product(sums + j, row[i] + t, row[from + j] + t);
+                for (int32_t j = from; j < ath_min(from + AT_ONCE, i + 1); j++) {
+                    double sum[ATH_LANES];
+                    lanes_store(sum, sums + (j - from));
+                    products[i * count + j] = products[j * count + i] = (sum[0] + sum[1]) + (sum[2] + sum[3]);
+                }
+            }
+    }
 }
 
 ATH_HOT
