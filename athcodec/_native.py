@@ -206,7 +206,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_basis_modes": (None, [c_void_p, c_int32, c_int32, *[c_void_p] * 3]),
     "ath_basis_sheets": (None, [c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_principal": (None, [c_int32, c_int32, *[c_void_p] * 4]),
-    "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p]),
+    "ath_plan_nodes": (None, [POINTER(CorePlan), c_void_p, c_int32, c_int32]),
     "ath_waves": (None, [c_int32, c_int32, c_void_p]),
     "ath_motion_work": (c_size_t, [c_int32, c_int32]),
     "ath_attach_cache_size": (c_size_t, [c_int64, c_int32]),

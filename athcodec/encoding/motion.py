@@ -138,7 +138,7 @@ class Plan:
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
-        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data)
+        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data, 0, self.level_count)
         if self.predicted or not bases:
             return
         gaps = np.empty(vertices, np.uint8)

@@ -16,7 +16,7 @@ static uint64_t carve_build(ath_file *file, uint8_t *base)
         for (int32_t of_nodes = 0; of_nodes < 2; of_nodes++)
             are_there[wave_kind(file, s, of_nodes)][ath_file_frames(file, s)] = 1;
     file->plan.bases = file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    file->built_level = -1;
+    file->built_level = file->planned_level = -1;
     file->next_piece = file->next_waves = 0;
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
@@ -31,7 +31,8 @@ size_t ath_build_size(const ath_file *file)
     return ath_size_or_most(carve_build(&counted, 0));
 }
 
-/* Fills the waves, then the bases that levels up to one take: the picture of a coarse level does not wait for all. */
+/* Fills the waves, then the nodes and bases that levels up to one take: the picture of a coarse level does not wait for
+ * all. */
 static int build_to(ath_file *file, int32_t level, int32_t *cost)
 {
     int result = ATH_OK;
@@ -43,6 +44,11 @@ static int build_to(ath_file *file, int32_t level, int32_t *cost)
     }
     while (result == ATH_OK && file->built_level < level) {
         int32_t next = file->built_level + 1;
+        if (file->planned_level < next) {
+            if (!ath_spend(cost, file->info.vertex_count)) return ATH_MORE;
+            ath_plan_nodes(&file->plan, file->nodes, next, next);
+            file->planned_level = next;
+        }
         if (file->bases_count > 0)
             result = ath_basis_fill(file->pieces, &file->next_piece, file->plan.piece_count, next, next, file->rest, 0,
                                     (double *)file->scratch, file->bases, cost);
@@ -125,7 +131,7 @@ static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_i
     layer->plan.rest = layer->rest;
     layer->bases_count = (uint64_t)ath_basis_layout(layer->pieces, layer->plan.piece_count, layer->rest, file->gaps,
                                                     (int32_t *)file->scratch);
-    if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes);
+    if (q == 0) ath_plan_nodes(&layer->plan, layer->nodes, 0, INT32_MAX);
     return ATH_OK;
 }
 

@@ -58,6 +58,7 @@ struct ath_file {
     ath_rest_head rest_head;
     ath_bytes rest_body;
     int32_t built_level;       /* level up to which `bases` are filled; -1: none */
+    int32_t planned_level;     /* the same of `nodes` */
     int32_t is_reading;        /* 1: a layer's rest pose is read in part */
     int32_t next_piece;        /* where filling the bases that come next goes on */
     int32_t next_waves;        /* where filling the waves goes on, by number of frames and kind */

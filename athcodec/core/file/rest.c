@@ -103,7 +103,6 @@ void ath_know_rest(ath_file *file)
     if (file->first_layer > 0 && !file->header.is_predicted)
         file->bases_count = (uint64_t)ath_basis_layout(file->pieces, file->plan.piece_count, file->rest, file->gaps,
                                                        (int32_t *)file->scratch);
-    ath_plan_nodes(&file->plan, file->nodes);
 }
 
 /* Gets the bits of a vertex's numbers, with -0.0 as 0.0. */

@@ -209,9 +209,10 @@ void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes)
     }
 }
 
-void ath_plan_nodes(const ath_plan *plan, ath_node *nodes)
+void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_level, int32_t high_level)
 {
     for (int32_t n = 0; n < plan->node_count; n++) {
+        if (nodes[n].level < low_level || nodes[n].level > high_level) continue;
         memset(nodes[n].whitening, 0, sizeof nodes[n].whitening);
         whiten(plan, nodes + n);
     }

@@ -69,7 +69,7 @@ ATH_ENCODER_API void ath_plan_rigid(const ath_plan *plan, ath_piece *pieces, int
 ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes);
 
 /* Completes the nodes once the rest pose is known. */
-ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes);
+ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_level, int32_t high_level);
 
 ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex) { return plan->rest + 3 * (size_t)vertex; }
 
