@@ -18,9 +18,8 @@ from bench import data, odd, rd
 from bench.codecs import Source, check, simple
 from bench.codecs.program import CannotKeep
 from bench.odd import growing
-from bench.odd.bending import Bones, moved_tree, scanned_tree, swaying_tree
+from bench.odd.bending import Bones
 from bench.odd.grass import grass
-from bench.odd.others import captured_stem, still_mesh, tumbling_cube
 from bench.store import read
 from bench.trees.plant import grow
 
@@ -111,50 +110,6 @@ def test_leaves_open_one_after_the_other_and_keep_their_foot():
     assert np.array_equal(np.unique(clip.faces), np.arange(9, clip.vertex_count))
 
 
-# ---- plants in wind ----
-
-
-def test_elements_keep_their_lengths_where_plants_sway(clips):
-    for name in ("calm", "scanned", "few_7", "held"):
-        clip = clips[name]
-        ends = clip.positions[:, clip.edges].astype(np.float64)
-        lengths = np.linalg.norm(ends[:, :, 0] - ends[:, :, 1], axis=-1)
-        assert np.ptp(lengths, axis=0).max() < 1e-5, name
-
-
-def test_the_calm_tree_moves_little_and_the_scanned_one_is_far_from_its_rest_pose(clips):
-    def away(clip):
-        height = np.ptp(clip.rest[:, 1])
-        return np.linalg.norm(clip.positions - clip.rest, axis=-1).mean() / height
-
-    assert away(clips["calm"]) < 0.01 < away(clips["few_7"]) < 0.1 < away(clips["scanned"])
-    counts = np.bincount(scanned_tree(4, 2, 50, 5, 0.6).vertex_branch)
-    assert set(counts[1:]) == {1, 2, 3, 4, 5}
-
-
-def test_a_moved_tree_only_jumps_between_its_places():
-    still, moved = swaying_tree(6, 60, 100), moved_tree(6, 60, 100, every=20)
-    offset = moved.positions - still.positions
-    assert np.allclose(offset, offset[:, :1], atol=1e-5)
-    jumps = np.flatnonzero(np.linalg.norm(np.diff(offset[:, 0], axis=0), axis=1) > 1e-3) + 1
-    assert jumps.tolist() == [20, 40]
-
-
-def test_held_and_still_clips_repeat_their_frames(clips):
-    held = clips["held"].positions
-    assert (held[0::3] == held[1::3]).all() and (held[0::3] == held[2::3]).all() and (held[0] != held[3]).any()
-    still, one = clips["still"], clips["one_frame"]
-    assert (still.positions == one.positions).all() and (one.faces == still.faces).all()
-    assert np.array_equal(np.unique(still_mesh(2, 1, 200, 20).faces), np.arange(still_mesh(2, 1, 200, 20).vertex_count))
-
-
-def test_the_far_tree_has_few_bits_left_for_its_motion(clips):
-    clip = clips["far"]
-    assert clip.positions[..., 0].min() > 9e4 and np.ptp(clip.positions[..., 0]) < 2000
-    along = np.unique(clip.positions[..., 0].astype(np.float64))
-    assert np.diff(along).min() == 2.0**-7, "one part in 200,000 of the plant"
-
-
 # ---- grass ----
 
 
@@ -167,50 +122,6 @@ def test_the_points_of_grass_are_the_same_named_and_unnamed_in_every_order():
     for order in ("interleaved", "shuffled"):
         clip = grass(seed=2, blades=30, points=5, frames=8, order=order)
         assert np.array_equal(clip.positions[:, hierarchy_of(clip).vertex_source], blades.positions)
-
-
-def test_blades_stand_on_their_feet_keep_their_lengths_and_bend_one_after_the_other_along_the_wind():
-    clip = grass(seed=3, blades=300, points=4, frames=100)
-    points = clip.positions.reshape(100, 300, 4, 3).astype(np.float64)
-    assert (points[:, :, 0] == points[0, :, 0]).all()
-    lengths = np.linalg.norm(np.diff(points, axis=2), axis=-1)
-    assert np.ptp(lengths, axis=0).max() < 1e-5
-    tips = points[:, :, -1, 0] - points[:, :, -1, 0].mean(axis=0)
-    foot = points[0, :, 0]
-    first = np.argsort(foot[:, 0])
-    tips /= tips.std(axis=0)
-    near = (tips[:, first[:30]] * tips[:, first[1:31]]).mean()
-    assert near > 0.6, "neighbours bend alike"
-
-
-# ---- others ----
-
-
-def test_the_noise_of_a_capture_is_as_large_as_asked_for():
-    clip = captured_stem(5, 500, 31, 1e-3)
-    same = captured_stem(5, 500, 31, 0.0)
-    diagonal = np.linalg.norm(np.ptp(same.positions.reshape(-1, 3), axis=0))
-    assert (clip.positions - same.positions).std() / diagonal == pytest.approx(1e-3, rel=0.02)
-    assert np.abs(np.diff(same.positions, n=2, axis=0)).max() < 2e-3 * diagonal, "smooth without it"
-
-
-@pytest.mark.parametrize("name", ("morph", "morph_narrow"))
-def test_few_of_the_shapes_are_mixed_at_a_time_in_straight_lines(clips, name):
-    clip = clips[name]
-    bent = np.linalg.norm(np.diff(clip.positions.astype(np.float64), n=2, axis=0), axis=-1).max(axis=1)
-    assert set(np.flatnonzero(bent > 1e-5) + 1) <= set(range(15, 225, 15))
-    motion = (clip.positions - clip.positions[0]).reshape(225, -1).astype(np.float64)
-    singular = np.linalg.svd(motion, compute_uv=False)
-    assert singular[20] < 1e-5 * singular[0]
-    key = np.linalg.svd(motion[[15, 30]], compute_uv=False)
-    assert key[1] > 0.1 * key[0]
-
-
-def test_the_cube_stays_a_cube():
-    corners = tumbling_cube(7, 50).positions.astype(np.float64)
-    middle = corners.mean(axis=1, keepdims=True)
-    assert np.allclose(np.linalg.norm(corners - middle, axis=-1), np.sqrt(0.75), atol=1e-5)
-    assert np.abs(middle[25] - middle[0]).max() > 0.5
 
 
 # ---- the simple codec ----

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import athcodec
+from athcodec.motion.branches.grown_pose import with_grown_pose
 
 ORGANS, VERTICES, FRAMES = 10, 40, 24
 
@@ -46,6 +47,12 @@ def test_a_clip_that_begins_grown_keeps_its_first_frame_as_rest_pose():
     clip = growing_organs(decay=True)
     with athcodec.open(athcodec.encode(clip, rel_error=1e-4, attributes="none")) as decoder:
         assert np.abs(decoder.file.rest - clip.positions[0]).max() < 1e-3
+
+
+def test_no_pose_shows_points_grown_that_wander():
+    positions = np.random.default_rng(3).random((40, 60, 3)).astype(np.float32)
+    clip = athcodec.MotionClip(positions, np.arange(40) / 24, rest=positions[0])
+    assert with_grown_pose(clip) is clip
 
 
 def test_a_rest_pose_that_a_clip_was_given_comes_back_whatever_its_size():

@@ -106,6 +106,16 @@ def test_positions_stay_in_the_file_and_come_by_whole_chunks(forked, tmp_path, m
     assert np.array_equal(np.concatenate([block for _, block in blocks]), positions)
 
 
+@pytest.mark.parametrize(("max_memory", "is_kept"), [(64 << 20, True), (12 << 20, False)])
+def test_chunks_of_a_small_clip_are_unpacked_once_if_they_fit_the_memory(tmp_path, max_memory, is_kept):
+    with h5py.File(tmp_path / "packed.h5", "w") as file:
+        ones = np.ones((150, 10000, 3), np.float32)
+        file.create_dataset("positions", data=ones, chunks=(32, 10000, 3), compression="gzip")
+    with read_hdf5(tmp_path / "packed.h5", max_memory=max_memory) as clip:
+        _, cache, _ = clip.positions.id.get_access_plist().get_chunk_cache()
+        assert (cache >= clip.positions.nbytes) == is_kept
+
+
 def test_a_closed_clip_says_that_it_cannot_be_read(sample_file):
     with read_hdf5(sample_file) as clip:
         pass

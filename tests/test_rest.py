@@ -13,6 +13,7 @@ from plants import diagonal
 import athcodec
 from athcodec._native import BRANCH
 from athcodec.encoding import streams
+from bench.odd.others import still_mesh
 
 
 def terrain(rows: int, columns: int, rough: float, seed: int) -> np.ndarray:
@@ -109,6 +110,15 @@ def test_a_still_mesh_keeps_the_bounds_of_its_vertices(scratch):
     weights = np.random.default_rng(1).uniform(0.1, 1.0, len(points))
     with coded(still(points), scratch / "weights.ath", max_error=0.05, weights=weights) as decoder:
         assert (np.linalg.norm(decoder.positions(0) - points, axis=1) <= 0.05 * weights).all()
+
+
+def test_leaves_that_keep_their_shape_on_a_still_tree_take_no_more_bytes_than_half_the_bound_does(scratch):
+    mesh = still_mesh(seed=7, frames=1, nodes=400, leaves=160)
+    sizes = [
+        athcodec.encode(mesh, scratch / "still.ath", rel_error=relative, attributes="none", ladder="none").bytes
+        for relative in (1e-5, 5e-6)
+    ]
+    assert sizes[0] < 1.05 * sizes[1]
 
 
 def test_a_still_mesh_is_stored_in_its_own_order(scratch):

@@ -57,7 +57,7 @@ from athcodec.encoding.progress import (
     silent,
 )
 from athcodec.encoding.sample import is_small
-from athcodec.encoding.search import CHUNK_BYTES, LEVEL_BYTES, Search
+from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.segment_samples import typical_segments
 from athcodec.encoding.settings import Choice
@@ -80,6 +80,7 @@ from athcodec.motion.units import Length
 from athcodec.options import DEFAULT_LADDER, EFFORTS, LADDERS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
+CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.

@@ -36,7 +36,6 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
-CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
 SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
@@ -137,14 +136,9 @@ class Search:
         all waves of its segment, and learned time bases do not always help."""
         trials = (self.of_sample or self).trials
         in_short = Search(replace(self.trials, source=short, samples=samples_of(short)), self.effort, self.ratios)
-        most = (in_short.first_cost() + in_short.front_bytes) / SHORT_SHARE - self.front_bytes
+        most = in_short.first_cost() / SHORT_SHARE
         apart = replace(trials)  # What a search chooses later may not depend on what was learned here.
         return most < self.first_cost() and most < apart.cost(trials.start.in_learned_bases())
-
-    @property
-    def front_bytes(self) -> int:
-        """About the bytes of the front for all levels and segments."""
-        return (CHUNK_BYTES + LEVEL_BYTES) * self.trials.levels * len(self.trials.source.segments)
 
     def levels_need_own_bases(self) -> bool:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
