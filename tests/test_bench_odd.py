@@ -1,11 +1,10 @@
-"""The odd clips of the benchmark: each is what its name says, and the same whenever and wherever it is made."""
+"""The odd clips of the benchmark, the same whenever and wherever they are made, and the simple codec."""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +16,8 @@ from athcodec.motion.hierarchy import hierarchy_of
 from bench import data, odd, rd
 from bench.codecs import Source, check, simple
 from bench.codecs.program import CannotKeep
-from bench.odd import growing
-from bench.odd.bending import Bones
 from bench.odd.grass import grass
 from bench.store import read
-from bench.trees.plant import grow
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -61,53 +57,12 @@ def test_clips_have_the_frames_and_vertices_that_they_are_known_for(clips):
     assert set(data.SUITES["odd"]) == set(odd.CLIPS) < set(data.RECIPES)
 
 
-# ---- growth ----
-
-
 def test_the_growth_that_ships_with_athcodec_is_that_of_the_benchmark(clips):
     with athcodec.read_hdf5(athcodec.sample_path("growth")) as shipped:
         made = clips["growth_carried"]
         assert np.allclose(shipped.block(0, 120), made.positions, atol=1e-5)  # processors round differently
         assert np.array_equal(shipped.vertex_branch, made.vertex_branch)
         assert np.array_equal(shipped.branch_parent, made.branch_parent)
-
-
-@pytest.mark.parametrize("eased", (False, True))
-def test_in_growth_no_vertex_moves_before_its_branch_begins_or_after_it_has_stopped(eased):
-    clip = growing.growth(5, 90, 400, eased)
-    bones = Bones.of(grow(400, 2, 8.0, 5))
-    begin, end = growing.begin_and_end(bones, 90, np.random.default_rng(5)).T
-    frame = np.arange(90)[:, None]
-    before, after = frame <= begin[bones.branch], frame >= end[bones.branch]
-    attached = bones.rest[growing.attach_node(bones)[bones.branch]].astype(np.float32)
-    rest = bones.rest.astype(np.float32)
-    assert np.allclose(np.where(before[..., None], clip.positions - attached, 0), 0, atol=1e-6)
-    assert np.allclose(np.where(after[..., None], clip.positions - rest, 0), 0, atol=1e-6)
-    assert before[:, -1].any() and after[-1].all() and not (before | after).all()
-
-
-@pytest.mark.parametrize("maker", (growing.growth_in_wind, partial(growing.growth, carried=True)))
-def test_a_branch_that_waits_is_carried_by_its_parent(maker):
-    clip = maker(5, 90, 400)
-    bones = Bones.of(grow(400, 2, 8.0, 5))
-    begin = growing.begin_and_end(bones, 90, np.random.default_rng(5))[:, 0]
-    attach = growing.attach_node(bones)[bones.branch]
-    waits = np.arange(90)[:, None] <= begin[bones.branch]
-    assert np.allclose((clip.positions - clip.positions[:, attach])[waits], 0, atol=1e-6)
-    assert np.linalg.norm(clip.positions[0], axis=1).max() == 0, "at first all of it is at the root"
-    what_has_grown_sways = np.ptp(clip.positions[60:, 10], axis=0).max() > 0.01
-    assert what_has_grown_sways == (maker is growing.growth_in_wind)
-
-
-def test_leaves_open_one_after_the_other_and_keep_their_foot():
-    clip = growing.unfolding_leaves(3, 60, 8)
-    leaves = clip.positions[:, 9:].reshape(60, 8, growing.ROWS, growing.WIDE, 3).astype(np.float64)
-    length = np.linalg.norm(leaves[:, :, -1, 1] - clip.positions[:, 1:9], axis=-1)
-    half = [np.flatnonzero(one > (one[0] + one[-1]) / 2)[0] for one in length.T]
-    assert half == sorted(set(half))
-    assert (length[-1] > 2 * length[0]).all()
-    assert (clip.positions[:, :9] == clip.positions[0, :9]).all()
-    assert np.array_equal(np.unique(clip.faces), np.arange(9, clip.vertex_count))
 
 
 # ---- grass ----
