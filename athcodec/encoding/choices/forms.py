@@ -16,6 +16,7 @@ from athcodec.encoding.settings import BEAM, Settings
 from athcodec.encoding.trials import Trials, distinct
 
 GIVE_UP_RATIO = 1.3  # Forms are not tried with rotations where they, or the best with them, are so many times as large.
+WAVES_RATIO = 1.08  # Forms are not tried with time bases either where they make a file in waves so many times as large.
 SHORT_STEM = 3  # Vertices of a median stem up to which learned modes can stand for whole stems.
 
 
@@ -57,7 +58,9 @@ def best_forms(settings: Settings, trials: Trials) -> Settings:
 
 def best_forms_again(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with the best forms once rotations and time bases are known."""
-    return trials.cheapest(candidates(settings, trials))
+    tried = candidates(settings, trials)
+    costs = trials.costs([candidate.in_waves() for candidate in tried])
+    return trials.cheapest([settings, *(one for one, cost in zip(tried, costs) if cost <= WAVES_RATIO * min(costs))])
 
 
 def in_each_basis(settings: Settings, trials: Trials) -> list[Settings]:
