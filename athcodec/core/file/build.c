@@ -104,12 +104,26 @@ static int start_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     return ATH_OK;
 }
 
+/* All pieces of a refinement belong to its level. */
+static void plan_pieces(const ath_file *file, int32_t q)
+{
+    const ath_layer *layer = &file->layers[q];
+    memcpy(layer->pieces, file->pieces, (size_t)file->plan.piece_count * sizeof *layer->pieces);
+    for (int32_t p = 0; q > 0 && p < file->plan.piece_count; p++) {
+        layer->pieces[p].level = ath_level_of_layer(file, q);
+        layer->pieces[p].low_level = -1;
+        layer->pieces[p].low_modes = 0;
+    }
+    ath_plan_rigid(&layer->plan, layer->pieces, q);
+}
+
 /* Reads a layer's rest pose. That of the layer before is known. */
 static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_info *fault)
 {
     ath_layer *layer = &file->layers[q];
     const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_level_of_layer(file, q) : 1, 0);
     layer->plan.rest = plan_before(file, q)->rest;
+    if (!file->is_reading) plan_pieces(file, q);
     if (!chunk) {
         if (!ath_spend(cost, file->info.vertex_count)) return ATH_MORE;
         memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));

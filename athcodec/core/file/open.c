@@ -223,21 +223,13 @@ static void build_plan(ath_file *file)
     if (file->header.is_predicted) ath_without_stems(plan, file->pieces, file->nodes);
 }
 
-/* All pieces of a refinement belong to its level. */
+/* Pieces of a layer follow with its rest pose. */
 static void plan_layers(ath_file *file)
 {
     file->first_layer = ath_file_chunk(file, ATH_REFINED_REST, 1, 0) ? 0 : 1;
     for (int32_t q = file->first_layer; q < file->header.layer_count; q++) {
-        ath_layer *layer = &file->layers[q];
-        layer->plan = file->plan;
-        layer->plan.pieces = layer->pieces;
-        memcpy(layer->pieces, file->pieces, (size_t)file->plan.piece_count * sizeof *layer->pieces);
-        for (int32_t p = 0; q > 0 && p < file->plan.piece_count; p++) {
-            layer->pieces[p].level = ath_level_of_layer(file, q);
-            layer->pieces[p].low_level = -1;
-            layer->pieces[p].low_modes = 0;
-        }
-        ath_plan_rigid(&layer->plan, layer->pieces, q);
+        file->layers[q].plan = file->plan;
+        file->layers[q].plan.pieces = file->layers[q].pieces;
     }
     if (file->first_layer > 0) return;
     memcpy(file->layers[0].nodes, file->nodes, (size_t)file->plan.node_count * sizeof *file->nodes);
