@@ -166,10 +166,10 @@ class Trials:
             return None
         seen, pieces = self._learn_modes(settings), None if everywhere else settings.learned_pieces
         key = id(seen), settings.step, pieces if pieces is None else pieces.tobytes()
-        if (last := self._last_modes) is not None and last[0] == key:  # Other rest poses are tried with the same modes.
-            return last[1]
-        self._last_modes = key, learn(plan, seen, settings.step, pieces)
-        return self._last_modes[1]
+        last = self._last_modes  # Other rest poses are tried with the same modes, by several threads.
+        if last is None or last[0] != key:
+            self._last_modes = last = key, learn(plan, seen, settings.step, pieces)
+        return last[1]
 
     def analysed(
         self, settings: Settings, number: int, modes: LearnedModes | None, bent: bool = False
