@@ -114,6 +114,7 @@ def test_chunks_of_a_small_clip_are_unpacked_once_if_they_fit_the_memory(tmp_pat
     with read_hdf5(tmp_path / "packed.h5", max_memory=max_memory) as clip:
         _, cache, _ = clip.positions.id.get_access_plist().get_chunk_cache()
         assert (cache >= clip.positions.nbytes) == is_kept
+    assert clip.vertex_count == 10000, "its shape is known once it is closed"
 
 
 def test_a_closed_clip_says_that_it_cannot_be_read(sample_file):

@@ -182,7 +182,7 @@ def _unpacked_once(file: h5py.File, name: str, budget: Budget) -> h5py.Dataset |
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
     access.set_chunk_cache(CACHE_SLOTS, size, 1.0)
     del dataset  # A dataset that is open has its cache already.
-    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access), readonly=True)
 
 
 def chunk_bytes(dataset: h5py.Dataset) -> int:
