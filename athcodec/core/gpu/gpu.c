@@ -63,6 +63,7 @@ static int32_t body_count(const ath_file *file, int32_t level)
 {
     body_walk walk = walk_bodies(file, level);
     int32_t count = 0;
+    walk.plan = &file->plan; /* has as many bodies as layers, whose pieces are planned when they are refined */
     while (next_body(&walk)) count++;
     return count;
 }
