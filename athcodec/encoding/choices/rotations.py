@@ -30,7 +30,9 @@ def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     in_waves, *in_bases = turned_over(settings, trials)
     if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
         return settings
-    tried = [settings, *learned_bases.candidates(settings, trials)[:1], in_waves, *in_bases[:1]]
+    tried = [settings, in_waves]
+    if trials.work.fits(2 * trials.work_of_trial):  # One time basis alone would win against waves.
+        tried += [*learned_bases.candidates(settings, trials)[:1], *in_bases[:1]]
     return replace(settings, still=trials.cheapest(tried).still)
 
 
