@@ -31,8 +31,7 @@ size_t ath_build_size(const ath_file *file)
     return ath_size_or_most(carve_build(&counted, 0));
 }
 
-/* Fills the waves, then the nodes and bases that levels up to one take: the picture of a coarse level does not wait for
- * all. */
+/* Fills the waves, then nodes and bases that levels up to one take: a coarse picture waits for no others. */
 static int build_to(ath_file *file, int32_t level, int32_t *cost)
 {
     int result = ATH_OK;

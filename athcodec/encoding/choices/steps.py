@@ -43,8 +43,7 @@ def walked(
 ) -> Settings:
     """Walk step and rest step in turn to the cheapest."""
     for again in range(WALKS):
-        # The first walks look further ahead where the nearest steps do not pay: a much coarser step, or a much finer
-        # rest pose, still may.
+        # Where the nearest steps do not pay, a much coarser step, or a much finer rest pose, still may.
         coarser, finer = ([], []) if again else ([2], [-4])
         before, settings = settings, _walk(settings, trials, "step", factor, math.inf, coarser)
         if trials.source.reference_is_exact:
