@@ -17,14 +17,17 @@ from typing import Any, BinaryIO, cast
 from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
+from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions, placed_clip
 from athcodec.encoding.layers import layer_ratios
+from athcodec.encoding.places import PlacedClip
+from athcodec.encoding.polygons import pack_places
 from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress, Work, allowed_work, stage_weights
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
+from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import MotionClip
 from athcodec.options import DEFAULT_REL_ERROR
 
@@ -167,16 +170,14 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
-    grown = clip if options.keeps_rest else with_grown_pose(clip)
-    branches = None
+    placed, branches = placed_clip(clip, options), None
     if not clip.has_branches:
-        work = Work(
-            BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
-        )
-        work.expected = BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, "default")
+        vertices, frames = placed.clip.vertex_count, clip.frame_count
+        work = Work(BRANCH_SHARE * allowed_work(vertices, frames, options.effort), report, "branches")
+        work.expected = BRANCH_SHARE * allowed_work(vertices, frames, "default")
         with work.trying("branches"):
-            branches = best_branches(grown, option, work, options.host_rest)
-    job = EncodingJob.begin(clip, grown, branches, options, report)
+            placed, branches = _best_places(placed, option, options, work)
+    job = EncodingJob.begin(placed, _grown(placed, options), branches, options, report)
     if branches is not None:
         job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
@@ -187,6 +188,26 @@ def _begin(
         return size
 
     return job, option.in_scene_units(job.source, file_size)
+
+
+def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
+    return placed.clip if options.keeps_rest else with_grown_pose(placed.clip)
+
+
+def _best_places(
+    placed: PlacedClip, option: BoundOption, options: EncodingOptions, work: Work
+) -> tuple[PlacedClip, Found]:
+    """Return the clip with parts that touch at a point joined there or apart, whichever makes the smaller file, and the
+    branches of its places."""
+    apart = placed.apart()
+    grown = _grown(placed, options)
+    branches, size = best_branches(grown, option, work, options.host_rest, is_compared=apart is not None)
+    if apart is None or not work.fits(work.done):
+        return placed, branches
+    others, other_size = best_branches(_grown(apart, options), option, work, options.host_rest, is_compared=True)
+    size += len(pack_places(placed.places))
+    other_size += len(pack_places(apart.places)) if apart.places.are_shared else 0
+    return (apart, others) if other_size < size else (placed, branches)
 
 
 def _weighted_progress(
