@@ -247,6 +247,8 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     ),
     "ath_encode_places": (c_int64, [*_WRITER, c_uint32, c_int32, c_int32, c_void_p]),
     "ath_hash_positions": (None, [c_int64, c_void_p, *[c_int32] * 2, *[c_int] * 2, c_void_p, c_void_p]),
+    "ath_find_near": (None, [*[c_int32] * 3, c_void_p, c_void_p, c_double, c_void_p, c_uint32, c_void_p]),
+    "ath_find_far": (None, [c_int64, *[c_void_p] * 2, *[c_int32] * 2, c_int, c_void_p, c_void_p]),
     "ath_find_apart": (None, [c_int64, *[c_void_p] * 2, *[c_int32] * 2, *[c_int] * 2, c_void_p, c_void_p]),
     "ath_encode_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8]),
     "ath_find_copies": (c_int32, [c_void_p, c_int32, c_void_p, c_double, c_double, c_void_p, c_void_p]),

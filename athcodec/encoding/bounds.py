@@ -6,9 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
+from athcodec.motion.algebra import length
+from athcodec.motion.clip import MotionClip
 from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
@@ -52,6 +56,17 @@ class BoundOption:
             return max(LOSSLESS_REL_ERROR * extent, least, extent / qz.LARGEST_EXTENT)
         fraction = self.rel_error or DEFAULT_REL_ERROR
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
+
+
+    def least(self, clip: MotionClip) -> float:
+        """Return what the bound for a clip is at least, as far as some of its frames tell; 0: they do not."""
+        if self.max_error is not None:
+            return self.max_error
+        if self.target_size is not None or self.lossless:
+            return 0.0
+        frames = {0, clip.frame_count // 2, clip.frame_count - 1}
+        corners = [getattr(clip.block(frame, frame + 1)[0], name)(axis=0) for frame in frames for name in ("min", "max")]
+        return (self.rel_error or DEFAULT_REL_ERROR) * length(np.ptp(np.array(corners, float), axis=0))
 
 
 def least_bound(source: Source) -> float:

@@ -32,6 +32,9 @@ from athcodec.motion.clip import MotionClip
 from athcodec.options import DEFAULT_REL_ERROR
 
 
+JOINED_SHARE = 0.97  # Largest share of the bytes at which parts that touch at a point are joined there.
+
+
 def encode_clip(
     clip: MotionClip,
     target: str | PathLike[str] | BinaryIO,
@@ -170,7 +173,7 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
-    placed, branches = placed_clip(clip, options), None
+    placed, branches = placed_clip(clip, options, option.least(clip)), None
     if not clip.has_branches:
         vertices, frames = placed.clip.vertex_count, clip.frame_count
         work = Work(BRANCH_SHARE * allowed_work(vertices, frames, options.effort), report, "branches")
@@ -200,14 +203,15 @@ def _best_places(
     """Return the clip with parts that touch at a point joined there or apart, whichever makes the smaller file, and the
     branches of its places."""
     apart = placed.apart()
-    grown = _grown(placed, options)
+    first = placed if apart is None else apart
+    grown = _grown(first, options)
     branches, size = best_branches(grown, option, work, options.host_rest, is_compared=apart is not None)
     if apart is None or not work.fits(work.done):
-        return placed, branches
-    others, other_size = best_branches(_grown(apart, options), option, work, options.host_rest, is_compared=True)
-    size += len(pack_places(placed.places))
-    other_size += len(pack_places(apart.places)) if apart.places.are_shared else 0
-    return (apart, others) if other_size < size else (placed, branches)
+        return first, branches
+    others, other_size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
+    size += len(pack_places(apart.places)) if apart.places.are_shared else 0
+    other_size += len(pack_places(placed.places))
+    return (placed, others) if other_size < JOINED_SHARE * size else (apart, branches)
 
 
 def _weighted_progress(

@@ -86,6 +86,7 @@ CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the e
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
+PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another that is coded in its place.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
@@ -204,12 +205,17 @@ def _host_rest(clip: MotionClip) -> np.ndarray:
     return clip.rest.astype(np.float32) + np.float32(0)  # -0.0 is 0.0
 
 
-def placed_clip(clip: MotionClip, options: EncodingOptions, places: Places | None = None) -> PlacedClip:
-    """Return the clip with a vertex for each place. places: as they were found before. Raises ClipError."""
+def placed_clip(
+    clip: MotionClip, options: EncodingOptions, bound: float = 0.0, places: Places | None = None
+) -> PlacedClip:
+    """Return the clip with a vertex for each place. bound: the largest error at least; places: as they were found
+    before. Raises ClipError."""
     clip, weights = (clip, None) if options.weights is None else _weighted(clip, options.weights)
     if places is None:
         labels = [] if weights is None else [weights]
-        places = find_places(clip, labels, options.lossless or options.exact_rest)
+        least = bound if weights is None else bound * float(weights.min() / weights.max())
+        most_error = 0.0 if options.lossless or options.keeps_rest else PLACE_SHARE * least
+        places = find_places(clip, labels, options.lossless or options.exact_rest, most_error)
     return PlacedClip.of(clip, places, weights)
 
 
@@ -330,7 +336,7 @@ class EncodingJob:
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
-        placed = placed_clip(clip, options, draft.places)
+        placed = placed_clip(clip, options, places=draft.places)
         source = cls._source(placed, draft.branches, seen, options, ThreadPool(jobs or default_jobs()))
         return cls(source, placed, options, report, draft.branches)
 
@@ -359,6 +365,7 @@ class EncodingJob:
             options.host_rest,
             polygons=_polygons(clip, options),
             shares=sizes if placed.places.are_shared else None,
+            place_error=placed.places.error,
             host_mesh=_host_rest(placed.source) if options.host_rest else None,
             rest_precision=options.rest_precision,
             without=options.without,
@@ -855,7 +862,7 @@ class EncodingJob:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
-            errors[:, segment.index] = segment.errors + decided.source.held_error
+            errors[:, segment.index] = segment.errors + decided.source.replaced_error
             joins[:, segment.index] = segment.joins
             flaws[:, segment.index] = segment.flaws
             for (level, kind), payload in segment.chunks.items():

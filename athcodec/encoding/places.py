@@ -19,6 +19,7 @@ from athcodec.motion.hierarchy import is_forest
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import POLYGON_ARRAYS
 
+NEAR_SHARE = 0.9  # Largest share of places that are left where near vertices are joined.
 MIXER = np.uint64(0x9E3779B97F4A7C15)  # Odd, so that multiplying by it loses nothing.
 
 
@@ -55,13 +56,18 @@ class PlacedClip:
         part = parts_by_sides(self.source, self.places)
         if part is None:
             return None
-        places = _alike_in_copies(self.source, Places.of_labels(self.places.of_vertex, part))
+        places = Places.of_labels(self.places.of_vertex, part, error=self.places.error)
+        places = _alike_in_copies(self.source, places)
         return None if places.count == self.places.count else PlacedClip.of(self.source, places, self.weights)
 
 
-def find_places(clip: MotionClip, labels: Sequence[np.ndarray] = (), zeros_differ: bool = False) -> Places:
+def find_places(
+    clip: MotionClip, labels: Sequence[np.ndarray] = (), zeros_differ: bool = False, most_error: float = 0.0
+) -> Places:
     """Return the places of a clip: vertices are at one if all their coordinates are equal in the rest pose and in every
-    frame, and they are of the same branch, object and copy, as far as the source says.
+    frame, and they are of the same branch, object and copy, as far as the source says. Vertices of different faces that
+    stay within `most_error` of each other are at one, too, if there are many: programs compute or print the position
+    of a place more than once, with different roundings.
 
     Parameters
     ----------
@@ -70,6 +76,8 @@ def find_places(clip: MotionClip, labels: Sequence[np.ndarray] = (), zeros_diffe
         What vertices of one place also have in common, such as factors on the bound.
     zeros_differ : bool
         Whether 0.0 and -0.0 are different coordinates.
+    most_error : float
+        Scene units; 0: only what is equal is at one place.
 
     Raises
     ------
@@ -84,6 +92,9 @@ def find_places(clip: MotionClip, labels: Sequence[np.ndarray] = (), zeros_diffe
             break
         followers = _split(block, leader, followers, zeros_differ)
     places = _numbered(leader)
+    if most_error > 0:
+        near = _join_near(clip, leader, joined, most_error)
+        places = near if near.count <= NEAR_SHARE * places.count else places
     return places if not places.are_shared else _alike_in_copies(clip, places)
 
 
@@ -234,9 +245,71 @@ def _are_apart(block: np.ndarray, vertices: np.ndarray, others: np.ndarray, zero
     return apart > 0
 
 
-def _numbered(leader: np.ndarray) -> Places:
+def _join_near(clip: MotionClip, leader: np.ndarray, labels: Sequence[np.ndarray], most_error: float) -> Places:
+    """Return the places of vertices that have leaders, and of those that stay near others."""
+    some = np.flatnonzero(leader == np.arange(len(leader))).astype(np.int32)
+    label = np.zeros(len(some), np.int32)
+    if labels:
+        label = Places.of_labels(*(array[some] for array in labels)).of_vertex
+    near = some[_near_leaders(_typical_poses(clip)[:, some], label, most_error)]
+    near = np.where(_share_a_face(clip, leader, some, near), some, near)
+    followers, others = some[near != some], near[near != some]
+    squares = np.zeros(len(followers))
+    for _, block in clip.blocks():
+        if not len(followers):
+            break
+        block = np.ascontiguousarray(block)
+        lib.ath_find_far(
+            *(len(followers), address(followers, np.int32, 0), address(others, np.int32, 0)),
+            *(block.shape[0], block.shape[1], block.dtype == np.float64, block.ctypes.data, squares.ctypes.data),
+        )
+        stay = squares <= most_error**2
+        followers, others, squares = (np.ascontiguousarray(array[stay]) for array in (followers, others, squares))
+    joined = leader.copy()
+    joined[followers] = others
+    return _numbered(joined[leader], float(np.sqrt(squares.max(initial=0.0))))
+
+
+def _share_a_face(clip: MotionClip, leader: np.ndarray, some: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Return which of `some` would meet another corner of a face of theirs, which has no area then, if each were at the
+    place of `near`."""
+    if clip.polygons is None:
+        return np.zeros(len(some), bool)
+    counts, corners = clip.polygons
+    joined = leader.copy()
+    joined[some] = near
+    face = np.repeat(np.arange(len(counts)), counts)
+    before, after = leader[corners], joined[leader[corners]]
+    order = np.lexsort((before, after, face))
+    beside = (face[order[1:]] == face[order[:-1]]) & (after[order[1:]] == after[order[:-1]])
+    meets = np.flatnonzero(beside & (before[order[1:]] != before[order[:-1]]))
+    is_met = np.zeros(len(leader), bool)
+    is_met[before[order[meets]]] = is_met[before[order[meets + 1]]] = True
+    return is_met[some]
+
+
+def _typical_poses(clip: MotionClip) -> np.ndarray:
+    """Return the rest pose and the first, middle and last frame, (4, N, 3) float64."""
+    frames = (0, clip.frame_count // 2, clip.frame_count - 1)
+    return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in frames)])
+
+
+def _near_leaders(poses: np.ndarray, label: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return for each point of some poses, (k, N, 3), the first one that is near it in all, (N,)."""
+    points, count = np.ascontiguousarray(poses.transpose(1, 0, 2)), poses.shape[1]
+    table, leaders = 1 << count.bit_length(), np.empty(count, np.int32)
+    work = np.empty(table + count, np.int32)
+    widest = int(np.ptp(poses, axis=1).max(axis=1).argmax())
+    lib.ath_find_near(
+        *(count, len(poses), widest, points.ctypes.data, address(label, np.int32, count), tolerance),
+        *(work.ctypes.data, table, leaders.ctypes.data),
+    )
+    return leaders
+
+
+def _numbered(leader: np.ndarray, error: float = 0.0) -> Places:
     number = np.cumsum(leader == np.arange(len(leader)), dtype=np.int32) - 1
-    return Places(number[leader].astype(np.int32))
+    return Places(number[leader].astype(np.int32), error)
 
 
 def _alike_in_copies(clip: MotionClip, places: Places) -> Places:
@@ -251,7 +324,7 @@ def _alike_in_copies(clip: MotionClip, places: Places) -> Places:
             inside = Places.of_labels(places.of_vertex[rows].reshape(number, -1).T).of_vertex
             label[rows] = np.tile(inside, number)
     # Vertices that are no copies keep their labels; `copy` tells copies from each other and from those.
-    return Places.of_labels(copy, label)
+    return Places.of_labels(copy, label, error=places.error)
 
 
 def _ranks(places: np.ndarray, branch: np.ndarray) -> np.ndarray:

@@ -80,6 +80,7 @@ class Source:
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
     held: np.ndarray | None = None  # (frames,) bool: frames that the pose before them stands for; None: repeats alone.
     held_error: float = 0.0  # Largest distance of any vertex in a held frame from the pose that stands for it.
+    place_error: float = 0.0  # Largest distance of any vertex from the one that stands for its place.
     polygons: Polygons | None = None  # Polygons that the file stores as FACES, by places.
     shares: np.ndarray | None = None  # (N,) int32: how many vertices of the source are at each place; None: one.
     host_mesh: np.ndarray | None = None  # Rest pose of the host with all vertices; None: that of the clip.
@@ -235,11 +236,16 @@ class Source:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.held_error])
+        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.replaced_error])
 
     def unweighted_limit(self, bound: float) -> float:
         """Return what decoded positions of any vertex are held to if weights do not count."""
-        return qz.error_limit(bound - self.held_error, self.seen.diagonal)
+        return qz.error_limit(bound - self.replaced_error, self.seen.diagonal)
+
+    @property
+    def replaced_error(self) -> float:
+        """Largest distance of any vertex in any frame from what is coded in its place."""
+        return self.held_error + self.place_error
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""

@@ -1,7 +1,7 @@
 """Places: vertices that coincide in every frame are one, so that motion is coded once for each place.
 
 Meshes have several vertices at one place for flat shading, hard edges and seams of textures; simulators write a vertex
-for each corner of each face. Only what is equal bit for bit is joined.
+for each corner of each face, some of them with other roundings.
 """
 
 from __future__ import annotations
@@ -20,9 +20,12 @@ class Places:
     ----------
     of_vertex : (N,) int32 array
         The place of each vertex.
+    error : float
+        Largest distance, over all frames, of a vertex from the first one of its place; 0 if all are equal.
     """
 
     of_vertex: np.ndarray
+    error: float = 0.0
 
     @classmethod
     def apart(cls, vertex_count: int) -> Places:
@@ -30,7 +33,7 @@ class Places:
         return cls(np.arange(vertex_count, dtype=np.int32))
 
     @classmethod
-    def of_labels(cls, *labels: np.ndarray) -> Places:
+    def of_labels(cls, *labels: np.ndarray, error: float = 0.0) -> Places:
         """Return places of the vertices that have the same labels, arrays with a row for each vertex."""
         columns = [column for label in labels for column in np.reshape(label, (len(label), -1)).T]
         order = np.lexsort(columns[::-1])
@@ -44,7 +47,7 @@ class Places:
         number[np.argsort(first)] = np.arange(len(first))
         of_vertex = np.empty(len(order), np.int32)
         of_vertex[order] = number[np.cumsum(begins) - 1]
-        return cls(of_vertex)
+        return cls(of_vertex, error)
 
     @property
     def vertex_count(self) -> int:

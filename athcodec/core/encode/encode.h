@@ -177,6 +177,16 @@ ATH_ENCODER_API void ath_find_apart(int64_t count, const int32_t *vertices, cons
                                     int32_t vertex_count, int is_float64, int zeros_differ, const void *positions,
                                     uint8_t *apart);
 
+/* Fills for each of `count` points the first one with its label that is within a tolerance of it in all poses; itself if
+ * there is none. points: count x poses x 3. pose: the one in which points lie furthest apart. table: a power of two.
+ * work: table + count. */
+ATH_ENCODER_API void ath_find_near(int32_t count, int32_t poses, int32_t pose, const double *points,
+                                   const int32_t *labels, double tolerance, int32_t *work, uint32_t table,
+                                   int32_t *leaders);
+/* Raises `squares` to the square of the largest distance of each vertex from another in any of the frames. */
+ATH_ENCODER_API void ath_find_far(int64_t count, const int32_t *vertices, const int32_t *others, int32_t frames,
+                                  int32_t vertex_count, int is_float64, const void *positions, double *squares);
+
 enum { ATH_CORRECTION_ROW = 6 }; /* int32_t per row */
 
 /* How the corrections of a segment meet those of the segments beside it. At closed ends (1: first frame, 2: last frame)
