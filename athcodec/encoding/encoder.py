@@ -32,7 +32,7 @@ from athcodec.motion.clip import MotionClip
 from athcodec.options import DEFAULT_REL_ERROR
 
 
-JOINED_SHARE = 0.97  # Largest share of the bytes at which parts that touch at a point are joined there.
+JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
 
 
 def encode_clip(

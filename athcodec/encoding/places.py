@@ -87,10 +87,10 @@ def find_places(
     joined = [*_labels(clip), *labels]
     leader = _leaders_of_first_frame(clip, joined, zeros_differ)
     followers = _followers(leader)
-    for _, block in clip.blocks():
+    for _, block in clip.blocks() if len(followers) else ():
+        followers = _split(block, leader, followers, zeros_differ)
         if not len(followers):
             break
-        followers = _split(block, leader, followers, zeros_differ)
     places = _numbered(leader)
     if most_error > 0:
         near = _join_near(clip, leader, joined, most_error)
@@ -255,9 +255,7 @@ def _join_near(clip: MotionClip, leader: np.ndarray, labels: Sequence[np.ndarray
     near = np.where(_share_a_face(clip, leader, some, near), some, near)
     followers, others = some[near != some], near[near != some]
     squares = np.zeros(len(followers))
-    for _, block in clip.blocks():
-        if not len(followers):
-            break
+    for _, block in clip.blocks() if len(followers) else ():
         block = np.ascontiguousarray(block)
         lib.ath_find_far(
             *(len(followers), address(followers, np.int32, 0), address(others, np.int32, 0)),
@@ -265,6 +263,8 @@ def _join_near(clip: MotionClip, leader: np.ndarray, labels: Sequence[np.ndarray
         )
         stay = squares <= most_error**2
         followers, others, squares = (np.ascontiguousarray(array[stay]) for array in (followers, others, squares))
+        if not len(followers):
+            break
     joined = leader.copy()
     joined[followers] = others
     return _numbered(joined[leader], float(np.sqrt(squares.max(initial=0.0))))
