@@ -415,6 +415,8 @@ class Draft:
         return self.stream(stream) if self.stream else stream
 
     def with_header(self, **fields) -> Draft:
+        if "place_count" in fields:  # As many vertices, unless something else is said.
+            fields = {"vertex_count": fields["place_count"]} | fields
         return replace(self, header=self.header | fields)
 
     def index(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> int:

@@ -34,7 +34,7 @@ def best_branches(
     about its bytes, infinite where nothing had to be tried. Predicted motion hardly depends on branches: if two
     candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
     by_points = work.fits(FINDING * clip.vertex_count)
-    proposals, trial = candidates(clip, by_points), _Trial(clip, option, host_rest, work)
+    proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
     finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
     work.add(finding)
@@ -57,7 +57,7 @@ def best_branches(
     return (unordered, size) if size < least else (best, least)
 
 
-class _Trial:
+class Trial:
     """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
 
     def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):

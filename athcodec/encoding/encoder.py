@@ -16,7 +16,7 @@ from typing import Any, BinaryIO, cast
 
 from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import best_branches
+from athcodec.encoding.branch_trials import Trial, best_branches
 from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions, placed_clip
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.places import PlacedClip
@@ -33,6 +33,7 @@ from athcodec.options import DEFAULT_REL_ERROR
 
 
 JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
+FEWER_PLACES = 0.9  # Largest share of the places that are left then, if joining is to be tried.
 
 
 def encode_clip(
@@ -200,18 +201,28 @@ def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
 def _best_places(
     placed: PlacedClip, option: BoundOption, options: EncodingOptions, work: Work
 ) -> tuple[PlacedClip, Found]:
-    """Return the clip with parts that touch at a point joined there or apart, whichever makes the smaller file, and the
-    branches of its places."""
+    """Return the clip with the places that make the smallest file, as far as there is work for trials, and the branches
+    of its places. Parts that touch at a point are joined there or apart; like objects may be joined alike."""
     apart = placed.apart()
     first = placed if apart is None else apart
-    grown = _grown(first, options)
-    branches, size = best_branches(grown, option, work, options.host_rest, is_compared=apart is not None)
-    if apart is None or not work.fits(work.done):
-        return first, branches
-    others, other_size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
-    size += len(pack_places(apart.places)) if apart.places.are_shared else 0
-    other_size += len(pack_places(placed.places))
-    return (placed, others) if other_size < JOINED_SHARE * size else (apart, branches)
+    regular = first.regular()
+    is_joined_tried = apart is not None and placed.places.count <= FEWER_PLACES * apart.places.count
+    is_compared = is_joined_tried or regular is not None
+    branches, size = best_branches(_grown(first, options), option, work, options.host_rest, is_compared)
+    best, least = (first, branches), size + _table_bytes(first)
+    if regular is not None:
+        moved, trial = first.moved_to(branches, regular), Trial(_grown(regular, options), option, options.host_rest, work)
+        size = trial.size(moved)[0] + _table_bytes(regular)
+        best, least = ((regular, moved), size) if size < least else (best, least)
+    if is_joined_tried and work.fits(work.done):
+        others, size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
+        if size + _table_bytes(placed) < JOINED_SHARE * least:
+            return placed, others
+    return best
+
+
+def _table_bytes(placed: PlacedClip) -> int:
+    return len(pack_places(placed.places)) if placed.places.are_shared else 0
 
 
 def _weighted_progress(

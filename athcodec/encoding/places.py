@@ -6,12 +6,13 @@ All frames are read once, block by block, and no longer than vertices are left t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from athcodec._native import address, lib
 from athcodec.motion.branches.finding import named_labels
+from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.seen import copies_of, parts_by_sides, parts_of
 from athcodec.motion.clip import MotionClip, Skin
 from athcodec.motion.frames import Frames
@@ -19,7 +20,7 @@ from athcodec.motion.hierarchy import is_forest
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import POLYGON_ARRAYS
 
-NEAR_SHARE = 0.9  # Largest share of places that are left where near vertices are joined.
+NEAR_SHARE = 0.98  # Largest share of places that are left where near vertices are joined.
 MIXER = np.uint64(0x9E3779B97F4A7C15)  # Odd, so that multiplying by it loses nothing.
 
 
@@ -59,6 +60,23 @@ class PlacedClip:
         places = Places.of_labels(self.places.of_vertex, part, error=self.places.error)
         places = _alike_in_copies(self.source, places)
         return None if places.count == self.places.count else PlacedClip.of(self.source, places, self.weights)
+
+
+    def regular(self) -> PlacedClip | None:
+        """Return the clip with objects of as many vertices joined alike, where vertices coincide in some of them and
+        differ by roundings in others; None: they are alike."""
+        part = parts_of(self.source)
+        if part is None or not self.places.are_shared:
+            return None
+        places = _alike_in_runs(self.places, np.bincount(part))
+        return None if places.count == self.places.count else PlacedClip.of(self.source, places, self.weights)
+
+    def moved_to(self, branches: Found, other: PlacedClip) -> Found:
+        """Return branches of these places for those of another clip of the same vertices."""
+        of_place = self.places.of_vertex[other.places.first]
+        branch = branches.vertex_branch[of_place]
+        stem_index = None if branches.stem_index is None else _ranks(branches.stem_index[of_place], branch)
+        return replace(branches, vertex_branch=branch, stem_index=stem_index)
 
 
 def find_places(
@@ -321,10 +339,23 @@ def _alike_in_copies(clip: MotionClip, places: Places) -> Places:
     for first, count, number in zip(np.cumsum(counts) - counts, counts.tolist(), copies.tolist()):
         if number > 1 and count:
             rows = slice(first, first + count)
-            inside = Places.of_labels(places.of_vertex[rows].reshape(number, -1).T).of_vertex
-            label[rows] = np.tile(inside, number)
+            label[rows] = _joined_in_all(places.of_vertex[rows].reshape(number, -1)).reshape(-1)
     # Vertices that are no copies keep their labels; `copy` tells copies from each other and from those.
     return Places.of_labels(copy, label, error=places.error)
+
+
+def _alike_in_runs(places: Places, counts: np.ndarray) -> Places:
+    """Return places such that runs of as many vertices, of which there are `counts`, have as many."""
+    first, label = np.cumsum(counts) - counts, places.of_vertex.astype(np.int64)
+    for count in np.unique(counts):
+        rows = first[counts == count][:, None] + np.arange(count)
+        label[rows] = _joined_in_all(label[rows])
+    return Places.of_labels(np.repeat(np.arange(len(counts)), counts), label, error=places.error)
+
+
+def _joined_in_all(places: np.ndarray) -> np.ndarray:
+    """Return labels (k, n) for the places (k, n) of vertices of like parts, which join what is joined in all parts."""
+    return np.broadcast_to(Places.of_labels(places.T).of_vertex, places.shape)
 
 
 def _ranks(places: np.ndarray, branch: np.ndarray) -> np.ndarray:

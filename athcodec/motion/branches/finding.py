@@ -108,8 +108,8 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
         if first.method == "skeleton":
             yield dataclasses.replace(first, stem_index=None)
         if first.method == "components":
-            if seen.parts is not None:  # Parts that touch at a point may move as one.
-                yield arranged(seen, components(seen.links, clip.vertex_count), None, "components")
+            if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
+                yield arranged(seen, seen.parts, None, "components")
             unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
             if len(unwelded.branch_parent) != len(first.branch_parent):
                 yield unwelded
@@ -287,7 +287,7 @@ def _by_components(seen: Seen, root: int | None) -> Found | None:
     if not len(seen.mesh):
         return None
     vertex_count = seen.clip.vertex_count
-    label = components(seen.links, vertex_count) if seen.parts is None else seen.parts
+    label = components(seen.links, vertex_count)
     count = int(label.max()) + 1
     if count == 1 or count > COMPONENTS_AT_MOST * vertex_count:
         return None
