@@ -41,15 +41,16 @@ def environment(argv: Sequence[str]) -> dict[str, Any]:
 
 
 @cache
-def commit() -> str:
-    """The commit of the clone that measures, with a mark if its code has changed since; "unknown" outside a clone."""
+def commit(code: tuple[str, ...] = CODE) -> str:
+    """The commit of the clone that measures, with a mark if code at these paths has changed since; "unknown" outside a
+    clone."""
 
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
     try:
         is_clone = not git("rev-parse", "--show-prefix")  # The folder may lie in the clone of another project.
-        name, changes = git("rev-parse", "--short=8", "HEAD"), git("status", "--porcelain", "--", *CODE)
+        name, changes = git("rev-parse", "--short=8", "HEAD"), git("status", "--porcelain", "--", *code)
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return name + (" + uncommitted changes" if changes else "") if is_clone else "unknown"

@@ -187,6 +187,15 @@ def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
         assert shown == decoder.positions(30).tobytes()
 
 
+def test_the_report_on_robustness_is_that_of_the_stored_results_and_names_the_commit_of_each():
+    from spec.robustness import as_markdown
+
+    results = json.loads((ROOT / "spec" / "robustness.json").read_text())
+    text = (ROOT / "spec" / "robustness.md").read_text()
+    assert text == as_markdown(results)
+    assert len(re.findall(r"^\d+ s, commit \(?[0-9a-f]{8}\)?( \+ uncommitted changes)?, ", text, re.M)) == len(results)
+
+
 def test_the_reference_has_every_public_name():
     text = (ROOT / "docs" / "python-reference.md").read_text("utf-8")
     assert set(re.findall(r"^::: athcodec\.(?:\w+\.)?(\w+)$", text, re.MULTILINE)) == set(athcodec.__all__)
