@@ -27,7 +27,7 @@ from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.options import MAX_MEMORY, SAMPLES
+from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
@@ -95,6 +95,7 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
+        set_numbers(self, reals=("fps",), wholes=("max_memory",))
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
