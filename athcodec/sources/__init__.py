@@ -31,8 +31,8 @@ from athcodec.options import MAX_MEMORY, SAMPLES
 
 # Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
-)
+    "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
+) | {"animated property", "skin that no node of the scene has"}
 LISTED = 8
 MEANINGS = {
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
@@ -242,6 +242,11 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
         f"{MEANINGS.get(kind, '')}"
         for kind, names in not_read.items()
     )
+
+
+def besides(not_read: Mapping[str, Sequence[str]]) -> str:
+    """The end of an error about a source of which nothing can be read: what it holds instead."""
+    return f"; not read: {listed(not_read)}" if not_read else ""
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:
