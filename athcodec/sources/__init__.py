@@ -32,9 +32,19 @@ from athcodec.options import MAX_MEMORY, SAMPLES
 # Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
     "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
-) | {"animated property", "skin that no node of the scene has"}
+) | {
+    "animated property",
+    "class that nothing inherits",
+    "inactive",
+    "layer",
+    "metadata",
+    "skin that no node of the scene has",
+    "variant",
+    "warning of USD",
+}
 LISTED = 8
 MEANINGS = {
+    "animation": " (--takes all, takes=\"all\": a clip of each)",
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
     "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
 }

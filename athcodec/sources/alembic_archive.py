@@ -213,7 +213,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         _statics(obj, times[0])
         _name_unread(obj)
         if len(obj.places) > 1:
-            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.leave_out("normals")  # They turn with each copy.
             obj.repeat(len(obj.places))
         if obj.kind == "mesh":  # whose corners are clockwise in the file
             frames = range(len(times) if obj.moves else 1)
