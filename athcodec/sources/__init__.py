@@ -35,6 +35,7 @@ NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".s
 ) | {
     "animated property",
     "class that nothing inherits",
+    "framesPerSecond",
     "inactive",
     "layer",
     "metadata",

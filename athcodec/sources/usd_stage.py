@@ -287,10 +287,14 @@ def _instanced(
         return []
     targets = instancer.GetPrototypesRel().GetForwardedTargets()
     prototypes = {number: prim.GetStage().GetPrimAtPath(target) for number, target in enumerate(targets)}
-    gone = [f"prototype {number} of {path}" for number in sorted(used) if not prototypes.get(number)]
-    _add_all(not_read, {"missing": gone} if gone else {})
     if not used:
         not_read.setdefault("empty", []).append(str(path))
+    if used - prototypes.keys():  # USD places no copy then.
+        text = f"{path} (protoIndices are {min(used)} to {max(used)}, of {len(targets)} prototypes)"
+        not_read.setdefault("PointInstancer", []).append(text)
+        return []
+    gone = [f"prototype {targets[number]} of {path}" for number in sorted(used) if not prototypes[number]]
+    _add_all(not_read, {"missing": gone} if gone else {})
     read = {number: prototype for number, prototype in prototypes.items() if number in used and prototype}
     shown.update(prototype.GetPath() for prototype in read.values())
     for other in _unshown(prim, shown):
@@ -644,12 +648,12 @@ def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarra
 
 def _samples(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> Sequence[float]:
     """The time codes in the stage's range, or all, at which an attribute or primvar may change: those of its samples,
-    or, where it has a spline, those of all frames."""
+    or, where it has a spline, those of all frames or knots."""
     attribute = source.GetAttr() if isinstance(source, UsdGeom.Primvar) else source
+    if not _has_range(attribute.GetStage()):
+        return [*attribute.GetSpline().GetKnots().keys()] if attribute.HasSpline() else source.GetTimeSamples()
     if attribute.HasSpline():
         return codes
-    if not _has_range(attribute.GetStage()):
-        return source.GetTimeSamples()
     return source.GetTimeSamplesInInterval(_interval(codes))
 
 
