@@ -754,8 +754,8 @@ def _keys(objects: list[_Prim]) -> _Keys:
         found.update(attribute.GetTimeSamples())
         if attribute.HasSpline():
             splines[str(attribute.GetPath())] = spline = attribute.GetSpline()
-            with quietly():  # Of inner loops USD says each time that they are deprecated.
-                found.update(spline.GetKnotsWithInnerLoopsBaked().keys())
+            with quietly():  # USD says each time that inner loops are deprecated; not every version bakes them.
+                found.update(getattr(spline, "GetKnotsWithInnerLoopsBaked", spline.GetKnots)().keys())
 
     for obj in objects:
         prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
