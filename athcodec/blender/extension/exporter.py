@@ -184,7 +184,7 @@ class Recording:
             "domains": static.pop("domains"),
         }
         materials = [slot.material.name for slot in self._obj.material_slots if slot.material]
-        not_read = {"attribute": static.pop("left_out"), "Material": materials}
+        not_read = {"attribute": static.pop("left_out"), "material": materials}
         skin = _skin(self._obj, self.vertex_count)
         return MotionClip(
             positions,
