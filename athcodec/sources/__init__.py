@@ -45,7 +45,7 @@ NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".s
 }
 LISTED = 8
 MEANINGS = {
-    "animation": " (--takes all, takes=\"all\": a clip of each)",
+    "animation": ' (--takes all, takes="all": a clip of each)',
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
     "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
 }

@@ -7,8 +7,8 @@ when a frame needs them. Frames lie at `fps`; by default at the rate that the ke
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
 names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
 whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. The attribute
-"face_material" numbers the materials, whose names are the metadata "material_names". Draco is refused. What else the file
-holds is named in the clip's `not_read` (gltf_unread.py).
+"face_material" numbers the materials, whose names are the metadata "material_names". Draco is refused. What else
+the file holds is named in the clip's `not_read` (gltf_unread.py).
 """
 
 from __future__ import annotations

@@ -2,17 +2,18 @@
 
 Every prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or "render"
 that some frame shows is read, also inside instances, into world space: time samples (interpolated as USD does),
-transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a prototype
-of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames
-are the whole time codes of the stage's range where it has one, else of that of its splines and samples, else the time
-codes that have samples; options.fps sets another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
-attribute "face_material" says the number for each face.
+splines, transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a
+prototype of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The
+frames are the whole time codes of the stage's range where it has one, else, where there are splines, those from the
+first key to the last, else the time codes that have samples; options.fps sets another rate. Static primvars become
+attributes, the names of materials the metadata "material_names", of which the attribute "face_material" says the number
+for each face.
 
 Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
 as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
-spheres, other variants, what is in materials, velocities, creases, is named in the clip's `not_read`. A stage is opened by its
-structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
-damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
+spheres, other variants, what is in materials, velocities, creases, is named in the clip's `not_read` (usd_unread.py). A
+stage is opened by its structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file
+even where it is damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
 
 from __future__ import annotations
@@ -867,7 +868,9 @@ def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool
     if not source.ValueMightBeTimeVarying():
         return False
     first = np.array(_value(source, codes[0]))
-    return any(not np.array_equal(np.array(_value(source, code)), first) for code in (*_samples(source, codes), codes[-1]))
+    return any(
+        not np.array_equal(np.array(_value(source, code)), first) for code in (*_samples(source, codes), codes[-1])
+    )
 
 
 def _keep(obj: _Prim, name: str, values: Any, interpolation: str, primvar: UsdGeom.Primvar | None = None) -> None:

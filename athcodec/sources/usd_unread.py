@@ -37,7 +37,7 @@ def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dic
     def add(kind: str, prim: Usd.Prim, more: str = "") -> None:
         found.setdefault(kind, []).append(f"{prim.GetPath()}{more}")
 
-    prims = iter(_every_prim_once(stage))
+    prims = iter(_PrimsOnce(stage))
     for prim in prims:
         if not prim.IsActive():
             add("inactive", prim)
@@ -61,15 +61,15 @@ def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dic
     return found | {kind: names for kind, names in (("layer", layers), ("metadata", data)) if names}
 
 
-class _every_prim_once:
-    """All prims of a stage, active or not, but each part of a native instance once; `prune` leaves out what is below the
-    last one."""
+class _PrimsOnce:
+    """Iterator of all prims of a stage, active or not, but each part of a native instance once; `prune` leaves out what
+    is below the last one."""
 
     def __init__(self, stage: Usd.Stage):
         predicate = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
         self._range, self._seen = iter(Usd.PrimRange(stage.GetPseudoRoot(), predicate)), set()
 
-    def __iter__(self) -> _every_prim_once:
+    def __iter__(self) -> _PrimsOnce:
         return self
 
     def __next__(self) -> Usd.Prim:
@@ -149,7 +149,7 @@ def _other_layers(root: Sdf.Layer) -> list[str]:
 
 
 def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
-    """The files of value clips, which USD opens when a value is asked for; and what to say of those that are missing."""
+    """The files of value clips, which USD opens when a value is asked for; and the names of those that are missing."""
     files, missing = [], []
     for prim in stage.TraverseAll():
         if not prim.HasAuthoredMetadata("clips"):
