@@ -29,7 +29,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES
 
-# Parts of a scene that are not read and are no shapes.
+# Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
     "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
 ) | {
@@ -37,6 +37,7 @@ NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".s
     "class that nothing inherits",
     "framesPerSecond",
     "inactive",
+    "keys outside of the stage's range",
     "layer",
     "metadata",
     "skin that no node of the scene has",

@@ -55,7 +55,7 @@ def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, 
     if missed.any():
         rate = _closer_rate(keys - (keys[0] if start is None else start), fps)
         advice = (
-            f"--fps {rate:.6g} has frames closer to them"
+            f"--fps {rate:.4g} has frames closer to them"
             if rate
             else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
         )
