@@ -76,21 +76,22 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
             self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
             return {"CANCELLED"}
         self.report({"INFO"}, f"{summary.bytes:,} bytes, {summary.ratio:.1f} times smaller")
-        if left_out := self._left_out(context, summary):
+        if left_out := left_out_of(context, summary):
             self.report({"WARNING"}, f"not written: {left_out}")
         return {"FINISHED"}
-
-    def _left_out(self, context, summary) -> str:
-        """What is selected besides the object, and what of it is not in the file."""
-        from athcodec.sources import listed
-
-        others = [obj.name for obj in context.selected_objects if obj != context.active_object]
-        return listed({**({"object": others} if others else {}), **summary.not_read})
 
     def _bound(self) -> dict:
         if self.bound == "LENGTH":
             return {"max_error": self.max_error}
         return {"lossless": True} if self.bound == "LOSSLESS" else {"rel_error": self.rel_error}
+
+
+def left_out_of(context, summary) -> str:
+    """What is selected besides the active object, and what of that is not in the file, in words; "" for nothing."""
+    from athcodec.sources import listed
+
+    others = [obj.name for obj in context.selected_objects if obj != context.active_object]
+    return listed({**({"object": others} if others else {}), **summary.not_read})
 
 
 def write_object(
