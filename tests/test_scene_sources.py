@@ -296,6 +296,41 @@ def test_instancers_name_prototypes_that_are_unused_and_missing_and_indices_that
 
 
 @pytest.mark.formats
+def test_native_instances_are_read_each_and_what_is_left_out_of_them_is_named_once(tmp_path):
+    model = (
+        'class Xform "model"\n{\n'
+        + instancer("many", "/model/many/leaf", mesh())
+        + 'def Cone "tip"\n{\n}\n'
+        + mesh(name="old", metadata="(active = false)")
+        + "}\n"
+    )
+    shown = "".join(
+        f'def "{name}" (\n    instanceable = true\n    prepend inherits = </model>\n)\n{{\n'
+        f'    double3 xformOp:translate = ({place}, 0, 0)\n    uniform token[] xformOpOrder = ["xformOp:translate"]\n}}\n'
+        for name, place in (("a", 0), ("b", 10))
+    )
+    with opened(layer(tmp_path / "a.usda", model, shown)) as clip:
+        assert clip.attributes["part_copies"].tolist() == [2, 2]
+        found = clip.block(0, 1).reshape(4, 4, 3)
+        assert clip.not_read == {"Cone": ["/a/tip", "/b/tip"], "inactive": ["/a/old"]}
+    assert np.allclose(found, LEAF + np.array([0, 2, 10, 12])[:, None, None] * [1, 0, 0])
+
+
+@pytest.mark.formats
+def test_layers_of_a_package_that_the_first_one_does_not_lead_to_are_named(tmp_path):
+    from pxr import Sdf
+
+    layer(tmp_path / "used.usda", mesh())
+    layer(tmp_path / "spare.usda", mesh(name="spare"))
+    layer(tmp_path / "first.usda", subLayers="[@./used.usda@]")
+    with Sdf.ZipFileWriter.CreateNew(str(tmp_path / "a.usdz")) as package:
+        for name in ("first.usda", "used.usda", "spare.usda"):
+            package.AddFile(str(tmp_path / name), name)
+    with opened(tmp_path / "a.usdz") as clip:
+        assert clip.metadata["part_names"] == ["leaf"] and clip.not_read == {"layer": ["spare.usda"]}
+
+
+@pytest.mark.formats
 def test_skinning_that_moves_nothing_and_normals_that_turn_are_named(tmp_path):
     bound = '    int[] primvars:skel:jointIndices = [0, 0, 0, 0] (\n        interpolation = "vertex"\n    )\n'
     normals = f"    normal3f[] normals = {vectors([[0, 1, 0]] * 4)}\n"

@@ -130,6 +130,7 @@ class Scene:
         self.nodes = file.items("nodes")
         self.parent = self._parents()
         self.order = self._reached()
+        self._channels_of: dict[int, tuple[list[Channel], list[str]]] = {}
         self.played = self._together() if play is None else play
         self._times: dict[int, np.ndarray] = {}
         self._tracks: dict[tuple[int, str], Track] = {}
@@ -212,6 +213,8 @@ class Scene:
 
     def _channels(self, index: int) -> tuple[list[Channel], list[str]]:
         """The channels of an animation that move nodes of the scene, and what the others address."""
+        if index in self._channels_of:
+            return self._channels_of[index]
         played, others, inside = [], [], set(self.order)
         for channel in entries(self.file.item("animations", index), "channels"):
             target = target_of(channel)
@@ -228,6 +231,7 @@ class Scene:
             played += found
             if not found:
                 others.append(str(target))
+        self._channels_of[index] = played, others
         return played, others
 
     @cached_property
