@@ -306,7 +306,8 @@ def test_native_instances_are_read_each_and_what_is_left_out_of_them_is_named_on
     )
     shown = "".join(
         f'def "{name}" (\n    instanceable = true\n    prepend inherits = </model>\n)\n{{\n'
-        f'    double3 xformOp:translate = ({place}, 0, 0)\n    uniform token[] xformOpOrder = ["xformOp:translate"]\n}}\n'
+        f"    double3 xformOp:translate = ({place}, 0, 0)\n"
+        '    uniform token[] xformOpOrder = ["xformOp:translate"]\n}\n'
         for name, place in (("a", 0), ("b", 10))
     )
     with opened(layer(tmp_path / "a.usda", model, shown)) as clip:
