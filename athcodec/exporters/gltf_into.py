@@ -45,6 +45,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
+from athcodec.sources.gltf_scene import POINTER, Target, target_of
 
 # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
 SHARE_OF_TWINS = 1 / 8
@@ -52,7 +53,6 @@ ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
 KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # _references lists every index that these extensions hold.
-POINTING = ("KHR_animation_pointer",)  # to places in the file, as text
 Reference = tuple[str, Any, Any]
 """An array of the file ("accessors" ...), and the holder and key of an index into it."""
 
@@ -61,13 +61,15 @@ class Into:
     """A GLB whose vertices are to move by ATH_motion: `clip` is their motion, with the meshes as its rest pose.
 
     Close it. keep_animation leaves what moved the vertices in the file, for programs that do not know the extension.
-    name: of the motion. What other motions of the file move is left to them.
+    name: of the motion. What other motions of the file move is left to them. `lost`, once it is written: what the file
+    said and the new one does not, by its kind.
     Raises ClipError where the file is no GLB with its bytes inside, nothing in it moves, or what moves has to move to
     another node though it is to be kept.
     """
 
     def __init__(self, path: FilePath, options: ReadOptions, keep_animation: bool = False, name: str | None = None):
         self.path, self._keep, self._name = os.fspath(path), keep_animation, name
+        self.lost: dict[str, list[str]] = {}
         with naming(path, *BROKEN):
             self._file = GltfFile(path)
         try:
@@ -120,7 +122,7 @@ class Into:
             said.setdefault("motions", []).append(motion)
             if EXTENSION not in self._json.setdefault("extensionsUsed", []):
                 self._json["extensionsUsed"].append(EXTENSION)
-            if all(name.startswith(KNOWN) and name not in POINTING for name in self._json["extensionsUsed"]):
+            if _knows_references(self._json):
                 _prune(self._json, used, self._needless)
             data = binary.packed(self._json)
         with keeping(file_ids(self.path)), new_file(path) as out:
@@ -165,12 +167,13 @@ class Into:
         if self._keep:
             self._needless: set[int] = set()
             return
+        meshes = {gltf["nodes"][index]["mesh"] for index in moving}
         for index in sorted(moving):
             if not self._placement.stays(index):
                 self._move_mesh(index)
         freed = moving | {joint for node in self._nodes for joint in node.joints}
         self._needless = _needless_nodes(gltf, freed)
-        _drop_channels(gltf, moving, self._needless)
+        _drop_channels(gltf, moving, meshes, self._needless)
 
     def _replace_part(self, part: GltfNode, mesh: dict | None, binary: _Binary) -> None:
         primitives = part.primitives
@@ -230,6 +233,8 @@ class Into:
         """Its mesh to a node of its own, in the motion's space."""
         gltf, node = self._json, self._json["nodes"][index]
         matrix = self._placement.space
+        if not self._placement.is_always_shown(index):
+            self.lost.setdefault("visibility in time", []).append(node.get("name") or f"node {index}")
         own = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
         if not np.array_equal(matrix, np.eye(4)):
             own["matrix"] = matrix.T.ravel().tolist()
@@ -265,7 +270,7 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
             for primitive, _ in places:
                 _pop_extension(primitive)
         _remove_motions(gltf, set(numbers))
-        if all(name.startswith(KNOWN) and name not in POINTING for name in gltf.get("extensionsUsed", ())):
+        if _knows_references(gltf):
             _prune(gltf, used, needless)
         data = binary.packed(gltf)
     with keeping(file_ids(path)), new_file(out) as written:
@@ -347,7 +352,7 @@ def _morph_nodes(
     for index in moving:
         gltf["nodes"][index].pop("weights", None)
     needless = _needless_nodes(gltf, moving | {joint for skin in skins for joint in gltf["skins"][skin]["joints"]})
-    _drop_channels(gltf, moving, needless)
+    _drop_channels(gltf, moving, {gltf["nodes"][index]["mesh"] for index in moving}, needless)
     weights = np.eye(motion.frame_count, dtype=np.float32)
     for take, clip_range in zip(takes(motion), motion.clip_ranges):
         mine = said.get(clip_range.name, {})
@@ -423,16 +428,19 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
     )
 
 
-def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
-    """Return the channels of these nodes' weights, and of needless ones."""
+def _drop_channels(gltf: dict, moving: set[int], meshes: set[int], needless: set[int]) -> None:
+    """Removes the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
+
+    def stays(target: Target | str) -> bool:
+        if isinstance(target, str):
+            return True
+        if target.holder == "meshes":
+            return target.index not in meshes
+        return target.index not in needless and not (target.path == "weights" and target.index in moving)
+
     kept = []
     for animation in gltf.get("animations", []):
-        targets = [(channel["target"].get("node"), channel["target"].get("path")) for channel in animation["channels"]]
-        channels = [
-            channel
-            for channel, (node, path) in zip(animation["channels"], targets)
-            if node not in needless and not (path == "weights" and node in moving)
-        ]
+        channels = [channel for channel in animation["channels"] if stays(target_of(channel))]
         samplers = sorted({channel["sampler"] for channel in channels})
         animation["samplers"] = [animation["samplers"][sampler] for sampler in samplers]
         for channel in channels:
@@ -442,6 +450,21 @@ def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
     gltf.pop("animations", None)
     if kept:
         gltf["animations"] = kept
+    if not any(_has_pointer(channel) for animation in kept for channel in animation["channels"]):
+        for key in ("extensionsUsed", "extensionsRequired"):
+            if POINTER in gltf.get(key, ()):
+                gltf[key].remove(POINTER)
+                if not gltf[key]:
+                    del gltf[key]
+
+
+def _has_pointer(channel: dict) -> bool:
+    return POINTER in (channel["target"].get("extensions") or {})
+
+
+def _knows_references(gltf: dict) -> bool:
+    """Whether _references lists every index of the file: not where pointers to places in it remain, which are text."""
+    return all(name.startswith(KNOWN) and name != POINTER for name in gltf.get("extensionsUsed", ()))
 
 
 def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:

@@ -29,12 +29,24 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
-# Parts of a scene that are not read and are no shapes.
+# Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
-)
+    "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
+) | {
+    "animated property",
+    "class that nothing inherits",
+    "framesPerSecond",
+    "inactive",
+    "keys outside of the stage's range",
+    "layer",
+    "metadata",
+    "skin that no node of the scene has",
+    "variant",
+    "warning of USD",
+}
 LISTED = 8
 MEANINGS = {
+    "animation": ' (--takes all, takes="all": a clip of each)',
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
     "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
 }
@@ -243,6 +255,11 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
         f"{MEANINGS.get(kind, '')}"
         for kind, names in not_read.items()
     )
+
+
+def besides(not_read: Mapping[str, Sequence[str]]) -> str:
+    """The end of an error about a source of which nothing can be read: what it holds instead."""
+    return f"; not read: {listed(not_read)}" if not_read else ""
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:
