@@ -34,7 +34,15 @@ from athcodec.motion.joining import join
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
-from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
+from athcodec.sources.scene_objects import (
+    FACE_MATERIAL,
+    FLIPPED,
+    GUESSED,
+    MATERIAL_NAMES,
+    OWN,
+    Facing,
+    presence_metadata,
+)
 from athcodec.sources.timing import warn_of_missed
 
 WORK_BYTES = 64 << 20
@@ -443,7 +451,7 @@ def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
 
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
         for number, item in enumerate(file.items(items)):
-            if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
+            if "name" not in _guessed(item) and (kind != "scene" or number != file.json.get("scene", 0)):
                 add(kind, number, item)
     for index in scene.order:
         if extension(scene.nodes[index], "KHR_lights_punctual") is not None:
@@ -768,8 +776,9 @@ def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
-    materials = [primitive.get("material") for primitive in node.primitives]
-    return all(number is not None and file.item("materials", number).get("doubleSided") is True for number in materials)
+    numbers = [primitive.get("material") for primitive in node.primitives]
+    materials = [{} if number is None else file.item("materials", number) for number in numbers]
+    return all(item.get("doubleSided") is True and "doubleSided" not in _guessed(item) for item in materials)
 
 
 def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
@@ -792,7 +801,7 @@ def _connections(
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
-    materials = []
+    materials, numbers = [], _material_numbers(file)
     for node in nodes:
         own: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
@@ -806,8 +815,7 @@ def _connections(
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
-                label = -1 if label >= 0 and file.items("materials")[label] == TWO_SIDES else label
-                labels.append(np.full(len(rows), label, np.int32))
+                labels.append(np.full(len(rows), label if label < 0 else numbers[label], np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
         for size, parts in own.items():
             if parts:
@@ -823,10 +831,23 @@ def _connections(
     return faces, edges, face_material if (face_material >= 0).any() else None
 
 
+def _material_numbers(file: GltfFile) -> list[int]:
+    """Return the number of each material among those that have names; -1 of one that athcodec's writer made up."""
+    is_stated = np.array(["name" not in _guessed(item) for item in file.items("materials")], bool)
+    return np.where(is_stated, np.cumsum(is_stated) - 1, -1).tolist()
+
+
 def _material_names(file: GltfFile) -> list[str]:
-    materials = file.items("materials")
-    names = [item.get("name") for item in (materials[:-1] if materials[-1:] == [TWO_SIDES] else materials)]
+    names = [item.get("name") for item in file.items("materials") if "name" not in _guessed(item)]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
+
+
+def _guessed(item: Any) -> list[Any]:
+    """Return the names of what athcodec's writer has guessed of a part of the file."""
+    extras = item.get("extras") if isinstance(item, dict) else None
+    ours = extras.get(OWN) if isinstance(extras, dict) else None
+    guessed = ours.get(GUESSED) if isinstance(ours, dict) else None
+    return guessed if isinstance(guessed, list) else []
 
 
 def _attributes(
@@ -834,6 +855,7 @@ def _attributes(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
+    keep_normals = keep_normals and NAMES["NORMAL"] not in _guessed(scene.file.json["asset"])
     keep_normals = keep_normals and not any(
         node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
     )
