@@ -307,6 +307,18 @@ def test_lines_and_points_have_a_colour_and_no_light(edges, tmp_path):
 
 
 @formats
+def test_instances_beside_points_state_what_both_use(tmp_path):
+    rest = np.concatenate([*(CARD + [0, i, 0] for i in range(3)), np.ones((2, 3))])
+    faces = [[4 * i + k for k in range(4)] for i in range(3)]
+    clip = clip_of(rest, faces, angles=[0.0], part_names=["leaf", "dust"], part_kinds=["mesh", "points"])
+    clip.attributes |= {"part_vertex_counts": np.int32([12, 2]), "part_copies": np.int32([3, 1])}
+    write(clip, tmp_path / "a.glb", instances=True)
+    gltf, _ = parsed(tmp_path / "a.glb")
+    assert sorted(gltf["extensionsUsed"]) == ["EXT_mesh_gpu_instancing", "KHR_materials_unlit"]
+    assert gltf["extensionsRequired"] == ["EXT_mesh_gpu_instancing"]
+
+
+@formats
 @pytest.mark.parametrize("suffix", [".glb", ".usda"])
 @pytest.mark.parametrize("frames", [1, FRAMES])
 def test_what_was_guessed_does_not_come_back(suffix, frames, tmp_path):

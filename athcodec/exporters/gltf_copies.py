@@ -81,7 +81,8 @@ class GltfCopies:
         extension = {INSTANCING: {"attributes": parts}}
         glb.node(parent, name=self.shape.name, mesh=mesh, extensions=extension, **transform)
         for key in ("extensionsUsed", "extensionsRequired"):  # without it one of them would be shown
-            glb.json[key] = [INSTANCING]
+            names = glb.json.setdefault(key, [])
+            names += [] if INSTANCING in names else [INSTANCING]
 
 
 def with_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:

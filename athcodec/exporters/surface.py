@@ -147,7 +147,7 @@ class MovingNormals:
     def offsets(self, normals: np.ndarray, vertices: np.ndarray) -> np.ndarray:
         """Return what to add to the normals at rest, (n, 3) float32, of these vertices, (n,), in that frame."""
         before, after = self._before[vertices], self._after[vertices]
-        moved = np.einsum("nij,nik,nk->nj", after, before, normals)
+        moved = np.einsum("nij,ni->nj", after, np.einsum("nij,nj->ni", before, normals))
         # Where faces have no area, as those of a leaf that unfolds out of a point, nothing says how they turn.
         has_both = before.any(axis=2).all(axis=1) & after.any(axis=2).all(axis=1)
         moved[~has_both] = np.where(after[~has_both, 0].any(axis=1)[:, None], after[~has_both, 0], normals[~has_both])
