@@ -402,6 +402,34 @@ def test_a_glb_without_materials_gets_some_with_its_motion(tmp_path):
 
 
 @formats
+def test_every_primitive_of_a_mesh_keeps_its_triangles_where_it_becomes_two(tmp_path):
+    plant = joined(tube(8), (CARD + [1, 1, 0], QUAD.tolist()))
+    both = joined(plant, (plant[0] + [3, 0, 0], plant[1]))
+    clip = clip_of(*both, part_names=["a", "b"], part_kinds=["mesh", "mesh"], material_names=["all"])
+    clip.attributes |= {"part_vertex_counts": np.int32([len(plant[0])] * 2)}
+    clip.attributes |= {"face_material": np.zeros(len(both[1]), np.int32)}
+
+    def merge(gltf):
+        """One mesh, whose primitives have vertices of their own."""
+        node = next(node for node in gltf["nodes"] if node.get("mesh") == 1)
+        del node["mesh"], node["skin"]
+        gltf["meshes"][0]["primitives"] += gltf["meshes"].pop()["primitives"]
+
+    def triangles(parts):
+        """Of all primitives, as places of corners."""
+        found = []
+        for primitive in primitives(parts[0]):
+            points = array(parts, primitive["attributes"]["POSITION"])
+            found.append(points[array(parts, primitive["indices"])[:, 0]].reshape(-1, 9))
+        return np.unique(np.concatenate(found), axis=0)
+
+    source = bare(tmp_path / "a.glb", clip, merge, animation="joints")
+    parts = with_motion(source, tmp_path / "b.glb")
+    assert [is_green(material) for material in materials(parts[0])] == [False, False, True, True]
+    assert np.array_equal(triangles(parts), triangles(parsed(source)))
+
+
+@formats
 def test_materials_of_a_glb_stay_as_they_are_and_what_has_one_gets_no_normals(tmp_path):
     glass = {"name": "glass", "pbrMetallicRoughness": {"metallicFactor": 1.0}}
 

@@ -249,8 +249,7 @@ class Into:
                 primitive["attributes"][NORMAL] = normals
             groups = by_material(rows, looks.labels[first - len(rows) : first])
             further = [copy.deepcopy(primitive) for _ in groups[1:]]
-            place = next(place for place, each in enumerate(siblings) if each is primitive) + 1
-            siblings[place:place] = further
+            siblings += further  # at the end, so that the others keep their places
             for each, (label, own) in zip([primitive, *further], groups):
                 each["material"] = self._material(looks.materials[label], has_colours)
                 each |= _drawn(binary, own) if further else {}
