@@ -27,9 +27,9 @@ JOINTS = 1024
 LAYER = '#usda 1.0\n(\n    defaultPrim = "plant"\n)\ndef "plant" (references = @{}@)\n{{\n}}\n'
 NOTE = """
 Bytes of all files together, with faces and branches and no other attributes. Largest error over the diagonal of all
-frames. USD, Alembic and morph targets hold float32 positions of every frame, and morph targets normals. Our bytes in
-USD: the .ath file and a layer that references it. In a GLB the mesh at rest is there too, with its normals, for
-programs that do not know ATH_motion, and is the rest pose of the motion.
+frames. USD, Alembic and morph targets hold float32 positions of every frame, and morph targets normals of faces too.
+Our bytes in USD: the .ath file and a layer that references it. In a GLB the mesh at rest is there too, with its
+normals, for programs that do not know ATH_motion, and is the rest pose of the motion.
 """
 
 
@@ -66,7 +66,7 @@ class _Wrappings:
         for name, file, options in (
             ("USD crate", "a.usdc", {}),
             ("Alembic", "a.abc", {}),
-            ("GLB, morph targets with normals", "a.glb", {"animation": "morphs"}),
+            ("GLB, morph targets", "a.glb", {"animation": "morphs"}),
             (f"GLB, skin of {self._joints:,} joints", "rig.glb", {"rig": self._joints}),
             (f"USD, UsdSkel of {self._joints:,} joints", "rig.usdc", {"rig": self._joints}),
             ("textures as OpenVAT has them, half", "a.openvat", {}),
