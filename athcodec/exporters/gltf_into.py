@@ -2,8 +2,8 @@
 
 What moved them before goes where nothing else needs it: morph targets, skins and their joints, channels of animations,
 and the bytes of these. Meshes keep their bytes where their vertices lie in the motion's space; one that hangs on a
-moving node gets new positions, normals and tangents there and a node of its own. spec/gltf/README.md describes the
-extension.
+moving node gets new positions, normals and tangents there and a node of its own. Primitives that move and have no
+material, which viewers show black, get one (looks.py) and normals. spec/gltf/README.md describes the extension.
 """
 
 from __future__ import annotations
@@ -24,7 +24,20 @@ from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters.gltf import check_morphs
-from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES, takes
+from athcodec.exporters.gltf_build import (
+    COLOUR,
+    COMPONENTS,
+    INDICES,
+    NORMAL,
+    TYPES,
+    UNLIT,
+    VERTICES,
+    by_material,
+    material_of,
+    takes,
+)
+from athcodec.exporters.looks import Look, line_look, looks_of_mesh
+from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import file_ids, keeping, new_file
 from athcodec.files.gltf.document import HARMLESS, MESHOPT, GltfFile
 from athcodec.files.gltf.json import BROKEN, entries
@@ -184,17 +197,17 @@ class Into:
                 for number, one in enumerate(originals)
                 if any(one is own for own in primitives)
             ]
+        faces = [self._faces(part, primitive) for primitive in primitives]
         attributes = self._attributes(part, binary)
         if self._keep and ("POSITION" in attributes or not self._placement.stays(part.index)):
             raise ClipError(
                 f"mesh {part.name!r}: got one that lies elsewhere than its motion, expected no animation to keep"
             )
-        for primitive in primitives:
+        for primitive, rows in zip(primitives, faces):
             if not self._keep:
                 primitive.pop("targets", None)
-                if part.mirrored.any() and len(rows := triangles(self._file, primitive, part.count)):
-                    corners = rows[:, ::-1].reshape(-1, 1).astype(np.uint32)
-                    primitive |= {"indices": binary.array(corners), "mode": 4}
+                if part.mirrored.any() and len(rows):
+                    primitive |= _drawn(binary, rows)
             kept = {
                 key: value
                 for key, value in primitive["attributes"].items()
@@ -207,6 +220,51 @@ class Into:
                 {"firstVertex": part.first} if part.first and self._vertex is None else {}
             )
             primitive.setdefault("extensions", {})[EXTENSION] = said
+        shown = self._json["meshes"][part.mesh] if mesh is None else mesh
+        self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
+
+    def _faces(self, part: GltfNode, primitive: dict) -> np.ndarray:
+        """The triangles of a primitive, (F, 3), as they are to face in the motion's space."""
+        rows = triangles(self._file, primitive, part.count)
+        return rows[:, ::-1] if part.mirrored.any() and not self._keep else rows
+
+    def _dress(
+        self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: _Binary
+    ) -> None:
+        """Gives primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
+        if all("material" in primitive for primitive, _ in drawn):
+            return
+        faces = np.concatenate([rows for _, rows in drawn])
+        rest = self.clip.source_rest[self._vertices(part)]
+        surface = Surface(np.full(len(faces), 3), faces.ravel(), rest)
+        looks, normals, first = looks_of_mesh(surface, part.name), None, 0
+        for primitive, rows in drawn:
+            first += len(rows)
+            if "material" in primitive:
+                continue
+            has_colours = COLOUR in primitive["attributes"]
+            if not len(rows):
+                primitive["material"] = self._material(line_look(part.name), has_colours)
+                continue
+            if NORMAL not in primitive["attributes"] and not primitive.get("targets"):
+                if normals is None:
+                    normals = binary.attribute(surface.unit_normals(rest))
+                primitive["attributes"][NORMAL] = normals
+            groups = by_material(rows, looks.labels[first - len(rows) : first])
+            further = [copy.deepcopy(primitive) for _ in groups[1:]]
+            siblings += further  # at the end, so that the others keep their places
+            for each, (label, own) in zip([primitive, *further], groups):
+                each["material"] = self._material(looks.materials[label], has_colours)
+                each |= _drawn(binary, own) if further else {}
+
+    def _material(self, look: Look, has_colours: bool) -> int:
+        """The number of a material, which is added where the file has not got it."""
+        materials, material = self._json.setdefault("materials", []), material_of(look, has_colours)
+        if material not in materials:
+            materials.append(material)
+            used = self._json.setdefault("extensionsUsed", []) if not look.is_lit else [UNLIT]
+            used += [] if UNLIT in used else [UNLIT]
+        return materials.index(material)
 
     def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
         """The attributes of a part that change, as new accessors."""
@@ -244,6 +302,11 @@ class Into:
             scene.setdefault("nodes", []).append(len(gltf["nodes"]) - 1)
 
 
+def _drawn(binary: _Binary, faces: np.ndarray) -> dict[str, int]:
+    """The members of a primitive that draws these triangles, (F, 3)."""
+    return {"indices": binary.array(faces.reshape(-1, 1).astype(np.uint32), INDICES), "mode": 4}
+
+
 def _named(clip: MotionClip) -> MotionClip:
     """With the name of the animation where it is a single one."""
     played = clip.metadata.get("animations", [])
@@ -258,14 +321,15 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
 
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
     """
-    for view in views:
-        check_morphs(view, view.vertex_count)
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         gltf, used, binary, needless = file.json, _used(file.json), _Binary(file), set[int]()
         numbers = [view.decoder.file.source.number for view in views]
-        for number, view, places in zip(numbers, views, [places_of(file, number) for number in numbers]):
+        places_of_views = [places_of(file, number) for number in numbers]
+        for view, places in zip(views, places_of_views):
+            check_morphs(view, sum(len(vertices) * (1 + _has_normals(primitive)) for primitive, vertices in places))
+        for number, view, places in zip(numbers, views, places_of_views):
             said = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
-            _add_targets(gltf, binary, places, view)
+            _add_targets(file, binary, places, view)
             needless |= _morph_nodes(gltf, binary, places, view, said)
             for primitive, _ in places:
                 _pop_extension(primitive)
@@ -313,17 +377,28 @@ def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
         return written.tell()
 
 
-def _add_targets(gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
+def _has_normals(primitive: dict) -> bool:
+    return NORMAL in primitive["attributes"]
+
+
+def _add_targets(file: GltfFile, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
     """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
-    rest = np.asarray(motion.rest).astype(np.float32)
+    gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
+    normals, at_rest = MovingNormals(Surface(*(motion.polygons or ((), ())), rest), rest), {}
     for primitive, _ in places:
         primitive["targets"] = []
         primitive["attributes"].pop(VERTEX_ATTRIBUTE, None)
+        if _has_normals(primitive):
+            at_rest[id(primitive)] = file.floats(primitive["attributes"][NORMAL])
     for _, frames in motion.blocks():
         for frame in frames:
             offsets = (frame.astype(np.float64) - rest).astype(np.float32)
+            normals.move(frame)
             for primitive, vertices in places:
-                primitive["targets"].append({"POSITION": binary.attribute(offsets[vertices], bounds=True)})
+                target = {"POSITION": binary.attribute(offsets[vertices], bounds=True)}
+                if id(primitive) in at_rest:
+                    target[NORMAL] = binary.attribute(normals.offsets(at_rest[id(primitive)], vertices))
+                primitive["targets"].append(target)
     moved = {id(primitive) for primitive, _ in places}
     for mesh in gltf["meshes"]:
         if moved.isdisjoint(map(id, mesh["primitives"])):
@@ -624,10 +699,12 @@ class _Binary:
         self._json.setdefault("accessors", []).append(accessor)
         return len(self._json["accessors"]) - 1
 
-    def array(self, values: np.ndarray) -> int:
+    def array(self, values: np.ndarray, target: int | None = None) -> int:
         """An accessor of (count, 1) numbers without gaps, with its bounds."""
         index = self.attribute(values, bounds=True)
-        self._json["bufferViews"][self._json["accessors"][index]["bufferView"]].pop("target")
+        view = self._json["bufferViews"][self._json["accessors"][index]["bufferView"]]
+        del view["target"]
+        view |= {} if target is None else {"target": target}
         return index
 
     def packed(self, gltf: dict) -> bytes:

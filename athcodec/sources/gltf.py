@@ -33,8 +33,8 @@ from athcodec.motion.joining import join
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions, besides
 from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
-from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING, not_read
-from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
+from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING, guessed, not_read
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, Facing, presence_metadata
 from athcodec.sources.timing import warn_of_missed
 
 WORK_BYTES = 64 << 20
@@ -208,7 +208,8 @@ def _clip(
     keeps_normals = all(len(timing.times) == 1 for timing in timings.values()) and not any(
         node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
     )
-    attributes, branches = _attributes(scene, nodes, options.skip, motion, keeps_normals)
+    are_guessed = NAMES["NORMAL"] in guessed(file.json["asset"])
+    attributes, branches = _attributes(scene, nodes, options.skip, motion, keeps_normals and not are_guessed)
     facings = [Facing() for _ in nodes]
     for name, take in motions.items():
         take.add_facings(timings[name].times, facings)
@@ -221,7 +222,7 @@ def _clip(
         attributes[FACE_MATERIAL] = face_material
         said = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
     rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
-    unread = not_read(list(scenes.values()), nodes, keeps_normals) | (
+    unread = not_read(list(scenes.values()), nodes, keeps_normals or are_guessed) | (
         {} if _chooses(options) else _other_animations(scene)
     )
     clips = {}
@@ -746,8 +747,9 @@ def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
-    materials = [primitive.get("material") for primitive in node.primitives]
-    return all(number is not None and file.item("materials", number).get("doubleSided") is True for number in materials)
+    numbers = [primitive.get("material") for primitive in node.primitives]
+    materials = [{} if number is None else file.item("materials", number) for number in numbers]
+    return all(item.get("doubleSided") is True and "doubleSided" not in guessed(item) for item in materials)
 
 
 def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
@@ -777,7 +779,7 @@ def _connections(
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
-    materials = []
+    materials, numbers = [], _material_numbers(file)
     for node in nodes:
         own: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
@@ -791,8 +793,7 @@ def _connections(
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
-                label = -1 if label >= 0 and file.items("materials")[label] == TWO_SIDES else label
-                labels.append(np.full(len(rows), label, np.int32))
+                labels.append(np.full(len(rows), label if label < 0 else numbers[label], np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
         for size, parts in own.items():
             if parts:
@@ -808,9 +809,14 @@ def _connections(
     return faces, edges, face_material if (face_material >= 0).any() else None
 
 
+def _material_numbers(file: GltfFile) -> list[int]:
+    """Return the number of each material among those that have names; -1 of one that athcodec's writer made up."""
+    is_stated = np.array(["name" not in guessed(item) for item in file.items("materials")], bool)
+    return np.where(is_stated, np.cumsum(is_stated) - 1, -1).tolist()
+
+
 def _material_names(file: GltfFile) -> list[str]:
-    materials = file.items("materials")
-    names = [item.get("name") for item in (materials[:-1] if materials[-1:] == [TWO_SIDES] else materials)]
+    names = [item.get("name") for item in file.items("materials") if "name" not in guessed(item)]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 

@@ -13,7 +13,7 @@ from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.json import entries, entry, extension
 from athcodec.files.gltf.motion import EXTENSION
 from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
-from athcodec.sources.scene_objects import FLIPPED, TWO_SIDES
+from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
 
 if TYPE_CHECKING:
     from athcodec.sources.gltf import GltfNode
@@ -62,13 +62,21 @@ def _name(kind: str, number: int, item: Any) -> str:
     return name if isinstance(name, str) and name else f"{kind} {number}"
 
 
+def guessed(item: Any) -> list[Any]:
+    """Return the names of what athcodec's writer has guessed of a part of the file."""
+    extras = item.get("extras") if isinstance(item, dict) else None
+    ours = extras.get(OWN) if isinstance(extras, dict) else None
+    names = ours.get(GUESSED) if isinstance(ours, dict) else None
+    return names if isinstance(names, list) else []
+
+
 def _unused(scene: Scene) -> dict[str, list[str]]:
     """Materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
     file, found = scene.file, dict[str, list[str]]()
     used = {kind: {scene.nodes[index].get(kind) for index in scene.order} for kind in ("mesh", "skin")}
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
         for number, item in enumerate(file.items(items)):
-            if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
+            if "name" not in guessed(item) and (kind != "scene" or number != file.json.get("scene", 0)):
                 _add(found, kind, number, item)
     for kind, items in (("mesh", "meshes"), ("skin", "skins")):
         for number, item in enumerate(file.items(items)):

@@ -29,7 +29,7 @@ CHANGING = (
     ": points that appear or vanish cannot be read; write them as copies of a mesh with ids, or read other objects "
     "with --only"
 )
-TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
+GUESSED = "guessed"  # In what our writers add: names of what the clip does not state, so that it is not read as stated.
 SCHEME = "subdivisionScheme"  # The key of USD's word in the details of a mesh; without it the faces are the surface.
 SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats

@@ -39,6 +39,7 @@ from athcodec.motion.units import METRES
 from athcodec.sources import LISTED, ReadOptions, besides
 from athcodec.sources.crate import check_crates
 from athcodec.sources.scene_objects import (
+    GUESSED,
     OWN,
     SCHEME,
     ArrayDescriptor,
@@ -594,7 +595,7 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         mesh = UsdGeom.Mesh(obj.prim)
         obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
-        if mesh.GetDoubleSidedAttr().Get():
+        if mesh.GetDoubleSidedAttr().Get() and not _is_guessed(mesh.GetDoubleSidedAttr()):
             obj.details["doubleSided"] = "true"
         _note(obj, SCHEME, mesh.GetSubdivisionSchemeAttr(), "none")
         _bind_materials(obj)
@@ -802,6 +803,8 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
             continue  # which has moved it
+        if _is_guessed(primvar.GetAttr()):
+            continue
         if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
@@ -847,7 +850,7 @@ def _keep_unless_it_changes(
     obj: _Prim, codes: np.ndarray, name: str, attribute: Usd.Attribute, interpolation: str
 ) -> None:
     """Keep an array of the schema that no primvar replaces, or note that it is left out."""
-    if not attribute.HasAuthoredValue() or name in obj.statics:
+    if not attribute.HasAuthoredValue() or name in obj.statics or _is_guessed(attribute):
         return
     if _changes(attribute, codes):
         obj.left_out.append(attribute.GetName())
@@ -895,6 +898,11 @@ def _numbers(values: Any) -> np.ndarray | None:
     if array.dtype.kind not in "biuf" or not isinstance(values, (bool, int, float)) and array.ndim == 0:
         return None
     return array.reshape(-1) if array.ndim == 0 else array if is_array(values) else array[None]
+
+
+def _is_guessed(attribute: Usd.Attribute) -> bool:
+    """Whether athcodec's writer has made up the value, so that it says nothing of the clip."""
+    return attribute.GetCustomDataByKey(f"{OWN}:{GUESSED}") is True
 
 
 def _said(attribute: Usd.Attribute, key: str) -> str | None:
