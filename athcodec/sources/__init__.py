@@ -26,12 +26,15 @@ from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
+from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES
 
 # Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
+    "attribute element empty field hidden statement other".split(),
+    ("note of a dataset", "empty dataset", "dataset of references or lists", "pickled object", "member"),
+    NOT_KEPT.values(),
 )
 LISTED = 8
 MEANINGS = {
@@ -60,6 +63,11 @@ class ReadOptions:
         The file that has the faces of a point cache, or of the vertices of a plant in MTG.
     field : str, optional
         Name of the displacement that is added to the points of a finite-element result.
+    dataset : str, optional
+        Path of the array with the positions in HDF5, NumPy and MATLAB files, or of its group.
+    axes : str or sequence of str, optional
+        The order of that array's axes, by default "frames,vertices,xyz"; "frames,vertices+xyz" where x, y and z of all
+        vertices lie in one axis, "vertices,xyz" for a single frame.
     only : sequence of str, optional
         Patterns (fnmatch) of the names of the prims, objects or meshes to read; all by default.
     takes : sequence of str or str, optional
@@ -78,13 +86,15 @@ class ReadOptions:
     Raises
     ------
     ValueError
-        For values that rest and fps cannot have.
+        For values that rest, fps, axes and max_memory cannot have.
     """
 
     rest: str = "auto"
     fps: float | None = None
     mesh: str | PathLike[str] | None = None
     field: str | None = None
+    dataset: str | None = None
+    axes: str | Sequence[str] | None = None
     only: Sequence[str] = ()
     takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
@@ -99,6 +109,13 @@ class ReadOptions:
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
+        if self.axes is not None:
+            parse_order(self.axes)
+
+    @property
+    def order(self) -> Order | None:
+        """The axes as motion/positions.py has them; None where they are not given."""
+        return None if self.axes is None else parse_order(self.axes)
 
 
 @dataclass(frozen=True)
@@ -154,8 +171,14 @@ class Format:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), magic=(b"\x89HDF\r\n\x1a\n",)),
-    Format("npz", "NumPy archive of the same schema", (".npz",)),
+    Format(
+        "hdf5",
+        "HDF5 of athcodec's schema or of other programs, VTKHDF, MATLAB 7.3",
+        (".h5", ".hdf5", ".hdf", ".vtkhdf"),
+        magic=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"),
+    ),
+    Format("npz", "NumPy archive, of the same schema or of other programs", (".npz",)),
+    Format("npy", "NumPy array of positions", (".npy",), magic=(b"\x93NUMPY",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
@@ -201,8 +224,8 @@ def read(
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
-        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root, allow_outside,
-        max_memory.
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
+        allow_outside, max_memory.
 
     Returns
     -------
