@@ -195,7 +195,7 @@ REFUSED = {
         "archive: got Alembic in HDF5, expected .* abcconvert -toOgawa",
     ),
     "complex positions": ([], {"positions": np.zeros((5, 6, 3), "c8")}, "complex64"),
-    "empty positions": ([], {"positions": h5py.Empty("f4")}, "positions: got a group or an empty dataset"),
+    "empty positions": ([], {"positions": h5py.Empty("f4")}, "positions: got an empty dataset"),
     "a cycle of edges": (BRANCHES, {"edges": [[0, 1], [1, 2], [2, 0]]}, "closes a cycle"),
     "NaN at rest": ([], {"rest": np.full((6, 3), np.nan)}, "rest: vertex 0"),
 }

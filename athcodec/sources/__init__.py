@@ -138,6 +138,8 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    magic_places : tuple of int, optional
+        Where in its files `magic` may stand.
     """
 
     name: str
@@ -148,6 +150,11 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    magic_places: tuple[int, ...] = (0,)
+
+    def begins(self, head: bytes) -> bool:
+        """Whether the first bytes of a file are those of this format."""
+        return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
 
     @property
     def is_installed(self) -> bool:
@@ -175,10 +182,12 @@ FORMATS = (
         "hdf5",
         "HDF5 of athcodec's schema or of other programs, VTKHDF, MATLAB 7.3",
         (".h5", ".hdf5", ".hdf", ".vtkhdf"),
-        magic=(b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"),
+        magic=(b"\x89HDF\r\n\x1a\n",),
+        magic_places=(0, 512, 1024, 2048),
     ),
     Format("npz", "NumPy archive, of the same schema or of other programs", (".npz",)),
     Format("npy", "NumPy array of positions", (".npy",), magic=(b"\x93NUMPY",)),
+    Format("mat", "MATLAB up to 7.2", (".mat",), "matlab", ("scipy",), (b"MATLAB 5.0 MAT-file",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
@@ -305,7 +314,7 @@ def find_format(path: str | PathLike[str]) -> Format:
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
     for candidate in FORMATS:
-        if head.startswith(candidate.magic or ()):
+        if candidate.begins(head):
             return candidate
     if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
         raise ClipError(f"{os.fspath(path)}: {hint}")

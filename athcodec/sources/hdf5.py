@@ -163,8 +163,6 @@ class _Datasets:
         if isinstance(link, h5py.SoftLink) and name != POSITIONS:
             return  # What a link within the file names is read where it is.
         if not isinstance(item, h5py.Dataset):
-            if name == POSITIONS:
-                raise ClipError(f"{name}: got a group or an empty dataset, expected an array")
             if isinstance(link, h5py.ExternalLink):
                 self._leave_out("link", name)
             return
@@ -175,7 +173,7 @@ class _Datasets:
             return
         if item.shape is None or MATLAB_EMPTY in item.attrs:
             if name == POSITIONS:
-                raise ClipError(f"{name}: got a group or an empty dataset, expected an array")
+                raise ClipError(f"{name}: got an empty dataset, expected an array")
             self._leave_out("empty dataset", name)
         elif item.dtype.hasobject and h5py.check_string_dtype(item.dtype) is None:
             self._leave_out("dataset of references or lists", name)
