@@ -44,6 +44,7 @@ MEANINGS = {
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
@@ -305,6 +306,11 @@ def find_format(path: str | PathLike[str]) -> Format:
         head = b"#"
     else:
         if os.path.isdir(path):
+            if any(os.path.exists(os.path.join(path, name)) for name in ("zarr.json", ".zarray", ".zgroup")):
+                raise ClipError(
+                    f"{os.fspath(path)}: is a zarr store, expected a file; in Python, athcodec.encode takes one of its "
+                    "arrays"
+                )
             raise ClipError(
                 f"{os.fspath(path)}: is a folder, expected a file: any one of numbered files stands for all, and "
                 "`athcodec batch` encodes many clips"
