@@ -42,13 +42,17 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
     """The clip in an open file. watched: resource and unchanged as in MotionClip. Raises ClipError."""
     budget, name = Budget(options.max_memory), Path(path).stem
     if options.axes is not None:
-        raise ClipError("axes: got an order for VTKHDF, whose points have one; --dataset (dataset=) names another array")
+        raise ClipError(
+            "axes: got an order for VTKHDF, whose points have one; --dataset (dataset=) names another array"
+        )
     groups, left_out = _groups(file, options.only)
     parts = [_Part(name if len(groups) == 1 else block, group, budget) for block, group in groups.items()]
     stored = parts[0].times
     for part in parts[1:]:
         if not np.array_equal(part.times, stored):
-            raise ClipError(f"{part.name}: got other times than {parts[0].name}; --only (only=) reads some of the blocks")
+            raise ClipError(
+                f"{part.name}: got other times than {parts[0].name}; --only (only=) reads some of the blocks"
+            )
     time, metadata = times_in_seconds(stored, options.fps)
     steps = JoinedSteps(parts, budget, fspath(path))
     steps.left_out += [name for part in parts for name in part.left_out]
@@ -178,7 +182,9 @@ class _Part:
         total = self._group["NumberOfPoints"].shape[0]
         count = self._of_step("NumberOfParts", step, 1 if self._steps is not None else total)
         if not 0 <= first <= first + count <= total:
-            raise ClipError(f"Steps: got the pieces {first} to {first + count} in step {step}, expected some of {total}")
+            raise ClipError(
+                f"Steps: got the pieces {first} to {first + count} in step {step}, expected some of {total}"
+            )
         return range(first, first + count)
 
     def _points_at(self, step: int) -> tuple[int, int]:

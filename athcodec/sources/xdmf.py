@@ -15,7 +15,7 @@ import json
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from os import fspath
 from pathlib import Path
@@ -93,10 +93,13 @@ TOPOLOGIES = {
     "line": "line",
 }
 PLAIN = {"polyvertex": "poly_vertex", "polyline": "poly_line", "polygon": "polygon"}
+RECTILINEAR = ("2drectmesh", "3drectmesh", "2dcorectmesh", "3dcorectmesh")
+WITHOUT_POINTS = "save grids without points of their own as unstructured ones"
 STRUCTURED = {"2dsmesh": "quad", "3dsmesh": "hexahedron"}
 KNOWN = ("Grid", "Topology", "Geometry", "Attribute", "Time", "DataItem")  # Elements of a grid that are read.
 COLLECTIONS, UNIFORM = ("collection", "tree"), "uniform"
-MOST_NESTED, MOST_GRIDS = 16, 1 << 20  # Grids inside grids; grids that are looked at, those of includes too.
+MOST_NESTED = 16  # Grids inside grids.
+MOST_VISITS, VISITS_PER_ELEMENT = 1000, 16  # Grids that are looked at, more than once if they are included.
 FUNCTION_SPACE = "degrees of freedom of write_checkpoint; XDMFFile.write writes values per point"
 LISTED = 12  # Names in a message.
 MOST_POINTS = 1 << 28  # Of a curvilinear grid.
@@ -130,14 +133,15 @@ def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
 class Track:
     """A mesh in time: for each step the grids that say something of it, and its time if that is stated.
 
-    is_series: whether it comes from a temporal collection, even if of a single step.
+    is_series: whether it comes from a temporal collection, even if of a single step. families: numbers of the grids
+    that it is in; what is in one grid belongs together.
     """
 
     name: str
     steps: list[list[Element]]
     times: np.ndarray | None = None
     is_series: bool = False
-    labels: list[str] = field(default_factory=list)  # What the grids of each step are called.
+    families: frozenset[int] = frozenset()
 
 
 class _Scene:
@@ -154,20 +158,25 @@ class _Scene:
         grids = [grid for domain in self._domains for grid in self._documents.children(domain, "Grid")]
         if not grids:
             raise ClipError("got no Grid, expected some in a Domain")
-        self._tracks = [track for grid in grids for track in self._tracks_of(grid, 0)]
+        self._tracks = [
+            replace(track, families=frozenset([number]))
+            for number, grid in enumerate(grids)
+            for track in self._tracks_of(grid, 0)
+        ]
 
     # ---- from grids to tracks ----
 
     def _tracks_of(self, grid: Element, depth: int) -> list[Track]:
         """The tracks of a grid. Raises ClipError."""
         self._grid_count += 1
-        if depth > MOST_NESTED or self._grid_count > MOST_GRIDS:
-            raise ClipError(f"Grid: got more than {MOST_NESTED} inside each other or {MOST_GRIDS} in all, expected fewer")
+        most = MOST_VISITS + VISITS_PER_ELEMENT * self._documents.size
+        if depth > MOST_NESTED or self._grid_count > most:
+            raise ClipError(f"Grid: got more than {MOST_NESTED} inside each other or {most} in all, expected fewer")
         kind, name = grid.get("GridType", UNIFORM).lower(), grid.get("Name", "")
         self._name_unknown(grid, KNOWN)
         if kind == UNIFORM:
             time = self._time_of(grid)
-            return [Track(name, [[grid]], None if time is None else np.array([time]), labels=[name])]
+            return [Track(name, [[grid]], None if time is None else np.array([time]))]
         if kind not in COLLECTIONS:
             raise ClipError(f"Grid {name[:40]!r}: got the type {kind[:40]!r}, expected Uniform, Collection or Tree")
         grids = self._documents.children(grid, "Grid")
@@ -192,13 +201,14 @@ class _Scene:
         for number, step in enumerate(steps):
             if len(step) != len(first):
                 raise ClipError(f"step {number}: got {len(step)} grids, expected {len(first)} as in the first step")
-        by_name = len(set(first)) == len(first) > 1 and all({track.name for track in step} == set(first) for step in steps)
+        by_name = len(set(first)) == len(first) > 1 and all(
+            {track.name for track in step} == set(first) for step in steps
+        )
         tracks = []
         for place, own in enumerate(first):
             row = [next(t for t in step if t.name == own) if by_name else step[place] for step in steps]
             times = self._series_times(collection, [track.times for track in row], grids)
-            names = [grid.get("Name", "") for grid in grids]
-            joined = Track(own if len(first) > 1 else name or own, [t.steps[0] for t in row], times, True, names)
+            joined = Track(own if len(first) > 1 else name or own, [t.steps[0] for t in row], times, True)
             tracks.append(_in_order(joined))
         return tracks
 
@@ -207,12 +217,10 @@ class _Scene:
     def _time_of(self, grid: Element) -> float | None:
         """The time that a grid states for itself alone."""
         element = self._documents.child(grid, "Time")
-        if element is None or grid.get("GridType", UNIFORM).lower() == "collection" and len(self._numbers(element)) != 1:
-            return None
-        numbers = self._numbers(element)
-        if len(numbers) != 1:
+        numbers = np.zeros(0) if element is None else self._numbers(element)
+        if len(numbers) > 1 and grid.get("GridType", UNIFORM).lower() != "collection":
             raise ClipError(f"Time: got {len(numbers)} for the grid {grid.get('Name', '')[:40]!r}, expected one")
-        return float(numbers[0])
+        return float(numbers[0]) if len(numbers) == 1 else None
 
     def _numbers(self, element: Element) -> np.ndarray:
         text = element.get("Value", "").split()
@@ -257,7 +265,9 @@ class _Scene:
         if stored is None or not track.is_series:
             stored = np.arange(count) / frame_rate({} if fps is None else {"fps": fps})
             if count > 1 and fps is None:
-                self._warn(f"Time: the steps have none, and come {frame_rate({}):g} a second; --fps (fps=) states a rate")
+                self._warn(
+                    f"Time: the steps have none, and come {frame_rate({}):g} a second; --fps (fps=) states a rate"
+                )
         time, metadata = times_in_seconds(stored, fps)
         if "start_frame" in said:
             start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
@@ -307,17 +317,20 @@ class _Scene:
             else:
                 for step, more in zip(found[key].steps, track.steps):
                     step += more
+                found[key].families |= track.families
         return list(found.values())
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:
         """Of several series those that are read: with the field, or that move, at the same times."""
         wanted = self._options.field
         if wanted is not None:
-            found = [track for track in groups if wanted in self._fields(track)]
-            if not found:
+            moving = [track for track in groups if wanted in self._fields(track)]
+            if not moving:
                 raise ClipError(f"field: got {wanted!r}, expected one of {self._listed(groups)}")
         else:
-            found = [track for track in groups if self._moves(track)] or list(groups)
+            moving = [track for track in groups if self._moves(track)] or list(groups)
+        families = frozenset[int]().union(*(track.families for track in moving))
+        found = [track for track in groups if track.families & families]
         times = {None if track.times is None else track.times.tobytes() for track in found}
         if len(times) > 1:
             raise ClipError(
@@ -417,8 +430,7 @@ def _in_order(track: Track) -> Track:
     if track.times is None or not np.isfinite(track.times).all() or (np.diff(track.times) > 0).all():
         return track
     order = np.argsort(track.times, kind="stable")
-    steps, labels = [track.steps[number] for number in order], [track.labels[number] for number in order]
-    return replace(track, steps=steps, times=track.times[order], labels=labels)
+    return replace(track, steps=[track.steps[number] for number in order], times=track.times[order])
 
 
 class _Part:
@@ -444,8 +456,8 @@ class _Part:
             return np.stack([self._items.read(item).reshape(-1) for item in items], axis=1)
         if kind not in ("XYZ", "XY") or len(items) != 1:
             raise ClipError(
-                f"Geometry: got the type {kind[:40]!r} with {len(items)} DataItems, expected XYZ, XY, X_Y_Z or X_Y; save "
-                "grids without points of their own as unstructured ones"
+                f"Geometry: got the type {kind[:40]!r} with {len(items)} DataItems, expected XYZ, XY, X_Y_Z or X_Y; "
+                f"{WITHOUT_POINTS}"
             )
         return self._items.read(items[0]).reshape(-1, len(kind))
 
@@ -513,7 +525,9 @@ class _Part:
                 name, center = element.get("Name") or "unnamed", element.get("Center", "Node").lower()
                 if element.get("ItemType", "").lower() == "finiteelementfunction":
                     center = FUNCTION_SPACE
-                key = (name, center) if (name, center) not in found else (f"{grid.get('Name') or number}/{name}", center)
+                key = (
+                    (name, center) if (name, center) not in found else (f"{grid.get('Name') or number}/{name}", center)
+                )
                 found[key] = element
         return found
 
@@ -527,6 +541,8 @@ class _Part:
             return []
         if kind in STRUCTURED:
             return _structured(STRUCTURED[kind], element)
+        if kind in RECTILINEAR:
+            raise ClipError(f"Topology: got the type {kind!r}, expected cells between points; {WITHOUT_POINTS}")
         nodes = self._items.first(element)
         if nodes.dtype.kind not in "iu":
             nodes = _whole_numbers(nodes)

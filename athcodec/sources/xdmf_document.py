@@ -32,6 +32,7 @@ class Documents:
         self._path, self._allow_outside, self._budget, self._unchanged = path, allow_outside, budget, unchanged
         self._pointers: dict[Path, Pointers] = {}
         self._home: dict[Element, Path] = {}  # Of elements of other documents: theirs.
+        self.size = 0  # Number of elements of all documents.
         self.root = self._load(path)
 
     def children(self, element: Element, *tags: str) -> list[Element]:
@@ -56,6 +57,7 @@ class Documents:
     def _load(self, path: Path) -> Element:
         root = parse_xml(read_plain(path, self._budget), TAG, self._budget)
         self._pointers[path] = Pointers(root)
+        self.size += sum(1 for _ in root.iter())
         if path != self._path:
             self._unchanged.add(path)
             self._home |= dict.fromkeys(root.iter(), path)

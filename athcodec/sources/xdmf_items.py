@@ -131,7 +131,9 @@ class Items:
             if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind not in "fiu":
                 raise ClipError(f"{path.name}: {inside[:80]!r}: got no array of numbers")
             if part:
-                selection = _selection(*np.array(part.replace(":", " ").split(), np.int64).reshape(-1, len(dataset.shape))[:3])
+                selection = _selection(
+                    *np.array(part.replace(":", " ").split(), np.int64).reshape(-1, len(dataset.shape))[:3]
+                )
             size = (
                 dataset.nbytes
                 if selection == ()
@@ -163,7 +165,9 @@ class Items:
     def _function(self, item: Element, depth: int) -> np.ndarray:
         text = item.get("Function", "")
         operands = [self.read(child, depth + 1) for child in self.documents.children(item, "DataItem")]
-        self.budget.need(8 * sum(operand.size for operand in operands) * (1 + len(text) // 4), f"Function {text[:40]!r}")
+        self.budget.need(
+            8 * sum(operand.size for operand in operands) * (1 + len(text) // 4), f"Function {text[:40]!r}"
+        )
         with np.errstate(all="ignore"):  # Values that are none are refused where they are used.
             return _shaped(np.asarray(_Function(text, operands).value()), _shape(item))
 
@@ -219,7 +223,9 @@ class _Function:
         shape = max((np.shape(value) for value in values), key=math.prod)
         if any(np.size(value) not in (1, math.prod(shape)) for value in values):
             shapes = " and ".join(str(np.shape(value)) for value in values)
-            raise ClipError(f"Function: got arrays of {shapes} in {self._text[:80]!r}, expected as many numbers in each")
+            raise ClipError(
+                f"Function: got arrays of {shapes} in {self._text[:80]!r}, expected as many numbers in each"
+            )
         return tuple(value if np.size(value) == 1 else np.reshape(value, shape) for value in values)
 
     def _joined(self, arguments: Sequence[ast.expr]) -> np.ndarray:

@@ -174,9 +174,8 @@ class _Parser:
         if self._take("("):
             inside = self._nested(self._union)
             self._expect(")")
-            steps, is_absolute = [lambda document, element: inside(document, element)], False
-            if self._next not in ("/", "//"):
-                return inside
+            tests = self._predicates()
+            steps, is_absolute = [lambda document, start: _filtered(document, inside(document, start), tests)], False
         else:
             steps, is_absolute = [], self._next in ("/", "//")
             if not is_absolute:
@@ -209,24 +208,20 @@ class _Parser:
             if axis not in AXES:
                 raise self._unknown(axis)
             self._at += 2
-        is_name = self._name_test()
+        is_name, tests = self._name_test(), self._predicates()
+
+        def find(document: Pointers, element: Element) -> list[Element]:
+            found = [each for each in document.along(axis, element) if is_name(each)]
+            return _filtered(document, found, tests)
+
+        return find
+
+    def _predicates(self) -> list[Test]:
         tests = []
         while self._take("["):
             tests.append(self._nested(self._either))
             self._expect("]")
-
-        def find(document: Pointers, element: Element) -> list[Element]:
-            found = [each for each in document.along(axis, element) if is_name(each)]
-            for test in tests:
-                values = [test(document, each, place, len(found)) for place, each in enumerate(found, 1)]
-                found = [
-                    each
-                    for place, (each, value) in enumerate(zip(found, values), 1)
-                    if (value == place if type(value) is int else bool(value))
-                ]
-            return found
-
-        return find
+        return tests
 
     def _name_test(self) -> Callable[[Element], bool]:
         name = self._next
@@ -318,6 +313,18 @@ _FUNCTIONS: dict[tuple[str, int], Callable[..., Any]] = {
     ("contains", 2): lambda at, text, part: part in (text or ""),
     ("starts-with", 2): lambda at, text, part: (text or "").startswith(part),
 }
+
+
+def _filtered(document: Pointers, found: list[Element], tests: list[Test]) -> list[Element]:
+    """Return the elements that pass all tests; a number is the place of the one that does."""
+    for test in tests:
+        values = [test(document, each, place, len(found)) for place, each in enumerate(found, 1)]
+        found = [
+            each
+            for place, (each, value) in enumerate(zip(found, values), 1)
+            if (value == place if type(value) is int else bool(value))
+        ]
+    return found
 
 
 def local_name(element: Element) -> str:
