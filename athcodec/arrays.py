@@ -25,6 +25,7 @@ from athcodec.motion.positions import (
     order_of_labels,
     ordered,
     parse_order,
+    seconds_of_dates,
     turned_advice,
 )
 from athcodec.motion.units import unit_symbol
@@ -43,8 +44,8 @@ OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
     """Give a source as a clip, and a sentence on how its numbers were converted, empty if they were not.
 
-    The options are OF_ARRAYS, OF_FILES and OF_PATHS, as far as they are given. A file that is opened here is closed when the
-    block ends. Raises ClipError, ValueError, and the errors of `read`.
+    The options are OF_ARRAYS, OF_FILES and OF_PATHS, as far as they are given. A file that is opened here is closed
+    when the block ends. Raises ClipError, ValueError, and the errors of `read`.
     """
     is_path, is_view = isinstance(source, (str, os.PathLike)), isinstance(source, (Decoder, ClipView))
     allowed = OF_PATHS if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
@@ -109,7 +110,5 @@ def _seconds(source: Source, order: Order | None, frame_count: int) -> np.ndarra
     if coordinates is None or order is None or len(labels) != len(order) or (FRAMES,) not in order:
         return None
     label = labels[order.index((FRAMES,))]
-    values = np.asarray(coordinates[label]) if label in coordinates else np.zeros(0)
-    if values.dtype.kind in "mM":
-        values = (values - values[:1]) / np.timedelta64(1, "s")
+    values = seconds_of_dates(np.asarray(coordinates[label]) if label in coordinates else np.zeros(0))
     return values if values.shape == (frame_count,) and values.dtype.kind in "fiu" else None

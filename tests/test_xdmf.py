@@ -33,7 +33,8 @@ def item(values, **more) -> str:
     values = np.asarray(values)
     kind = "Int" if values.dtype.kind == "i" else "Float"
     said = {"Dimensions": " ".join(map(str, values.shape)), "NumberType": kind, "Precision": 8, "Format": "XML"} | more
-    return f"<DataItem {' '.join(f'{key}={chr(34)}{value}{chr(34)}' for key, value in said.items())}>{text(values)}</DataItem>"
+    words = " ".join(f'{key}="{value}"' for key, value in said.items())
+    return f"<DataItem {words}>{text(values)}</DataItem>"
 
 
 def topology(quads=QUADS, more="") -> str:

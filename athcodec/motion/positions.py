@@ -52,8 +52,8 @@ def parse_order(axes: str | Sequence[str]) -> Order:
     names = sorted(name for axis in order for name in axis)
     if names not in ([FRAMES, VERTICES, XYZ], [VERTICES, XYZ]) or {FRAMES, VERTICES} in map(set, order):
         raise ValueError(
-            f"axes: got {axes!r}, expected the order of the array's axes in the words frames, vertices and xyz, such as "
-            "vertices,frames,xyz or, where vertices and xyz share an axis, frames,vertices+xyz"
+            f"axes: got {axes!r}, expected the order of the array's axes in the words frames, vertices and xyz, such "
+            "as vertices,frames,xyz or, where vertices and xyz share an axis, frames,vertices+xyz"
         )
     if any(len(axis) > 2 for axis in order):
         raise ValueError(f"axes: got {axes!r}, expected at most two of frames, vertices and xyz in one axis")
@@ -111,14 +111,13 @@ def order_of(shape: Sequence[int], facts: Facts, order: Order | None = None) -> 
         _lengths(shape, order)
         return order
     possible = list(_possible(tuple(shape)))
-    fitting = [each for each in possible if not _conflicts(shape, each, facts)]
+    fitting = [each for each in possible if not conflicts(shape, facts, each)]
     if USUAL in fitting or (USUAL in possible and not fitting):
         return USUAL
     if USUAL in possible:
-        conflicts = ", ".join(_conflicts(shape, USUAL, facts))
         raise ClipError(
-            f"positions: got shape {tuple(shape)}, which is {shape[0]} frames of {shape[1]} vertices, but {conflicts}; "
-            f"pass {advice(fitting)}"
+            f"positions: got shape {tuple(shape)}, which is {shape[0]} frames of {shape[1]} vertices, but "
+            f"{', '.join(conflicts(shape, facts))}; pass {advice(fitting)}"
         )
     said = f"positions: got shape {tuple(shape)}, expected (frames, vertices, 3)"
     raise ClipError(f"{said}; say the order of its axes: {advice(fitting or possible)}" if possible else said)
@@ -185,6 +184,11 @@ def in_floats(positions: Any) -> tuple[Any, str]:
     return Frames(read, frame_count, vertex_count, after), f"positions: {before} became {np.dtype(after)}"
 
 
+def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
+    """Return dates, or times between them, as (T,) float64 seconds from the first; other numbers unchanged."""
+    return (dates - dates[:1]).astype("timedelta64[ns]").astype(np.float64) / 1e9 if dates.dtype.kind in "mM" else dates
+
+
 def looks_turned(positions: Any, facts: Facts) -> bool:
     """Whether frames look like paths of vertices, so that the array probably has vertices first.
 
@@ -200,17 +204,18 @@ def looks_turned(positions: Any, facts: Facts) -> bool:
     if not np.isfinite(pairs).all():
         return False
     frames = pairs[:, 0]
-    in_frame, in_path = (np.linalg.norm(np.ptp(frames, axis=axis), axis=-1).mean() for axis in (1, 0))
-    step_in_frame, step_in_path = (np.linalg.norm(np.diff(pairs, axis=axis), axis=-1).mean() for axis in (2, 1))
-    return bool(in_frame < SMALL_SPREAD * in_path and step_in_frame < step_in_path)
+    with np.errstate(all="ignore"):  # What is too large is refused where it is read.
+        in_frame, in_path = (np.linalg.norm(np.ptp(frames, axis=axis), axis=-1).mean() for axis in (1, 0))
+        step_in_frame, step_in_path = (np.linalg.norm(np.diff(pairs, axis=axis), axis=-1).mean() for axis in (2, 1))
+        return bool(in_frame < SMALL_SPREAD * in_path and step_in_frame < step_in_path)
 
 
 def turned_advice(shape: Sequence[int]) -> str:
     """Return the question about an array that `looks_turned`."""
     swapped = (USUAL[1], USUAL[0], USUAL[2])
     return (
-        f"positions: shape {tuple(shape)} was taken as {shape[0]} frames of {shape[1]} vertices, but each frame looks like "
-        f"the path of one vertex; pass {advice([swapped])} if it is {shape[0]} vertices in {shape[1]} frames, and "
+        f"positions: shape {tuple(shape)} was taken as {shape[0]} frames of {shape[1]} vertices, but each frame looks "
+        f"like the path of one vertex; pass {advice([swapped])} if it is {shape[0]} vertices in {shape[1]} frames, and "
         f"{advice([USUAL])} if it is right"
     )
 
@@ -231,7 +236,7 @@ def _lengths(shape: Sequence[int], order: Order) -> dict[str, int]:
         others = [name for name in axis if name != XYZ]
         width = 3 if XYZ in axis else 1
         fits = fits and length % width == 0 and (bool(others) or length == width)
-        lengths |= {name: length // width for name in others}
+        lengths |= dict.fromkeys(others, length // width)
     if not fits:
         raise ClipError(f"positions: got shape {tuple(shape)}, expected one of axes {written(order)}, xyz being 3")
     return lengths
@@ -259,8 +264,8 @@ def _possible_of_few(shape: tuple[int, ...]) -> Iterator[Order]:
             yield from (order for order in shared if shape[order.index(joined)] % 3 == 0 < shape[order.index(joined)])
 
 
-def _conflicts(shape: Sequence[int], order: Order, facts: Facts) -> list[str]:
-    """Return what contradicts an order, in words."""
+def conflicts(shape: Sequence[int], facts: Facts, order: Order = USUAL) -> list[str]:
+    """Return what contradicts that an array of this shape has an order, in words. Raises ClipError where it cannot."""
     lengths = {FRAMES: 1} | _lengths(shape, order)
     found = []
     for name, (what, number) in facts.items():
@@ -274,7 +279,7 @@ def _conflicts(shape: Sequence[int], order: Order, facts: Facts) -> list[str]:
 def _confirm(shape: Sequence[int], facts: Facts) -> bool:
     """Whether the facts fit frames and vertices of this shape, and not the other way round."""
     swapped: Order = (USUAL[1], USUAL[0], USUAL[2])
-    return not _conflicts(shape, USUAL, facts) and bool(_conflicts(shape, swapped, facts))
+    return not conflicts(shape, facts) and bool(conflicts(shape, facts, swapped))
 
 
 def _rows(order: Order, axis: int, lengths: Mapping[str, int], start: int, stop: int) -> Iterator[tuple[slice, ...]]:

@@ -13,10 +13,11 @@
 
 The positions stay in the file and are read in blocks. Every other dataset, also one inside a group, is a named static
 array and survives unchanged (strings of variable length become UTF-8 of fixed length). Attributes of the file become
-metadata, but for clip_name and loop (true), which say the name of the clip and that it is a loop. Attributes of datasets
-are read where they state units, rates or dimensions; the clip's `not_read` names the others, datasets without numbers,
-and links to other files. Where a file could make the HDF5 library take more memory than options.max_memory, by filters
-that unpack to more than they should or by text that many elements share, it is read in a process of its own.
+metadata, but for clip_name and loop (true), which say the name of the clip and that it is a loop. Attributes of
+datasets are read where they state units, rates or dimensions; the clip's `not_read` names the others, datasets without
+numbers, and links that lead nowhere or to groups of other files. Where a file could make the HDF5 library take more
+memory than options.max_memory, by filters that unpack to more than they should or by text that many elements share, it
+is read in a process of its own.
 
 MATLAB 7.3 is HDF5 whose datasets have the attribute MATLAB_class and their dimensions reversed: shapes and --axes are
 those that MATLAB shows. Vertices are counted from 1 there.
@@ -129,7 +130,9 @@ def _read(file: h5py.File, path: FilePath, options: ReadOptions) -> MotionClip:
         return clip_of_arrays(arrays, path, options, **watched)
     except ClipError as error:
         index = _index_of(Path(path)) if POSITIONS not in file and options.dataset is None else None
-        raise ClipError(f"{error}; {index.name} beside it lists what is in it: encode that") if index else error
+        if index is None:
+            raise
+        raise ClipError(f"{error}; {index.name} beside it lists what is in it: encode that") from None
 
 
 def _index_of(path: Path) -> Path | None:

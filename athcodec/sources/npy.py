@@ -7,6 +7,7 @@ options.max_memory. Nothing is unpickled. npz.py reads archives of such files.
 from __future__ import annotations
 
 import os
+import tokenize
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
@@ -22,7 +23,18 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.raw import RawRows
 from athcodec.sources.schema import Stored, clip_of_arrays
 
-BROKEN = (ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, OverflowError, MemoryError, RuntimeError)
+BROKEN = (
+    OSError,
+    EOFError,
+    ValueError,
+    KeyError,
+    TypeError,
+    SyntaxError,
+    OverflowError,
+    MemoryError,
+    RuntimeError,
+    tokenize.TokenError,  # NumPy's, of headers in old styles
+)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py), or of other programs (schema.py).
+"""Reads a NumPy archive (.npz), with the names of athcodec's HDF5 schema (hdf5.py) or of other programs (schema.py).
 
 Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
 as they are asked for: going forward once, going backward from the start again. Every other array is static and
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import struct
-import tokenize
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.positions import Order
 from athcodec.sources import ReadOptions
-from athcodec.sources.npy import Header, check_size, positions_of_rows, read_header, rows_shape
+from athcodec.sources.npy import BROKEN, Header, check_size, positions_of_rows, read_header, rows_shape
 from athcodec.sources.raw import RawRows, read_exactly
 from athcodec.sources.schema import Stored, clip_of_arrays
 
@@ -36,22 +36,7 @@ SKIP_BYTES = 1 << 20
 ENCRYPTED = 1  # Bit of a member's flags.
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
-_BROKEN = (
-    zipfile.BadZipFile,
-    OSError,
-    zlib.error,
-    EOFError,
-    ValueError,
-    KeyError,
-    RuntimeError,
-    NotImplementedError,
-    struct.error,
-    MemoryError,
-    OverflowError,
-    TypeError,
-    SyntaxError,
-    tokenize.TokenError,  # NumPy's, of headers in old styles
-)
+_BROKEN = (*BROKEN, zipfile.BadZipFile, zlib.error, NotImplementedError, struct.error)
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
@@ -95,7 +80,7 @@ class _Members:
 
     def _add(self, name: str, info: zipfile.ZipInfo) -> None:
         if not info.filename.endswith(SUFFIX):
-            if not info.is_dir():
+            if info.filename and not info.is_dir():
                 self.not_read.setdefault("member", []).append(info.filename)
             return
         if info.flag_bits & ENCRYPTED:
@@ -118,6 +103,10 @@ class _Members:
             values = np.lib.format.read_array(member, allow_pickle=False)
             if member.read(1):
                 raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
+        if values.dtype.kind == "U":
+            values = values.astype(values.dtype.newbyteorder("="))
+            if values.size and (np.ascontiguousarray(values).reshape(-1).view(np.uint32) > sys.maxunicode).any():
+                raise ClipError(f"{name}: got text with numbers beyond those of letters, expected Unicode")
         return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
 
     def positions(self, name: str, order: Order) -> Any:

@@ -85,7 +85,7 @@ class JoinedSteps:
             try:
                 part.check(step)
             except ClipError as error:
-                raise ClipError(f"{part.name}: {error}") if len(self._parts) > 1 else error
+                raise ClipError(f"{part.name}: {error}" if len(self._parts) > 1 else str(error)) from None
 
     def fields(self) -> list[str]:
         return list(dict.fromkeys(name for part in self._parts for name in part.names(NODE)))

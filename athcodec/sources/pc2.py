@@ -130,7 +130,7 @@ def _say_other_meshes(path: Path) -> None:
     )
     if beside:
         warnings.warn(
-            f"{path}: the points alone were read; {', '.join(beside)} beside it may have the mesh: --mesh (mesh=) names it",
+            f"{path}: points alone were read; {', '.join(beside)} beside it may have the mesh: --mesh (mesh=) names it",
             GuessWarning,
             stacklevel=2,
         )

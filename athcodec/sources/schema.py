@@ -24,12 +24,14 @@ from athcodec.motion.joining import read_clip_metadata
 from athcodec.motion.positions import (
     FRAMES,
     Order,
+    conflicts,
     facts_of,
     in_floats,
     is_possible,
     looks_turned,
     order_of,
     order_of_labels,
+    seconds_of_dates,
     turned_advice,
 )
 from athcodec.motion.units import METRES, unit_symbol
@@ -52,7 +54,7 @@ SECONDS = {  # By the names of units of time, the seconds that each is.
     **dict.fromkeys("h hr hrs hour hours".split(), 3600.0),
     **dict.fromkeys("d day days".split(), 86400.0),
 }
-LISTED = 12  # Arrays that a message names.
+LISTED, SHOWN = 12, 80  # Arrays that a message names, and characters of a name.
 # Kinds in not_read: arrays of another clip in the file, and what a file says of an array.
 OTHER_CLIP, NOTE = "dataset", "note of a dataset"
 
@@ -66,7 +68,12 @@ class Stored:
     dtype: np.dtype
 
     def __str__(self) -> str:
-        return f"{self.name or 'an array'} {self.shape} {self.dtype}"
+        return f"{self.shown} {self.shape} {str(self.dtype)[:40]}"
+
+    @property
+    def shown(self) -> str:
+        """The name as messages have it."""
+        return one_line(self.name) or "an array"
 
 
 class Arrays(Protocol):
@@ -105,6 +112,11 @@ def clip_of_arrays(arrays: Arrays, path: FilePath, options: ReadOptions, **watch
     return _Clip(arrays, path, options).made(**watched)
 
 
+def one_line(name: str) -> str:
+    """Return a name as messages of one line can have it."""
+    return name[:SHOWN] if name.isprintable() else repr(name[:SHOWN])
+
+
 def listing(stored: Mapping[str, Stored]) -> str:
     """Return the arrays of a file with their shapes and types, for messages."""
     shown = [f"/{each}" if "/" in each.name else str(each) for each in list(stored.values())[:LISTED]]
@@ -137,19 +149,24 @@ class _Clip:
             self._warn(turned_advice(positions.shape))
         time = self._times(known, metadata, positions.shape[0])
         attributes = self._further(name)
-        clip = MotionClip(
-            positions,
-            time,
-            rest=known["rest"] if self.options.rest == "auto" else None,
-            rest_pose="mean" if self.options.rest == "mean" else "first",
-            edges=known["edges"],
-            faces=known["faces"],
-            attributes=attributes,
-            metadata=metadata,
-            not_read=self.not_read,
-            **_branches(positions, known, metadata, self.options),
-            **watched,
-        )
+        try:
+            clip = MotionClip(
+                positions,
+                time,
+                rest=known["rest"] if self.options.rest == "auto" else None,
+                rest_pose="mean" if self.options.rest == "mean" else "first",
+                edges=known["edges"],
+                faces=known["faces"],
+                attributes=attributes,
+                metadata=metadata,
+                not_read=self.not_read,
+                **_branches(positions, known, metadata, self.options),
+                **watched,
+            )
+        except ClipError as error:
+            if not conflicts(positions.shape, facts):
+                raise
+            raise ClipError(f"{error}; {listing(self.arrays.stored)}") from None
         branch_order = clip.attributes.get("branch_order")
         if branch_order is not None and clip.has_branches:
             if np.array_equal(branch_order, branch_orders(clip.branch_parent)):
@@ -170,32 +187,29 @@ class _Clip:
             raise ClipError(f"dataset: got {self.options.dataset!r}, expected an array; {listing(stored)}")
         if POSITIONS in stored:
             return POSITIONS
-        possible = [
-            each
-            for each in stored.values()
-            if each.dtype.kind == "f" and _last(each.name) not in RESERVED_NAMES - {POSITIONS}
-        ]
-        possible = [each for each in possible if is_possible(each.shape, order)]
+        others = [each for each in stored.values() if _last(each.name) not in RESERVED_NAMES - {POSITIONS}]
+        possible = [each for each in others if each.dtype.kind == "f" and is_possible(each.shape, order)]
         in_space = [each for each in possible if len(each.shape) == 3]
         usual = [each for each in in_space if each.shape[2] == 3]
-        for candidates in ([], possible) if order else (usual, in_space):
-            named = [each for each in candidates if _last(each.name).lower() in POSITION_NAMES]
-            for found in (named, candidates):
-                if len(found) == 1:
-                    self._say_chosen(found[0], candidates)
-                    return found[0].name
-            if candidates:
-                break
-        what = f"several, {', '.join(each.name for each in candidates[:LISTED])}" if candidates else "no such dataset"
+        candidates = possible if order else usual or in_space or possible
+        if not candidates and len(others) == 1:
+            candidates = others  # What is wrong with it is said where it is looked at.
+        named = [each for each in candidates if _last(each.name).lower() in POSITION_NAMES]
+        for found in (named, candidates):
+            if len(found) == 1:
+                self._say_chosen(found[0], candidates)
+                return found[0].name
+        several = ", ".join(each.shown for each in candidates[:LISTED])
+        what = f"several, {several}" if candidates else "no such dataset"
         raise ClipError(
-            f"positions: got {what}, expected (frames, vertices, 3); --dataset (dataset=) names the array, --axes (axes=) "
-            f"the order of its axes; {listing(stored)}"
+            f"positions: got {what}, expected (frames, vertices, 3); --dataset (dataset=) names the array, --axes "
+            f"(axes=) the order of its axes; {listing(stored)}"
         )
 
     def _say_chosen(self, chosen: Stored, candidates: Sequence[Stored]) -> None:
         """Say which array was taken for the positions, unless the file has no other."""
         if len(self.arrays.stored) > 1 or not _is_unnamed(chosen.name):
-            others = ", ".join(each.name for each in candidates if each is not chosen)
+            others = ", ".join(each.shown for each in candidates[:LISTED] if each is not chosen)
             beside = f", not {others}" if others else ""
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
@@ -205,7 +219,9 @@ class _Clip:
         try:
             return order_of(stored.shape, self._facts(known), stated)
         except ClipError as error:
-            raise ClipError(f"{error}; {listing(self.arrays.stored)}") from None
+            raise ClipError(
+                f"{error}; --dataset (dataset=) names another array; {listing(self.arrays.stored)}"
+            ) from None
 
     def _facts(self, known: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
         facts = facts_of(known)
@@ -264,10 +280,11 @@ class _Clip:
         for group in reversed([group for group in groups if group]):
             metadata |= self.arrays.notes(group)
         notes = dict(self.arrays.notes(name))
-        for key in list(notes):
-            rate = _plain(key) in RATE_NAMES | STEP_NAMES
-            if (key in SCALARS or rate) and key not in metadata:
-                metadata[key] = notes.pop(key)
+        for key in [key for key in notes if _is_scalar_name(key) and key not in metadata]:
+            metadata[key] = notes.pop(key)
+        for key, value in metadata.items():  # netCDF has arrays of one item for numbers.
+            if _is_scalar_name(key) and isinstance(value, list) and len(value) == 1:
+                metadata[key] = value[0]
         if unit_symbol(notes.get("units")) in METRES:
             metadata.setdefault("unit", notes.pop("units"))
         if unit_symbol(metadata.get("units")) in METRES:
@@ -297,7 +314,9 @@ class _Clip:
             fitting = [name for name in guesses if self._read(name).size == frame_count]
             if len(fitting) == 1:
                 self.used["time"] = name = fitting[0]
-                self._warn(f"time: {name} was taken for the seconds of the frames; --fps (fps=) states a rate instead")
+                self._warn(
+                    f"time: {one_line(name)} was taken for the seconds of the frames; --fps (fps=) states a rate"
+                )
                 return self._in_seconds(name, self._read(name).reshape(-1))
             self._guess_rate(metadata)
             if guesses and "fps" not in metadata:
@@ -313,10 +332,10 @@ class _Clip:
         unit = str(notes.pop("units", notes.pop("unit", "s"))).strip()
         self._name_notes(name, notes)
         if values.dtype.kind in "mM":
-            return (values - values[:1]) / np.timedelta64(1, "s")
+            return seconds_of_dates(values)
         factor = SECONDS.get(unit.lower().split(" ")[0])
         if factor is None:
-            self._warn(f"time: {name} is in {unit[:40]!r}, which was taken for seconds")
+            self._warn(f"time: {one_line(name)} is in {unit[:40]!r}, which was taken for seconds")
         return values if factor in (None, 1.0) else values * factor
 
     def _guessed_times(self) -> list[str]:
@@ -347,10 +366,13 @@ class _Clip:
             return
         key, rate = next(iter(rates.items()))
         if max(rates.values()) > (1 + 1e-6) * min(rates.values()):
-            got = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
+            got = ", ".join(f"{one_line(name)} {number:g}" for name, number in numbers.items())
             raise ClipError(f"fps: got {got}, expected one rate; --fps (fps=) states it")
         metadata["fps"] = rate
-        self._warn(f"fps: {key} {numbers[key]:g} was taken for {rate:.6g} frames a second; --fps (fps=) states another")
+        self._warn(
+            f"fps: {one_line(key)} {numbers[key]:g} was taken for {rate:.6g} frames a second; --fps (fps=) states "
+            "another"
+        )
 
     # ---- all the rest ----
 
@@ -408,6 +430,11 @@ def _is_single(stored: Stored) -> bool:
 def _ascends(values: np.ndarray) -> bool:
     row = values.reshape(-1)
     return bool((row[1:] > row[:-1]).all())
+
+
+def _is_scalar_name(key: str) -> bool:
+    """Whether metadata of this name are a rate, or what else is a single word or number."""
+    return key in SCALARS or _plain(key) in RATE_NAMES | STEP_NAMES
 
 
 def _plain(key: str) -> str:

@@ -1,5 +1,5 @@
-"""Reads VTKHDF, the HDF5 files of VTK: unstructured grids and surfaces (PolyData), with steps in time or without, in one
-piece or several, alone or as blocks.
+"""Reads VTKHDF, the HDF5 files of VTK: unstructured grids and surfaces (PolyData), with steps in time or without, in
+one piece or several, alone or as blocks.
 
 hdf5.py opens the file. See fields.py for what becomes the motion, cells.py for the cells and parts.py for several
 blocks. Pieces of a parallel run follow each other. What belongs to a step lies where Steps says: data without an offset
@@ -53,7 +53,8 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
             raise ClipError(
                 f"{part.name}: got other times than {parts[0].name}; --only (only=) reads some of the blocks"
             )
-    time, metadata = times_in_seconds(stored, options.fps)
+    with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
+        time, metadata = times_in_seconds(stored, options.fps)
     steps = JoinedSteps(parts, budget, fspath(path))
     steps.left_out += [name for part in parts for name in part.left_out]
     said = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}

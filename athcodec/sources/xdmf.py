@@ -241,8 +241,8 @@ class _Scene:
         if common is None:
             if len(missing) < count and self._options.fps is None:
                 raise ClipError(
-                    f"Time: got none in step {missing[0]} ({grids[missing[0]].get('Name', '')[:40]!r}) and one in others, "
-                    "expected it in all; --fps (fps=) numbers them in place of all times"
+                    f"Time: got none in step {missing[0]} ({grids[missing[0]].get('Name', '')[:40]!r}) and one in "
+                    "others, expected it in all; --fps (fps=) numbers them in place of all times"
                 )
             return None
         kind, numbers = common.get("TimeType", "Single").lower(), self._numbers(common)
@@ -268,10 +268,11 @@ class _Scene:
                 self._warn(
                     f"Time: the steps have none, and come {frame_rate({}):g} a second; --fps (fps=) states a rate"
                 )
-        time, metadata = times_in_seconds(stored, fps)
-        if "start_frame" in said:
-            start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
-            metadata["start_frame"] = whole(round(start, 6))
+        with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
+            time, metadata = times_in_seconds(stored, fps)
+            if "start_frame" in said:
+                start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
+                metadata["start_frame"] = whole(round(start, 6))
         return time, said | metadata
 
     # ---- which tracks ----
@@ -300,8 +301,8 @@ class _Scene:
         times = {float(track.times[0]) for track in with_points if track.times is not None}
         if len(times) > 1:
             raise ClipError(
-                f"got {len(with_points)} grids at different times and no temporal collection, expected a time series or "
-                "one grid"
+                f"got {len(with_points)} grids at different times and no temporal collection, expected a time series "
+                "or one grid"
             )
         self._name_others(with_points, [track for track in tracks if track not in with_points])
         return with_points
@@ -334,7 +335,8 @@ class _Scene:
         times = {None if track.times is None else track.times.tobytes() for track in found}
         if len(times) > 1:
             raise ClipError(
-                f"got {len(found)} series at different times, {self._listed(found)}; expected one: --only (only=) names it"
+                f"got {len(found)} series at different times, {self._listed(found)}; expected one: --only (only=) "
+                "names it"
             )
         return found
 
@@ -378,8 +380,8 @@ class _Scene:
         if len(meshes) != 1:
             names = ", ".join(repr(mesh.name) for mesh in meshes[:LISTED]) or "none"
             raise ClipError(
-                f"Grid {track.name[:40]!r}: got no grid with a Geometry in its steps; expected one, by xi:include or in "
-                f"place, of the meshes in the file: {names}"
+                f"Grid {track.name[:40]!r}: got no grid with a Geometry in its steps; expected one, by xi:include or "
+                f"in place, of the meshes in the file: {names}"
             )
         self._warn(f"the steps of {track.name!r} have no mesh, and that of {meshes[0].name!r} was taken for it")
         self.not_read["mesh"] = [name for name in self.not_read["mesh"] if name != (meshes[0].name or "unnamed")]
