@@ -69,15 +69,9 @@ def encode(
 
     Other Parameters
     ----------------
-    faces, vertex_branch, branch_parent, fps, unit, up_axis : optional
-        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. With a
-        path, fps, unit and up_axis are those of `read`.
-    axes : str or sequence of str, optional
-        The order of the array's axes, where it is not "frames,vertices,xyz": "vertices,frames,xyz", or
-        "frames,vertices+xyz" where x, y and z of all vertices lie in one axis; "vertices,xyz" is a single frame. Of a
-        path, the order in which the file has them.
-    dataset : str, optional
-        Of a path to an HDF5, NumPy or MATLAB file, the array with the positions.
+    faces, vertex_branch, branch_parent, fps, unit, up_axis, axes, dataset : optional
+        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. axes is
+        the order of its axes, such as "vertices,frames,xyz". With a path, all from fps on are those of `read`.
     max_error, rel_error, target_size : optional
         At most one: the largest distance of any vertex in any frame from the source in scene units, the same over the
         diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7), or the bytes that the file may take.

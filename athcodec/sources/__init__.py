@@ -33,7 +33,14 @@ from athcodec.options import MAX_MEMORY, SAMPLES
 # Parts of a scene that are not read and are no shapes.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
     "attribute element empty field hidden statement other".split(),
-    ("note of a dataset", "empty dataset", "dataset of references or lists", "pickled object", "member"),
+    (
+        "note of a dataset",
+        "empty dataset",
+        "dataset of references or lists",
+        "pickled object",
+        "member",
+        "sparse matrix",
+    ),
     NOT_KEPT.values(),
 )
 LISTED = 8

@@ -59,6 +59,7 @@ GROWTH = {
 """How many bytes a filter makes of one at most; DEFLATE unpacks all that there is, whatever size a chunk has."""
 MOST_GROWTH = 1 << 20  # Largest growth that is expected of an unknown filter.
 BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, UnicodeError, MemoryError)
+MATLAB_SPARSE, SPARSE = "MATLAB_sparse", "sparse matrix"
 VTKHDF = "VTKHDF"  # Name of VTK's group.
 MATLAB_CLASS, MATLAB_EMPTY, MATLAB_OWN = "MATLAB_class", "MATLAB_empty", ("#refs#", "#subsystem#")
 BOOKKEEPING = {"CLASS", "NAME", "DIMENSION_LIST", "DIMENSION_LABELS", "REFERENCE_LIST", "_FillValue", "H5PATH"}
@@ -170,6 +171,8 @@ class _Datasets:
                 self._leave_out("link", name)
             return
         info = h5py.h5o.get_info(item.id)
+        if self._is_sparse(name.rpartition("/")[0]):
+            return
         is_known = (info.fileno, info.addr) in seen and name != POSITIONS
         seen.add((info.fileno, info.addr))
         if is_known or name.startswith(MATLAB_OWN) or _is_only_a_dimension(item):
@@ -183,6 +186,14 @@ class _Datasets:
         else:
             self.stored[name] = _stored(name, item)
             self.counts_from_1 = self.counts_from_1 or _is_matlab(item)
+
+    def _is_sparse(self, group: str) -> bool:
+        """Whether a group is a sparse matrix of MATLAB, which is named then."""
+        if not group or MATLAB_SPARSE not in self._file[group].attrs:
+            return False
+        if group not in self.not_read.get(SPARSE, ()):
+            self._leave_out(SPARSE, group)
+        return True
 
     def _leave_out(self, kind: str, name: str) -> None:
         self.not_read.setdefault(kind, []).append(name)
