@@ -33,8 +33,8 @@ LABELS = {
     XYZ: "xyz axis axes coordinate coordinates coord coords component components dim space direction".split(),
 }
 _NAMES = {label: name for name, labels in LABELS.items() for label in labels}
-FRAMES_LOOKED_AT = 8  # Frames, each with the next one, that tell whether an array looks turned.
-SMALL_SPREAD = 0.25  # Extent of a frame over that of a vertex' path, below which a frame looks like a path itself.
+FRAMES_LOOKED_AT, VERTICES_LOOKED_AT = 8, 4096  # Each with the next one, they tell whether an array looks turned.
+SMALL_SPREAD = 0.5  # Extent of a frame over that of a vertex' path, below which a frame looks like a path itself.
 _COUNTED = {"time": FRAMES, "rest": VERTICES, "vertex_branch": VERTICES, "stem_index": VERTICES}
 _COUNTED |= {"faces": INDICES, "edges": INDICES}
 
@@ -200,13 +200,14 @@ def looks_turned(positions: Any, facts: Facts) -> bool:
     if min(frame_count, vertex_count) < 2 or positions.dtype.kind != "f" or _confirm(positions.shape, facts):
         return False
     starts = np.unique(np.linspace(0, frame_count - 2, FRAMES_LOOKED_AT).astype(int)).tolist()
-    pairs = np.stack([np.asarray(positions[start : start + 2], np.float64) for start in starts])
-    if not np.isfinite(pairs).all():
-        return False
-    frames = pairs[:, 0]
-    with np.errstate(all="ignore"):  # What is too large is refused where it is read.
-        in_frame, in_path = (np.linalg.norm(np.ptp(frames, axis=axis), axis=-1).mean() for axis in (1, 0))
-        step_in_frame, step_in_path = (np.linalg.norm(np.diff(pairs, axis=axis), axis=-1).mean() for axis in (2, 1))
+    places = np.unique(np.linspace(0, vertex_count - 2, VERTICES_LOOKED_AT).astype(int))
+    pairs = [np.asarray(positions[start : start + 2]) for start in starts]
+    points = np.stack([pair[:, places] for pair in pairs]).astype(np.float64)  # Of each frame and the next one.
+    beside = np.stack([pair[:, places + 1] for pair in pairs]).astype(np.float64)
+    with np.errstate(all="ignore"):  # What is no number, or too large, is refused where it is read.
+        in_frame, in_path = (np.linalg.norm(np.ptp(points[:, 0], axis=axis), axis=-1).mean() for axis in (1, 0))
+        step_in_frame = np.linalg.norm(beside - points, axis=-1).mean()
+        step_in_path = np.linalg.norm(points[:, 1] - points[:, 0], axis=-1).mean()
         return bool(in_frame < SMALL_SPREAD * in_path and step_in_frame < step_in_path)
 
 

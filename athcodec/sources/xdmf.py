@@ -12,6 +12,7 @@ cells, xdmf_document.py for includes and references and xdmf_items.py for number
 from __future__ import annotations
 
 import json
+import math
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -102,7 +103,6 @@ MOST_NESTED = 16  # Grids inside grids.
 MOST_VISITS, VISITS_PER_ELEMENT = 1000, 16  # Grids that are looked at, more than once if they are included.
 FUNCTION_SPACE = "degrees of freedom of write_checkpoint; XDMFFile.write writes values per point"
 LISTED = 12  # Names in a message.
-MOST_POINTS = 1 << 28  # Of a curvilinear grid.
 _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, IndexError, TypeError, MemoryError)
 
 
@@ -542,7 +542,7 @@ class _Part:
         if kind == "polyvertex":
             return []
         if kind in STRUCTURED:
-            return _structured(STRUCTURED[kind], element)
+            return _structured(STRUCTURED[kind], element, self._items.budget)
         if kind in RECTILINEAR:
             raise ClipError(f"Topology: got the type {kind!r}, expected cells between points; {WITHOUT_POINTS}")
         nodes = self._items.first(element)
@@ -573,13 +573,12 @@ class _Part:
         return [Block(TOPOLOGIES[kind], cells, np.arange(len(cells)))]
 
 
-def _structured(kind: str, element: Element) -> list[Block]:
+def _structured(kind: str, element: Element, budget: Budget) -> list[Block]:
     """The cells between the points of a curvilinear grid, whose last dimension is the fastest."""
     shape = [int(size) for size in (element.get("Dimensions") or element.get("NumberOfElements") or "").split()]
     if len(shape) != (2 if kind == "quad" else 3) or min(shape) < 1:
         raise ClipError(f"Topology: got the dimensions {shape}, expected {2 if kind == 'quad' else 3} of points")
-    if np.prod(shape, dtype=object) > MOST_POINTS:
-        raise ClipError(f"Topology: got a grid of {shape} points, expected at most {MOST_POINTS}")
+    budget.need(NODE_BYTES * len(shape) ** 2 * math.prod(shape), f"Topology: a grid of {shape} points")
     numbers = np.arange(int(np.prod(shape))).reshape(shape)
     sides = [(slice(None, -1), slice(1, None))] * len(shape)
     around = [(0, 0), (0, 1), (1, 1), (1, 0)]  # Of the last two dimensions, counter-clockwise.
