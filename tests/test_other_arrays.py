@@ -15,6 +15,7 @@ from plants import awkward
 import athcodec
 from athcodec.cli import main
 from athcodec.errors import ClipError, GuessWarning, SourceWarning
+from athcodec.sources import ReadOptions, find_format, mat
 
 HEIGHT, TIMES = np.linspace(0.0, 2.0, 18), np.array([0.0, 0.1, 0.25, 0.3, 0.5, 0.9])
 BENT = 0.1 * np.sin(3 * TIMES)[:, None] * HEIGHT**2
@@ -353,6 +354,8 @@ STATED = {
     ),
     "dt of the file": ({}, {"@dt": 0.04}, np.arange(6) / 25, "dt 0.04 was taken for 25 frames a second"),
     "frame rate of the positions": ({}, {"positions@frame_rate": 25}, np.arange(6) / 25, "frame_rate 25 was taken"),
+    "times of the file": ({}, {"@times": TIMES}, TIMES, "the attribute times was taken for the seconds"),
+    "times of the positions": ({}, {"positions@t": TIMES}, TIMES, "the attribute t was taken for the seconds"),
     "a dataset of one number": ({"dt": [[0.04]]}, {}, np.arange(6) / 25, "dt 0.04 was taken"),
     "fps in a dataset": ({"fps": [25]}, {}, np.arange(6) / 25, None),
     "fps of the positions": ({}, {"positions@fps": 25}, np.arange(6) / 25, None),
@@ -415,6 +418,14 @@ def test_matlab_files_are_read_as_matlab_shows_them(tmp_path, write):
         assert_motion(clip)
         assert np.array_equal(clip.faces, faces - 1) and clip.metadata == {"unit": "cm"}
         assert np.array_equal(clip.attributes["radius"], HEIGHT[:, None])
+
+
+def test_a_file_of_older_matlab_is_read_by_scipy(tmp_path):
+    path = matlab5(tmp_path / "a", {"positions": MOTION, "time": TIMES, "c": np.ones((2, 2)) > 0})
+    assert find_format(path).name == "mat"
+    with mat.open_clip(str(path), ReadOptions()) as clip:  # As the process of its own does, which takes longer.
+        assert_motion(clip)
+        assert clip.attributes.keys() == {"c"}
 
 
 @pytest.mark.formats

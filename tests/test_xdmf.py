@@ -242,6 +242,32 @@ def test_two_functions_of_one_name_keep_the_names_of_their_series(tmp_path):
 
 
 @pytest.mark.formats
+def test_a_mesh_that_each_series_has_for_itself_is_one_mesh(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:  # As DOLFIN writes two functions into one file.
+        for number in range(2):
+            file[f"Mesh/{number}/geometry"], file[f"Mesh/{number}/topology"] = REST, QUADS
+    own = [
+        '<Topology TopologyType="Quadrilateral"><DataItem Dimensions="8 4" NumberType="Int" Precision="8" Format="HDF">'
+        f'a.h5:/Mesh/{n}/topology</DataItem></Topology><Geometry GeometryType="XYZ"><DataItem Dimensions="18 3" '
+        f'Format="HDF">a.h5:/Mesh/{n}/geometry</DataItem></Geometry>'
+        for n in range(2)
+    ]
+    with athcodec.read(write(tmp_path, series(own[0], "v", 7 * MOVED, "velocity"), series(own[1]))) as clip:
+        assert_motion(clip)
+        assert clip.not_read == {"field": ["velocity"]}
+    alike = [grid(str(n), topology() + geometry() + attribute(item(MOVED[1]))) for n in range(2)]
+    with athcodec.read(write(tmp_path, temporal("plant", [spatial("0", alike, time(0))]))) as clip:
+        assert clip.vertex_count == 36  # Two of one shape in a step are two.
+
+
+@pytest.mark.formats
+def test_steps_that_include_the_grid_of_their_mesh_have_it(tmp_path):
+    path = write(tmp_path, mesh("leaf", REST + 5), mesh("stem"), series(include('/Xdmf/Domain/Grid[@Name="stem"]')))
+    with pytest.warns(SourceWarning, match="mesh leaf"), athcodec.read(path) as clip:
+        assert_motion(clip)
+
+
+@pytest.mark.formats
 def test_tags_of_the_mesh_that_dolfinx_writes_beside_it_are_named(tmp_path):
     tags = topology(QUADS[:2]) + include('//Grid[@Name="stem"]/Geometry')
     tags = grid("facet_tags", tags + attribute(item(np.arange(2)), "facet_tags", "Cell"))
@@ -346,6 +372,37 @@ def test_times_of_steps_may_be_items_and_in_any_order(tmp_path):
     ]
     with athcodec.read(write(tmp_path, mesh("stem"), temporal("u", steps))) as clip:
         assert_motion(clip)
+
+
+@pytest.mark.formats
+@pytest.mark.parametrize(
+    "stated",
+    [
+        '<Information Name="Time" Value="{}"/>',
+        '<Attribute Name="TIME" Center="Grid"><DataItem Dimensions="1">{}</DataItem></Attribute>',
+    ],
+)
+def test_times_that_are_stated_elsewhere_are_taken_and_said(tmp_path, stated):
+    steps = [grid("s", include() + stated.format(t) + attribute(item(moved))) for t, moved in zip(TIMES, MOVED)]
+    path = write(tmp_path, mesh("stem"), temporal("u", steps))
+    with pytest.warns(GuessWarning, match="Time: (Information Time|Attribute TIME) was taken"):
+        with athcodec.read(path) as clip:
+            assert np.allclose(clip.block(0, 6), MOTION, rtol=0, atol=1e-12)
+            assert np.allclose(clip.time, TIMES, rtol=0, atol=1e-6)
+
+
+@pytest.mark.formats
+def test_a_file_of_one_frame_among_others_says_so(tmp_path):
+    for number in range(3):
+        write(tmp_path, mesh("stem"), name=f"plant_{number}.xdmf")
+    with pytest.warns(
+        GuessWarning, match=r"holds one frame, and 2 others of its name \(plant_0.xdmf ...\) are not read"
+    ):
+        athcodec.read(tmp_path / "plant_1.xdmf").close()
+    np.save(tmp_path / "plant_1.npy", REST)
+    np.save(tmp_path / "plant_2.npy", REST)
+    with pytest.warns(GuessWarning, match=r"holds one frame, and 1 other of its name"):
+        athcodec.read(tmp_path / "plant_1.npy", axes="vertices,xyz").close()
 
 
 @pytest.mark.formats

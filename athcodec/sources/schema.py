@@ -36,6 +36,7 @@ from athcodec.motion.positions import (
 )
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources import ReadOptions
+from athcodec.sources.timing import say_single_frame
 
 POSITIONS = "positions"
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
@@ -172,6 +173,8 @@ class _Clip:
             if np.array_equal(branch_order, branch_orders(clip.branch_parent)):
                 del clip.attributes["branch_order"]
         read_clip_metadata(clip)
+        if clip.frame_count == 1:
+            say_single_frame(self.path)
         return clip
 
     # ---- the positions ----
@@ -294,6 +297,8 @@ class _Clip:
             if full is not None and scalar not in metadata and _is_single(self.arrays.stored[full]):
                 self.used[scalar], item = full, self._read(full).reshape(-1)[0].item()
                 metadata[scalar] = item.decode("utf-8", "replace") if isinstance(item, bytes) else item
+        for key in [key for key in notes if _plain(key) in TIME_NAMES and key not in metadata]:
+            metadata[key] = notes.pop(key)  # See _times; what is not taken stays as what the file says.
         self._name_notes(name, notes)
         return metadata
 
@@ -318,6 +323,12 @@ class _Clip:
                     f"time: {one_line(name)} was taken for the seconds of the frames; --fps (fps=) states a rate"
                 )
                 return self._in_seconds(name, self._read(name).reshape(-1))
+            if (key := self._row_of_times(metadata, frame_count)) is not None:
+                self._warn(
+                    f"time: the attribute {one_line(key)} was taken for the seconds of the frames; --fps (fps=) "
+                    "states a rate"
+                )
+                return np.array(metadata.pop(key), np.float64)
             self._guess_rate(metadata)
             if guesses and "fps" not in metadata:
                 shapes = ", ".join(str(self.arrays.stored[name]) for name in guesses)
@@ -326,6 +337,17 @@ class _Clip:
                     f"{frame_rate(metadata):g} a second; --fps (fps=) states another rate"
                 )
         return np.arange(frame_count) / frame_rate(metadata)
+
+    @staticmethod
+    def _row_of_times(metadata: Mapping[str, Any], frame_count: int) -> str | None:
+        """Return the name of metadata that seem to be times: ascending numbers, one for each frame."""
+        for key, row in metadata.items():
+            is_row = (
+                isinstance(row, list) and len(row) == frame_count > 1 and {type(each) for each in row} <= {int, float}
+            )
+            if is_row and _plain(key) in TIME_NAMES and _ascends(np.array(row, np.float64)):
+                return key
+        return None
 
     def _in_seconds(self, name: str, values: np.ndarray) -> np.ndarray:
         notes = dict(self.arrays.notes(name))

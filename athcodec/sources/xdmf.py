@@ -35,7 +35,7 @@ from athcodec.sources.fields import DISPLACEMENTS, clip_of_steps
 from athcodec.sources.mesh import same_values
 from athcodec.sources.parts import CELL, NODE, JoinedSteps
 from athcodec.sources.scene_objects import MATERIAL_NAMES
-from athcodec.sources.timing import times_in_seconds, whole
+from athcodec.sources.timing import say_single_frame, times_in_seconds, whole
 from athcodec.sources.xdmf_document import Element
 from athcodec.sources.xdmf_items import Items
 from athcodec.sources.xml_tree import TEXT_BYTES, parse_xml
@@ -103,6 +103,7 @@ MOST_NESTED = 16  # Grids inside grids.
 MOST_VISITS, VISITS_PER_ELEMENT = 1000, 16  # Grids that are looked at, more than once if they are included.
 FUNCTION_SPACE = "degrees of freedom of write_checkpoint; XDMFFile.write writes values per point"
 LISTED = 12  # Names in a message.
+TIME_NAMES = ("time", "timevalue", "time_value", "t")
 _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, IndexError, TypeError, MemoryError)
 
 
@@ -121,6 +122,8 @@ def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
     tracks = scene.chosen()
     parts = [_Part(items, track, scene.mesh_for(track)) for track in tracks]
     time, metadata = scene.times(tracks[0])
+    if len(time) == 1:
+        say_single_frame(path)
     steps = JoinedSteps(parts, items.budget, fspath(path))
     metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
     steps.left_out += scene.other_fields
@@ -149,7 +152,7 @@ class _Scene:
 
     def __init__(self, items: Items, shown_path: str, options: ReadOptions):
         self._items, self._documents, self._path, self._options = items, items.documents, shown_path, options
-        self._grid_count = 0
+        self._grid_count, self._said_once = 0, set[str]()
         self.not_read: dict[str, list[str]] = {"series": [], "mesh": [], "element": []}
         self.other_fields: list[str] = []
         root = self._documents.root
@@ -176,7 +179,8 @@ class _Scene:
         self._name_unknown(grid, KNOWN)
         if kind == UNIFORM:
             time = self._time_of(grid)
-            return [Track(name, [[grid]], None if time is None else np.array([time]))]
+            inside = self._documents.children(grid, "Grid")  # Some steps include the grid of their mesh as it is.
+            return [Track(name, [[grid, *inside]], None if time is None else np.array([time]))]
         if kind not in COLLECTIONS:
             raise ClipError(f"Grid {name[:40]!r}: got the type {kind[:40]!r}, expected Uniform, Collection or Tree")
         grids = self._documents.children(grid, "Grid")
@@ -217,10 +221,24 @@ class _Scene:
     def _time_of(self, grid: Element) -> float | None:
         """The time that a grid states for itself alone."""
         element = self._documents.child(grid, "Time")
-        numbers = np.zeros(0) if element is None else self._numbers(element)
+        numbers = self._time_elsewhere(grid) if element is None else self._numbers(element)
         if len(numbers) > 1 and grid.get("GridType", UNIFORM).lower() != "collection":
             raise ClipError(f"Time: got {len(numbers)} for the grid {grid.get('Name', '')[:40]!r}, expected one")
         return float(numbers[0]) if len(numbers) == 1 else None
+
+    def _time_elsewhere(self, grid: Element) -> np.ndarray:
+        """The time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
+        for element in self._documents.children(grid, "Information", "Attribute"):
+            is_whole = local_name(element) == "Information" or element.get("Center", "").lower() == "grid"
+            if is_whole and element.get("Name", "").lower() in TIME_NAMES:
+                with suppress(ClipError, ValueError):  # Words, or what is no single number, are no time.
+                    numbers = self._numbers(element)
+                    if len(numbers) == 1:
+                        self._say_once(
+                            f"Time: {local_name(element)} {element.get('Name')} was taken for that of the steps"
+                        )
+                        return numbers
+        return np.zeros(0)
 
     def _numbers(self, element: Element) -> np.ndarray:
         text = element.get("Value", "").split()
@@ -309,17 +327,39 @@ class _Scene:
 
     def _groups(self, series: Sequence[Track]) -> list[Track]:
         """The series, those of one mesh at the same times in one: that has all their data."""
-        found: dict[Any, Track] = {}
+        found: list[Track] = []
         for track in series:
-            mesh = tuple(self._documents.source(self._element(track, tag)) for tag in ("Geometry", "Topology"))
-            key = (mesh, None if track.times is None else track.times.tobytes(), len(track.steps))
-            if not any(mesh) or key not in found:
-                found[key if any(mesh) else id(track)] = replace(track, steps=[list(step) for step in track.steps])
+            group = next((each for each in found if self._belong_together(each, track)), None)
+            if group is None:
+                found.append(replace(track, steps=[list(step) for step in track.steps]))
             else:
-                for step, more in zip(found[key].steps, track.steps):
+                for step, more in zip(group.steps, track.steps):
                     step += more
-                found[key].families |= track.families
-        return list(found.values())
+                group.families |= track.families
+        return found
+
+    def _belong_together(self, one: Track, other: Track) -> bool:
+        """Whether two series are of one mesh, of different grids at the top, at the same times."""
+        if one.families & other.families or len(one.steps) != len(other.steps):
+            return False
+        if (one.times is None) != (other.times is None) or not np.array_equal(one.times, other.times):
+            return False
+        return self._same_mesh(one, other)
+
+    def _same_mesh(self, one: Track, other: Track) -> bool:
+        """Whether two tracks have the same points and cells in their first step, in one place or in several."""
+        geometry = self._element(one, "Geometry"), self._element(other, "Geometry")
+        topology = self._element(one, "Topology"), self._element(other, "Topology")
+        if None in geometry:
+            return False
+        if all(self._documents.source(a) == self._documents.source(b) for a, b in (geometry, topology)):
+            return True
+        with suppress(ClipError):  # Of a mesh that cannot be read nothing is known; it may be one that nobody wants.
+            parts = [_Part(self._items, track, None) for track in (one, other)]
+            points = [part.points(0) for part in parts]
+            blocks = [part.blocks for part in parts]
+            return np.array_equal(*points) and len(blocks[0]) == len(blocks[1]) and all(map(_same_block, *blocks))
+        return False
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:
         """Of several series those that are read: with the field, or that move, at the same times."""
@@ -358,7 +398,7 @@ class _Scene:
         """Name what is not read: fields of other series of a mesh that is, other series, and meshes of no step."""
         points = {self._documents.source(self._element(track, "Geometry")) for track in chosen}
         for track in others:
-            if self._documents.source(self._element(track, "Geometry")) in points:
+            if any(self._same_mesh(track, each) for each in chosen):
                 self.other_fields += [f"{track.name}/{name}" for name in self._fields(track)]
             elif track.is_series:
                 self._add_not_read("series", track.name or "unnamed")
@@ -416,12 +456,17 @@ class _Scene:
     def _name_unknown(self, parent: Element, known: Sequence[str]) -> None:
         """Name the children of an element that are not looked at."""
         for child in self._documents.children(parent):
-            if local_name(child) not in known:
+            if local_name(child) not in known and child.get("Name", "").lower() not in TIME_NAMES:
                 self._add_not_read("element", f"{local_name(child)} {child.get('Name', '')}".strip())
 
     def _add_not_read(self, kind: str, name: str) -> None:
         if name not in self.not_read[kind]:
             self.not_read[kind].append(name)
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said_once:
+            self._said_once.add(text)
+            self._warn(text)
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{self._path}: {text}", GuessWarning, stacklevel=2)
@@ -476,11 +521,7 @@ class _Part:
         if self._same(element, first):
             return
         blocks = self._blocks(element, self._element(step, "Geometry"))
-        same = len(blocks) == len(self.blocks) and all(
-            a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.rows, b.rows)
-            for a, b in zip(blocks, self.blocks)
-        )
-        if not same:
+        if len(blocks) != len(self.blocks) or not all(map(_same_block, blocks, self.blocks)):
             raise ClipError(f"frame {step}: got other cells than in the first; topology that changes cannot be coded")
 
     def names(self, center: str) -> list[str]:
@@ -571,6 +612,10 @@ class _Part:
                 raise ClipError(f"Topology: got the order {' '.join(order)[:40]!r}, expected 0 to {cells.shape[1] - 1}")
             cells = cells[:, [order.index(str(number)) for number in range(cells.shape[1])]]
         return [Block(TOPOLOGIES[kind], cells, np.arange(len(cells)))]
+
+
+def _same_block(one: Block, other: Block) -> bool:
+    return one.kind == other.kind and np.array_equal(one.nodes, other.nodes) and np.array_equal(one.rows, other.rows)
 
 
 def _structured(kind: str, element: Element, budget: Budget) -> list[Block]:
