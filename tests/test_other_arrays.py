@@ -110,6 +110,13 @@ def test_an_error_lists_the_arrays_with_their_shapes_and_names_the_options(tmp_p
 
 
 @pytest.mark.formats
+def test_coordinates_in_arrays_of_their_own_are_refused_with_what_to_do(tmp_path):
+    path = npz(tmp_path / "a", {name: MOTION[..., axis] for axis, name in enumerate("XYZ")})
+    with pytest.raises(ClipError, match="x, y and z in arrays of their own have to be stacked into one"):
+        athcodec.read(path)
+
+
+@pytest.mark.formats
 def test_one_that_is_called_as_positions_are_is_taken_and_the_others_are_named(tmp_path):
     path = hdf5(tmp_path / "a.h5", {"run/velocity": 3 * MOTION, "run/Position": MOTION, "time": TIMES})
     with pytest.warns(GuessWarning, match="run/Position .* was taken for them, not run/velocity;"):

@@ -141,7 +141,7 @@ class _Clip:
         self.used[POSITIONS] = name = self._chosen()
         metadata = self._metadata(name)
         known = self._of_schema()
-        order = self._order(name, known, metadata)
+        order = self._order(name, known)
         positions, converted = in_floats(self.arrays.positions(name, order))
         if converted:
             self._warn(converted)
@@ -168,10 +168,9 @@ class _Clip:
             if not conflicts(positions.shape, facts):
                 raise
             raise ClipError(f"{error}; {listing(self.arrays.stored)}") from None
-        branch_order = clip.attributes.get("branch_order")
-        if branch_order is not None and clip.has_branches:
-            if np.array_equal(branch_order, branch_orders(clip.branch_parent)):
-                del clip.attributes["branch_order"]
+        depths = branch_orders(clip.branch_parent) if clip.has_branches else None
+        if depths is not None and np.array_equal(clip.attributes.get("branch_order", ()), depths):
+            del clip.attributes["branch_order"]
         read_clip_metadata(clip)
         if clip.frame_count == 1:
             say_single_frame(self.path)
@@ -204,9 +203,11 @@ class _Clip:
                 return found[0].name
         several = ", ".join(each.shown for each in candidates[:LISTED])
         what = f"several, {several}" if candidates else "no such dataset"
+        apart = {_last(each.name).lower() for each in others} >= set("xyz")
+        hint = "; x, y and z in arrays of their own have to be stacked into one" if apart else ""
         raise ClipError(
-            f"positions: got {what}, expected (frames, vertices, 3); --dataset (dataset=) names the array, --axes "
-            f"(axes=) the order of its axes; {listing(stored)}"
+            f"positions: got {what}, expected (frames, vertices, 3){hint}; --dataset (dataset=) names the array, "
+            f"--axes (axes=) the order of its axes; {listing(stored)}"
         )
 
     def _say_chosen(self, chosen: Stored, candidates: Sequence[Stored]) -> None:
@@ -216,7 +217,7 @@ class _Clip:
             beside = f", not {others}" if others else ""
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
-    def _order(self, name: str, known: Mapping[str, Any], metadata: Mapping[str, Any]) -> Order:
+    def _order(self, name: str, known: Mapping[str, Any]) -> Order:
         stored = self.arrays.stored[name]
         stated = self.options.order or order_of_labels(self.arrays.labels(name))
         try:
@@ -242,7 +243,7 @@ class _Clip:
 
     def _of_schema(self) -> dict[str, np.ndarray | None]:
         known: dict[str, np.ndarray | None] = {}
-        for name in RESERVED_NAMES - {POSITIONS}:
+        for name in sorted(RESERVED_NAMES - {POSITIONS}):
             full = self._near(name)
             known[name] = None if full is None else self._array(name, full)
         if self.arrays.counts_from_1:
@@ -260,7 +261,8 @@ class _Clip:
         if name in ROWS and _is_row(self.arrays.stored[full]):
             values = values.reshape(-1)
         if self.arrays.counts_from_1 and name not in ("time", "rest") and values.dtype.kind == "f":
-            whole = values.astype(np.int64)
+            with np.errstate(invalid="ignore"):
+                whole = values.astype(np.int64)
             values = whole if np.array_equal(whole, values) else values
         return values
 
