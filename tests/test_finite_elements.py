@@ -420,8 +420,8 @@ REFUSED = {
         FENICS.replace('Format="HDF">a.h5:/Mesh/0/mesh/geometry', 'Format="XML">0 1 2'),
         "got 3 numbers",
     ),
-    "pieces": (FENICS.replace("<Grid>", '<Grid GridType="Collection">'), "have to be merged"),
-    "another reference": (FENICS.replace("<DataItem", '<DataItem Reference="XML"'), "got a reference"),
+    "pieces": (FENICS.replace("<Grid>", '<Grid GridType="Collection">'), "step 1: got 0 grids, expected 1"),
+    "another reference": (FENICS.replace("<DataItem", '<DataItem Reference="XML"'), "expected a path that is known"),
 }
 
 

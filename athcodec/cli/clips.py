@@ -77,7 +77,7 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
 
     if len(paths) != 1 or args.output:
         raise ClipError(f"--into: got {len(paths)} inputs or an output besides, expected one GLB and no other output")
-    for name in ("source_format", "mesh", "field", "unit", "up_axis"):
+    for name in ("source_format", "mesh", "field", "dataset", "axes", "unit", "up_axis"):
         if getattr(args, name) is not None:
             raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
     if args.rest not in ("auto", HOST) or args.exact_rest:
@@ -180,6 +180,8 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             fps=args.fps,
             mesh=args.mesh,
             field=args.field,
+            dataset=args.dataset,
+            axes=args.axes,
             only=args.only or (),
             takes=args.takes or (),
             allow_outside=args.allow_outside,

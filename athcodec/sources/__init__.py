@@ -26,24 +26,35 @@ from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
+from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
-) | {
-    "animated property",
-    "class that nothing inherits",
-    "framesPerSecond",
-    "inactive",
-    "keys outside of the stage's range",
-    "layer",
-    "metadata",
-    "skin that no node of the scene has",
-    "variant",
-    "warning of USD",
-}
+    "animation attribute element empty extension extras field hidden statement other".split(),
+    (
+        "animated property",
+        "class that nothing inherits",
+        "framesPerSecond",
+        "inactive",
+        "keys outside of the stage's range",
+        "layer",
+        "metadata",
+        "skin that no node of the scene has",
+        "variant",
+        "warning of USD",
+    ),
+    (
+        "note of a dataset",
+        "empty dataset",
+        "dataset of references or lists",
+        "pickled object",
+        "member",
+        "sparse matrix",
+    ),
+    NOT_KEPT.values(),
+)
 LISTED = 8
 MEANINGS = {
     "animation": ' (--takes all, takes="all": a clip of each)',
@@ -53,6 +64,7 @@ MEANINGS = {
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
@@ -72,6 +84,11 @@ class ReadOptions:
         The file that has the faces of a point cache, or of the vertices of a plant in MTG.
     field : str, optional
         Name of the displacement that is added to the points of a finite-element result.
+    dataset : str, optional
+        Path of the array with the positions in HDF5, NumPy and MATLAB files, or of its group.
+    axes : str or sequence of str, optional
+        The order of that array's axes, by default "frames,vertices,xyz"; "frames,vertices+xyz" where x, y and z of all
+        vertices lie in one axis, "vertices,xyz" for a single frame.
     only : sequence of str, optional
         Patterns (fnmatch) of the names of the prims, objects or meshes to read; all by default.
     takes : sequence of str or str, optional
@@ -90,13 +107,15 @@ class ReadOptions:
     Raises
     ------
     ValueError
-        For values that rest and fps cannot have.
+        For values that rest, fps, axes and max_memory cannot have.
     """
 
     rest: str = "auto"
     fps: float | None = None
     mesh: str | PathLike[str] | None = None
     field: str | None = None
+    dataset: str | None = None
+    axes: str | Sequence[str] | None = None
     only: Sequence[str] = ()
     takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
@@ -112,6 +131,13 @@ class ReadOptions:
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
+        if self.axes is not None:
+            parse_order(self.axes)
+
+    @property
+    def order(self) -> Order | None:
+        """The axes as motion/positions.py has them; None where they are not given."""
+        return None if self.axes is None else parse_order(self.axes)
 
 
 @dataclass(frozen=True)
@@ -134,6 +160,8 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    magic_places : tuple of int, optional
+        Where in its files `magic` may stand.
     """
 
     name: str
@@ -144,6 +172,11 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    magic_places: tuple[int, ...] = (0,)
+
+    def begins(self, head: bytes) -> bool:
+        """Whether the first bytes of a file are those of this format."""
+        return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
 
     @property
     def is_installed(self) -> bool:
@@ -167,8 +200,16 @@ class Format:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), magic=(b"\x89HDF\r\n\x1a\n",)),
-    Format("npz", "NumPy archive of the same schema", (".npz",)),
+    Format(
+        "hdf5",
+        "HDF5 of athcodec's schema or of other programs, VTKHDF, MATLAB 7.3",
+        (".h5", ".hdf5", ".hdf", ".vtkhdf"),
+        magic=(b"\x89HDF\r\n\x1a\n",),
+        magic_places=(0, 512, 1024, 2048),
+    ),
+    Format("npz", "NumPy archive, of the same schema or of other programs", (".npz",)),
+    Format("npy", "NumPy array of positions", (".npy",), magic=(b"\x93NUMPY",)),
+    Format("mat", "MATLAB up to 7.2", (".mat",), "matlab", ("scipy",), (b"MATLAB 5.0 MAT-file",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
@@ -214,8 +255,8 @@ def read(
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
-        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root, allow_outside,
-        max_memory.
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
+        allow_outside, max_memory.
 
     Returns
     -------
@@ -291,6 +332,11 @@ def find_format(path: str | PathLike[str]) -> Format:
         head = b"#"
     else:
         if os.path.isdir(path):
+            if any(os.path.exists(os.path.join(path, name)) for name in ("zarr.json", ".zarray", ".zgroup")):
+                raise ClipError(
+                    f"{os.fspath(path)}: is a zarr store, expected a file; in Python, athcodec.encode takes one of its "
+                    "arrays"
+                )
             raise ClipError(
                 f"{os.fspath(path)}: is a folder, expected a file: any one of numbered files stands for all, and "
                 "`athcodec batch` encodes many clips"
@@ -300,7 +346,7 @@ def find_format(path: str | PathLike[str]) -> Format:
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
     for candidate in FORMATS:
-        if head.startswith(candidate.magic or ()):
+        if candidate.begins(head):
             return candidate
     if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
         raise ClipError(f"{os.fspath(path)}: {hint}")
