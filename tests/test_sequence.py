@@ -118,7 +118,7 @@ def test_a_hyphen_before_a_number_is_no_sign_where_all_files_have_it(tmp_path):
 @pytest.mark.parametrize(
     "names",
     [
-        ["leaf_0.5.obj", "leaf_1.0.obj", "leaf_1.5.obj"],
+        ["leaf0.5.obj", "leaf1.0.obj", "leaf1.5.obj"],
         ["plant_03-20_AM.obj", "plant_03-20_PM.obj", "plant_03-21_AM.obj"],
         ["2024-03-31.obj", "2024-04-01.obj"],
         ["day12.5.obj", "day13.5.obj"],

@@ -43,6 +43,8 @@ NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
+FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtp", ".vtk", ".pvtu", ".pvtp", ".vtm")  # Formats with a file per frame.
+SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -168,12 +170,16 @@ FORMATS = (
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
-    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply")),
+    Format(
+        "sequence",
+        "numbered OBJ or PLY files, named by any one of them or a .series",
+        (".obj", ".ply", ".obj.series", ".ply.series"),
+    ),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
     Format(
         "vtk",
-        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtp", ".vtk", ".pvd"),
+        "VTU, VTP, VTK and their parallel pieces, named by any one of the files, a .pvd or a .series",
+        (".vtu", ".vtp", ".vtk", ".pvd", *FRAME_SUFFIXES[5:], *(f"{suffix}{SERIES}" for suffix in FRAME_SUFFIXES[2:])),
     ),
 )
 
@@ -259,9 +265,9 @@ def format_named(name: str, formats: Sequence[Format]) -> Format:
 
 def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    suffix = Path(path).suffix.lower()
+    name = Path(path).name.lower()
     for candidate in formats:
-        if suffix in candidate.suffixes:
+        if name.endswith(candidate.suffixes) and name not in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")

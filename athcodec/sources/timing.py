@@ -15,6 +15,7 @@ from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
 SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
+FINEST, MOST_FRAMES = 100, 10_000  # Limits of a rate that is advised: times the one that misses keys, and frames.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -50,14 +51,37 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
 
 def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str) -> None:
     """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames."""
-    if missed.any():
-        step = max(np.diff(keys).min(initial=0.25 / fps), SAME_TIME)
-        warnings.warn(
-            f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
-            f"there alone is missed; --fps {1 / step:.4g} has frames closer to them",
-            GuessWarning,
-            stacklevel=2,
-        )
+    if not missed.any():
+        return
+    met = keys[~missed]
+    rate = _rate_of_all(keys - (met[0] if len(met) else 0.0), fps)
+    if rate is None:
+        advice = f"--fps {plain_number(2 * fps)} has frames closer to them"
+    else:
+        advice = f"--fps {plain_number(rate)} has a frame at each of them"
+    warnings.warn(
+        f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
+        f"there alone is missed; {advice}",
+        GuessWarning,
+        stacklevel=2,
+    )
+
+
+def _rate_of_all(keys: np.ndarray, fps: float) -> float | None:
+    """The lowest multiple of a rate whose frames, one of them at 0, are at all keys; None where that takes too many."""
+    span = float(keys[-1] - keys[0])
+    for factor in range(2, FINEST + 1):
+        rate = factor * fps
+        if span * rate > MOST_FRAMES:
+            return None
+        if (np.abs(keys * rate - np.round(keys * rate)) <= SAME_TIME * rate).all():
+            return rate
+    return None
+
+
+def plain_number(number: float) -> str:
+    """The number as an option takes it and a person writes it: without an exponent."""
+    return np.format_float_positional(round(float(number), 6), trim="-")
 
 
 def whole(number: float) -> int | float:
