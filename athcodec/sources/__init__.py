@@ -41,9 +41,14 @@ MEANINGS = {
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    **dict.fromkeys(
+        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ),
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
-FRAME_SUFFIXES = (".obj", ".ply", ".vtu", ".vtp", ".vtk", ".pvtu", ".pvtp", ".vtm")  # Formats with a file per frame.
+_MESHES = (".obj", ".ply")
+_VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
+FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
 SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
@@ -173,13 +178,13 @@ FORMATS = (
     Format(
         "sequence",
         "numbered OBJ or PLY files, named by any one of them or a .series",
-        (".obj", ".ply", ".obj.series", ".ply.series"),
+        (*_MESHES, *(suffix + SERIES for suffix in _MESHES)),
     ),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
     Format(
         "vtk",
         "VTU, VTP, VTK and their parallel pieces, named by any one of the files, a .pvd or a .series",
-        (".vtu", ".vtp", ".vtk", ".pvd", *FRAME_SUFFIXES[5:], *(f"{suffix}{SERIES}" for suffix in FRAME_SUFFIXES[2:])),
+        (".vtu", ".vtp", ".vtk", ".pvd", *_VTK[3:], *(suffix + SERIES for suffix in _VTK)),
     ),
 )
 

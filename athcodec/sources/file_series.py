@@ -47,10 +47,10 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class StatedTime:
-    """What a file says of its own time, and where."""
+    """What a file says of its own time, and where; in float32 where it was rounded to that."""
 
     place: str
-    seconds: float
+    seconds: float | np.float32
     kind: Kind = Kind.TIME
 
 
@@ -214,11 +214,11 @@ def series_of(path: FilePath, options: ReadOptions) -> Series:
 
 def _warn_of_list(files: NumberedFiles) -> None:
     """Warn where the files are the pieces of one frame."""
-    whole = list_of(files.paths[0]) if len(files.paths) > 1 else None
+    whole = list_of(files.paths[0])
     if whole is not None:
         warnings.warn(
-            f"{files.paths[0]}: read as one of {len(files.paths)} frames, but {whole} lists it as a piece of one; name "
-            f"{whole} to read its pieces as one frame",
+            f"{files.paths[0]}: read as one of {len(files.paths)} frames, though {whole} lists it as a piece of one; "
+            f"name {whole} to read its pieces together",
             GuessWarning,
             stacklevel=2,
         )

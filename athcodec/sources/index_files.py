@@ -26,7 +26,7 @@ from athcodec.sources.numbering import some
 from athcodec.sources.xdmf import parse_xml
 
 PVD = ".pvd"
-LISTS = (".pvtu", ".pvtp", ".vtm", ".vtpd", ".vtpc")  # Files that list the pieces of one frame.
+LISTS = (".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")  # Files that list the pieces of one frame.
 JSON_BYTES = 300  # Bytes that a value of JSON takes.
 _JSON_MARKS = b",:[{"
 

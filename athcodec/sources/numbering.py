@@ -276,7 +276,16 @@ def files_to_read(path: FilePath) -> NumberedFiles:
     taken = {file.name for file in files.paths}
     form = _PLACES.sub("#", path.stem)
     others = _of_form(path, _PLACES, taken) if "#" in form else []
-    if others:
+    is_alone = len(taken) == 1 and not path.stem[-1:].isdigit()
+    pattern, similar = _pattern_of(path) if is_alone else ("", [])
+    if similar and set(others) <= set(similar):
+        warnings.warn(
+            f"{path}: read as one frame, without {some(similar)}, which differ in a number that is not the last of "
+            f"their names; {path.parent / pattern} names all of them as one motion",
+            GuessWarning,
+            stacklevel=2,
+        )
+    elif others:
         warnings.warn(
             f"{path}: read as {len(taken)} of {len(taken) + len(others)} files, without {some(others)}; frames differ "
             f"in the last number alone, written with as many zeros: to read all as one motion, call them "
@@ -284,15 +293,6 @@ def files_to_read(path: FilePath) -> NumberedFiles:
             GuessWarning,
             stacklevel=2,
         )
-    elif len(taken) == 1 and not path.stem[-1:].isdigit():
-        pattern, others = _pattern_of(path)
-        if others:
-            warnings.warn(
-                f"{path}: read as one frame, without {some(others)}, which differ in a number that is not the last "
-                f"of their names; {path.parent / pattern} names all of them as one motion",
-                GuessWarning,
-                stacklevel=2,
-            )
     return files
 
 

@@ -96,13 +96,15 @@ class Grid:
         """Raises ClipError for cells of a type that is not read, or with nodes that are no points."""
         return topology_of(blocks_of(*self.cells, VTK_NAMES), len(self.points))
 
-    def time(self) -> tuple[str, float] | None:
+    def time(self) -> tuple[str, float | np.float32] | None:
         """The field that states the time of the data set, and its value; one of STEP_NAMES where no other does."""
         known = {name.lower(): name for name in reversed(self.field_data)}
         for name in (*TIME_NAMES, *STEP_NAMES):
             values = self.field_data.get(known.get(name, ""))
             if values is not None and values.size == 1 and np.isfinite(values).all():
-                return known[name], float(values.reshape(-1)[0])
+                return known[name], values.reshape(-1)[0] if values.dtype == np.float32 else float(
+                    values.reshape(-1)[0]
+                )
         return None
 
 
@@ -122,6 +124,22 @@ def poly_cells(cells: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.n
         stops.append(ends + sum(map(len, nodes)))
         nodes.append(corners)
     return np.concatenate(types), np.concatenate(stops), np.concatenate(nodes)
+
+
+def lattice_cells(size: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(types, stops, nodes): hexahedra, quads or lines, along the axes that have more than one point."""
+    strides = np.cumprod([1, *size])[:3]
+    along = [axis for axis in range(3) if size[axis] > 1]
+    first = np.zeros(1, np.int64)
+    for axis in along:
+        first = (np.arange(size[axis] - 1)[:, None] * strides[axis] + first).reshape(-1)
+    corners = [0]
+    for axis in along:  # In the order of VTK: around each side, and the far side behind the near one.
+        far = [corner + int(strides[axis]) for corner in corners]
+        corners += far[::-1] if len(corners) == 2 else far
+    kind = {0: 1, 1: 3, 2: 9, 3: 12}[len(along)]
+    nodes = (first[:, None] + np.array(corners)).reshape(-1)
+    return np.full(len(first), kind), np.arange(1, len(first) + 1) * len(corners), nodes
 
 
 def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:

@@ -15,7 +15,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.reading import Budget
 from athcodec.sources.cells import NODE_BYTES
-from athcodec.sources.vtk_grid import STEP_NAMES, TIME_NAMES, Grid, poly_cells, starts_of
+from athcodec.sources.vtk_grid import STEP_NAMES, TIME_NAMES, Grid, lattice_cells, poly_cells, starts_of
 
 WORD_BYTES = 128  # Bytes that a word of text and the number made of it take.
 _MAGIC = re.compile(rb"# vtk DataFile Version +\d", re.IGNORECASE)
@@ -275,7 +275,7 @@ class _Legacy:
         size = self._dimensions()
         if int(np.prod(size, dtype=object)) != len(self._points):
             raise ClipError(f"DIMENSIONS: got {size} for {len(self._points)} points")
-        return self._points, *_lattice_cells(size)
+        return self._points, *lattice_cells(size)
 
     def _dimensions(self) -> list[int]:
         size = self._axes.get("DIMENSIONS", np.zeros(3, int)).tolist()
@@ -319,15 +319,12 @@ class _Legacy:
             self._keep(place, name, _word(words, 3, line), rows, width)
 
     def _keep(self, place: str, name: str, kind: str, count: int, width: int) -> None:
-        if kind.lower() in _STRINGS:
-            self._skip_strings(count * width)
-            self._left_out.append(name)
-            return
-        values = self._array(kind, count, width)
-        if place == "FIELD" and name.lower() not in (*TIME_NAMES, *STEP_NAMES):
-            self._left_out.append(f"{name} (field data)")
-        else:
+        is_string = kind.lower() in _STRINGS
+        values = self._skip_strings(count * width) if is_string else self._array(kind, count, width)
+        if values is not None and (place != "FIELD" or name.lower() in (*TIME_NAMES, *STEP_NAMES)):
             self._data_of[place][name] = values
+        else:
+            self._left_out.append(f"{name} (field data)" if place == "FIELD" else name)
 
 
 def _word(words: list[str], place: int, line: str) -> str:
@@ -347,19 +344,3 @@ def _lattice(axes: list[np.ndarray]) -> np.ndarray:
     """(N, 3) points of a lattice, x first."""
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     return np.stack([x, y, z], axis=-1).reshape(-1, 3)
-
-
-def _lattice_cells(size: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(types, stops, nodes): hexahedra, quads or lines, along the axes that have more than one point."""
-    strides = np.cumprod([1, *size])[:3]
-    along = [axis for axis in range(3) if size[axis] > 1]
-    first = np.zeros(1, np.int64)
-    for axis in along:
-        first = (np.arange(size[axis] - 1)[:, None] * strides[axis] + first).reshape(-1)
-    corners = [0]
-    for axis in along:  # In the order of VTK: around each side, and the far side behind the near one.
-        far = [corner + int(strides[axis]) for corner in corners]
-        corners += far[::-1] if len(corners) == 2 else far
-    kind = {0: 1, 1: 3, 2: 9, 3: 12}[len(along)]
-    nodes = (first[:, None] + np.array(corners)).reshape(-1)
-    return np.full(len(first), kind), np.arange(1, len(first) + 1) * len(corners), nodes

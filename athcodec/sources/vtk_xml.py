@@ -1,8 +1,8 @@
-"""Reads VTK's XML files: the data sets of .vtu and .vtp, and what .pvtu, .pvtp and .vtm list.
+"""Reads VTK's XML files: the data sets of .vtu, .vtp and .vts, and what .pvtu, .pvtp, .pvts, .vtm ... list.
 
-Text, base64 and appended data, plain or packed by zlib or LZMA. The pieces of a file are joined. Not read: structured
-data sets, polyhedra, several time steps in one file, arrays of strings, names of components, other information on
-arrays.
+Text, base64 and appended data, plain or packed by zlib or LZMA. The pieces of a file are joined. Not read: images and
+rectilinear grids, polyhedra, several time steps in one file, arrays of strings, names of components, other information
+on arrays.
 """
 
 from __future__ import annotations
@@ -22,7 +22,16 @@ from athcodec.errors import ClipError
 from athcodec.files.reading import Budget
 from athcodec.sources.cells import NODE_BYTES
 from athcodec.sources.scene_objects import OWN, scene_of_json
-from athcodec.sources.vtk_grid import POLY_CELLS, STEP_NAMES, TIME_NAMES, Grid, joined, poly_cells, starts_of
+from athcodec.sources.vtk_grid import (
+    POLY_CELLS,
+    STEP_NAMES,
+    TIME_NAMES,
+    Grid,
+    joined,
+    lattice_cells,
+    poly_cells,
+    starts_of,
+)
 from athcodec.sources.xdmf import TEXT_BYTES, parse_xml
 
 _TYPES = {
@@ -42,11 +51,12 @@ _UNPACKERS: dict[str, Callable[[int], Any]] = {
     "vtkLZMADataCompressor": lambda room: lzma.LZMADecompressor(memlimit=room),
 }
 """Makers of what unpacks a block, given the bytes of memory that it may take."""
-_DATA_SETS = ("UnstructuredGrid", "PolyData")
+_DATA_SETS = ("UnstructuredGrid", "PolyData", "StructuredGrid")
 # Types of files that list others: the tag and the attribute that name a file.
 _LISTS = {
     "PUnstructuredGrid": ("Piece", "Source"),
     "PPolyData": ("Piece", "Source"),
+    "PStructuredGrid": ("Piece", "Source"),
     "vtkMultiBlockDataSet": ("DataSet", "file"),
     "vtkPartitionedDataSet": ("DataSet", "file"),
     "vtkPartitionedDataSetCollection": ("DataSet", "file"),
@@ -158,12 +168,22 @@ class VtkXml:
         stated = piece.get("NumberOfPoints")
         if stated is not None and int(stated) != len(found):
             raise ClipError(f"points: got {len(found)}, expected {int(stated)}")
-        if self._type == "PolyData":
+        if self._type == "StructuredGrid":
+            types, stops, nodes = self._lattice(piece, len(found))
+        elif self._type == "PolyData":
             types, stops, nodes = poly_cells({tag: self._cells(piece, tag)[1:] for tag in POLY_CELLS})
         else:
             types, stops, nodes = self._cells(piece, "Cells")
         data = [self._arrays(piece, tag) for tag in ("PointData", "CellData")]
         return Grid(found, types, starts_of(stops), stops, nodes, *data)
+
+    def _lattice(self, piece: ElementTree.Element, point_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        ends = [int(number) for number in (piece.get("Extent") or "").split()]
+        size = [last - first + 1 for first, last in zip(ends[::2], ends[1::2])]
+        if len(size) != 3 or min(size) < 1 or size[0] * size[1] * size[2] != point_count:
+            raise ClipError(f"got the extent {piece.get('Extent')!r} of {point_count} points, expected one that fits")
+        self._budget.need(8 * NODE_BYTES * point_count, "cells")
+        return lattice_cells(size)
 
     def _cells(self, piece: ElementTree.Element, tag: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Types, ends and nodes of cells; none of what the file does not list."""
