@@ -24,10 +24,10 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
-from athcodec.sources import FORMATS, FRAME_SUFFIXES, NUMBER_PATTERN, is_pattern
+from athcodec.sources import FORMATS, FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, is_pattern
 from athcodec.sources.numbering import each_once, numbered_files
 
-SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
+SUFFIXES = (SERIES, *(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES))
 TAGS = (
     "ETag",
     "Last-Modified",

@@ -128,6 +128,8 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    has_series : bool, optional
+        Whether the times of its files may be in an index with the suffix .series behind theirs.
     """
 
     name: str
@@ -138,6 +140,7 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    has_series: bool = False
 
     @property
     def is_installed(self) -> bool:
@@ -175,17 +178,9 @@ FORMATS = (
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
-    Format(
-        "sequence",
-        "numbered OBJ or PLY files, named by any one of them or a .series",
-        (*_MESHES, *(suffix + SERIES for suffix in _MESHES)),
-    ),
+    Format("sequence", "OBJ or PLY: numbered files, or their .series", _MESHES, has_series=True),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
-    Format(
-        "vtk",
-        "VTU, VTP, VTK and their parallel pieces, named by any one of the files, a .pvd or a .series",
-        (".vtu", ".vtp", ".vtk", ".pvd", *_VTK[3:], *(suffix + SERIES for suffix in _VTK)),
-    ),
+    Format("vtk", "VTK: numbered files, or their .pvd or .series", (*_VTK, ".pvd"), has_series=True),
 )
 
 
@@ -272,7 +267,7 @@ def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Fo
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
     name = Path(path).name.lower()
     for candidate in formats:
-        if name.endswith(candidate.suffixes) and name not in candidate.suffixes:
+        if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
     raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -29,6 +30,7 @@ PVD = ".pvd"
 LISTS = (".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")  # Files that list the pieces of one frame.
 JSON_BYTES = 300  # Bytes that a value of JSON takes.
 _JSON_MARKS = b",:[{"
+_LISTED = re.compile(rb"""(?:file|Source)\s*=\s*["']([^"'\0]+)["']""")
 
 
 @dataclass(frozen=True)
@@ -206,8 +208,9 @@ def index_of(path: Path, frames: Sequence[Path], allow_outside: bool, max_memory
 def list_of(path: Path) -> Path | None:
     """A file, in the folder of another or the folder above, that lists it as a piece of one frame."""
     for file in _above(path, lambda name: name.lower().endswith(LISTS)):
-        with suppress(OSError, ClipError):
-            if path.name.encode() in read_plain(file, Budget()):
+        with suppress(OSError, ClipError, ValueError):
+            names = [name.decode() for name in _LISTED.findall(read_plain(file, Budget()))]
+            if file != path and os.path.abspath(path) in {os.path.abspath(file.parent / name) for name in names}:
                 return file
     return None
 

@@ -331,9 +331,9 @@ def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
     column, names = (0, file.objects) if file.objects.names else (1, file.groups)
     if names.names:
         _add_parts(mesh, _vertex_labels(mesh, file, labels[:, column], column), names.names)
-    are_parts = "part_names" in mesh.metadata
-    if column == 0 and file.objects.names and not are_parts:
-        file.not_read[b"o"] = None  # Objects whose vertices do not lie together.
+    are_parts = len(mesh.metadata.get("part_names", ())) == len(names.names)
+    if column == 0 and not are_parts:
+        file.not_read[b"o"] = None  # Objects whose vertices do not lie together, or that have none of their own.
     if len(file.groups.names) > 1 and (column == 0 or not are_parts):
         _add_face_names(mesh, "face_group", labels[:, 1], "group_names", file.groups.names)
     elif file.groups.names and not (column == 1 and are_parts):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import binascii
 import lzma
+import os
 import zlib
 from os import fspath
 from pathlib import Path
@@ -30,7 +31,7 @@ from athcodec.sources.vtk_legacy import is_legacy, read_legacy
 from athcodec.sources.vtk_xml import VtkXml
 
 STEPS_HELD = 3  # Data sets that are held at once: the first, the latest, and one that is read.
-LEVELS = 4  # How deep files may list files.
+MOST_FILES, LEVELS = 1 << 16, 8  # How many files a frame may be in, and how deep files may list files.
 _BROKEN = (
     ValueError,
     KeyError,
@@ -146,12 +147,16 @@ class _Steps:
     def _grid(self, step: int) -> Grid:
         if self._now is None or self._now[0] != step:
             files, budget = self._series.frames[step], Budget(self._max_memory)
-            grids = [self._read(file, budget, LEVELS) for file in files]
+            self._file_count = 0
+            grids = [self._read(file, budget) for file in files]
             self._now = step, joined(grids, self._series.parts)
         return self._now[1]
 
-    def _read(self, path: Path, budget: Budget, levels: int) -> Grid:
-        """The data set in a file, or in those that it lists."""
+    def _read(self, path: Path, budget: Budget, above: tuple[Path, ...] = ()) -> Grid:
+        """The data set in a file, or in those that it lists; above: the files that list it."""
+        self._file_count += 1
+        if self._file_count > MOST_FILES:
+            raise ClipError(f"{above[0]}: got more than {MOST_FILES} files, expected fewer for one frame")
         if path.is_dir():
             raise ClipError(f"{path}: got a folder, expected a plain file")
         data = read_plain(path, budget)
@@ -162,12 +167,13 @@ class _Steps:
             listed = file.files()
             if listed is None:
                 return file.grid()
-            if not levels:
-                raise ClipError(f"got files that list files more than {LEVELS} deep, expected data")
             paths = [file_beside(path.parent, one.file, self._options.allow_outside) for one in listed]
+            listing = {os.path.abspath(file) for file in (path, *above)}
+            if len(above) >= LEVELS or not listing.isdisjoint(map(os.path.abspath, paths)):
+                raise ClipError(f"lists itself, or files more than {LEVELS} deep, expected files with data")
         for piece in paths:
             self.unchanged.add(piece)
-        grids = [self._read(piece, budget, levels - 1) for piece in paths]
+        grids = [self._read(piece, budget, (*above, path)) for piece in paths]
         whole = joined(grids, [one.name for one in listed])
         with naming(path, *_BROKEN):
             fields, _, others = file.fields()
