@@ -11,6 +11,7 @@ import pytest
 
 import athcodec
 from athcodec.errors import ClipError, GuessWarning, SourceWarning
+from athcodec.sources.mtg import mtg_branches
 from athcodec.sources.timing import warn_of_missed
 
 TIMES = [0.0, 0.1, 0.25, 0.3, 0.5, 0.9]
@@ -151,6 +152,7 @@ def test_numbers_that_do_not_follow_one_another_are_said_and_the_advice_works(tm
     [
         (np.array([0, 2e-4, 1.0, 2.0]), 30, 60),  # No rate of a useful number of frames has all of them.
         (np.array([0, 0.0125, 1 / 24]), 24, 240),
+        (np.array([0, 1.234, 1.238, 3]), 30, 500),
         (np.array([1, 1.25, 1.5, 7.125]), 2, 8),
         (np.array([1 / 3, 0.5]), 1, 6),  # No key of the stage is on a frame: its frames begin at a whole one.
     ],
@@ -177,6 +179,31 @@ def test_parts_of_one_time_in_a_pvd_are_joined(tmp_path):
         assert clip.block(0, 2)[:, [0, 3], 2].tolist() == [[0, 2], [1, 3]] and clip.time.tolist() == [0, 0.5]
         assert clip.faces.tolist() == [[0, 1, 2], [3, 4, 5]] and clip.metadata["part_names"] == ["leaf", "stem"]
         assert clip.attributes["part_vertex_counts"].tolist() == [3, 3]
+
+
+def test_what_a_mesh_or_a_plant_says_and_is_not_read_is_named(tmp_path):
+    with write(tmp_path / "a.obj", 0).open("a") as file:
+        file.write("vn 0 0 1\nc_interp on\n")
+    write(tmp_path / "a.ply", 0, comment="comment TextureFile a.png\n")
+    for path, names in ((tmp_path / "a.obj", ["vn", "c_interp"]), (tmp_path / "a.ply", ["TextureFile"])):
+        with athcodec.read(path) as clip:
+            assert clip.not_read == {"statement": names}
+    with (tmp_path / "a.obj").open("a") as file:
+        file.write("curv2 1 2 3\n")
+    with pytest.warns(SourceWarning, match="not read: curve or surface curv2"):
+        athcodec.read(tmp_path / "a.obj").close()
+    plant = tmp_path / "a.mtg"
+    plant.write_text("CODE: FORM-A\nCLASSES:\n$\t0\nP\t1\nMTG:\nTOPO\tdiam\n/P1\t1\n*\t2\n^<P2\t3\n")
+    clip = athcodec.MotionClip(np.zeros((1, 2, 3)), np.zeros(1))
+    with pytest.warns(SourceWarning, match=r"not read: features diam; 1 row of later dates \(\*\)"):
+        assert mtg_branches(plant, clip)[0].tolist() == [0, 0]
+
+
+def test_numbered_files_of_a_format_that_has_all_frames_in_one_are_said(tmp_path):
+    for frame in range(2):
+        np.savez(tmp_path / f"leaf_{frame}.npz", positions=np.zeros((1, 3, 3)), time=np.zeros(1))
+    with pytest.warns(GuessWarning, match=r"leaf_0\.npz: read as one frame, without leaf_1\.npz"):
+        athcodec.read(tmp_path / "leaf_0.npz").close()
 
 
 # ---- times in files ----
@@ -407,7 +434,11 @@ REFUSED = {
         '<DataSet file="c" timestep="1" part="1"/></VTKFile>',
         "got 2 files at the time 1, expected the 1 parts",
     ),
-    "no suffix of files": ("a.series", '{"files": []}', "got an unknown format, expected one of .*vtu.series"),
+    "no suffix of files": (
+        "a.series",
+        '{"files": []}',
+        "got an unknown format, an index has the suffix of its files, too: NAME.vtu.series",
+    ),
 }
 
 

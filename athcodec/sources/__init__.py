@@ -12,6 +12,7 @@ import os
 import re
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
@@ -77,7 +78,8 @@ class ReadOptions:
     root : int or sequence of int, optional
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
-        Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
+        Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
+        refused.
     max_memory : int, optional
         Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
         one file of it takes besides.
@@ -236,9 +238,27 @@ def read(
         clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
+        if clip.frame_count == 1 and not kind.has_series:
+            _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
+
+
+def _warn_of_frames(path: str | PathLike[str]) -> None:
+    """Warn of a file whose format has all frames in one file, where others beside it are numbered like frames."""
+    from athcodec.sources.numbering import numbered_files, some  # They import this module.
+
+    others: list[str] = []
+    with suppress(ClipError, OSError):
+        others = [file.name for file in numbered_files(path).paths if file != Path(path)]
+    if others:
+        warnings.warn(
+            f"{os.fspath(path)}: read as one frame, without {some(others)}: numbered files of this format are not read "
+            "as one motion; write all frames into one file, or numbered OBJ, PLY or VTK files",
+            GuessWarning,
+            stacklevel=3,
+        )
 
 
 def listed(not_read: Mapping[str, Sequence[str]]) -> str:
@@ -270,7 +290,8 @@ def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Fo
         if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
+    hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}{hint}")
 
 
 def find_format(path: str | PathLike[str]) -> Format:

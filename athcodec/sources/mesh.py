@@ -32,7 +32,7 @@ PLY_ELEMENTS = ("vertex", "face", "edge")
 STRUCTURE = {"part_vertex_counts", "part_copies", "face_vertex_counts", "face_vertex_indices"}
 NAMED = {FACE_MATERIAL: "material_names", "face_group": "group_names"}  # Arrays whose numbers stand for names.
 # Statements of OBJ that are shapes of a kind that is not read, the last of them of older versions.
-FREE_FORM = ("curv", "curv2", "surf", "bsp", "bzp", "cdc", "cdp", "fo")
+FREE_FORM = ("curv", "curv2", "surf", "bsp", "bzp", "cdc", "cdp")
 INCLUDED = "call"  # The statement of OBJ that has another file read in its place.
 COMMENT_BYTES = 4096  # Where comments are looked for that concern the whole file.
 POLYPAINT = b"#MRGB"  # Colours of vertices, which ZBrush writes as comments.

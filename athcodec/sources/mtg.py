@@ -112,7 +112,7 @@ def _name_others(path: FilePath, mtg: Mtg) -> None:
     """Warn of what the file says and no branch has."""
     features = [name for name in mtg.features if name not in (*_coordinates(list(mtg.features)), ALIAS)]
     others = [f"features {', '.join(features)}"] if features else []
-    others += [f"{mtg.later_rows} rows of later dates (*)"] if mtg.later_rows else []
+    others += [f"{mtg.later_rows} row{'s' * (mtg.later_rows != 1)} of later dates (*)"] if mtg.later_rows else []
     if others:
         warnings.warn(
             f"{fspath(path)}: read for its branches alone; not read: {'; '.join(others)}", SourceWarning, stacklevel=3

@@ -68,13 +68,12 @@ def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str) 
 
 
 def _rate_of_all(keys: np.ndarray, fps: float) -> float | None:
-    """The lowest multiple of a rate whose frames, one of them at 0, are at all keys; None where that takes too many."""
-    span = float(keys[-1] - keys[0])
-    for factor in range(2, FINEST + 1):
-        rate = factor * fps
-        if span * rate > MOST_FRAMES:
-            return None
-        if (np.abs(keys * rate - np.round(keys * rate)) <= SAME_TIME * rate).all():
+    """The lowest rate, a whole number or a multiple of fps, whose frames, one of them at 0, are at all keys; None where
+    that takes too many frames."""
+    highest = min(FINEST * fps, MOST_FRAMES / max(float(np.ptp(keys)), SAME_TIME))
+    multiples = fps * np.arange(2, int(highest / fps) + 1)
+    for rate in sorted({*multiples.tolist(), *map(float, range(int(fps) + 1, int(highest) + 1))}):
+        if (np.abs(keys * rate - np.round(keys * rate)) <= min(SAME_TIME * rate, 0.01)).all():
             return rate
     return None
 
