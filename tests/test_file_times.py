@@ -297,7 +297,9 @@ def test_times_in_comments_are_taken_and_said(tmp_path, suffix, comment):
 
 
 @pytest.mark.formats
-@pytest.mark.parametrize("text", ["time 12:30:01", "Time 2024-03-31", "runtime 3", "timestamp 17", "t 5", "time 3.4.5"])
+@pytest.mark.parametrize(
+    "text", ["time 12:30:01", "Time 2024-03-31", "runtime 3", "timestamp 17", "t 5", "export time: 3", "time 3.4.5"]
+)
 def test_other_numbers_in_comments_are_no_times(tmp_path, text):
     files = write_all(tmp_path, ["a_1.obj", "a_2.obj"], comment=[f"# {text}\n", f"# {text}1\n"])
     assert read(files[0]) == ([0, 1], close([0, 1 / 30]))
@@ -405,7 +407,7 @@ def test_an_index_and_files_that_state_other_times_are_said(tmp_path):
     write_all(tmp_path, names, field=list(map(xml_field, [0, 0.2, 0.4])))
     assert read(pvd(tmp_path / "same.pvd", names, [0, 0.2, 0.4])) == ([0, 1, 2], close([0, 0.2, 0.4]))
     index = pvd(tmp_path / "other.pvd", names, [0, 0.1, 0.2])
-    text = r"other\.pvd has 0\.1 for leaf_1\.vtu, and is taken; the file has 0\.2 in the field TimeValue"
+    text = r"other\.pvd: the index has 0\.1 for leaf_1\.vtu, and is taken; the file has 0\.2 in the field TimeValue"
     assert read(index, text) == ([0, 1, 2], close([0, 0.1, 0.2]))
 
 
@@ -487,6 +489,11 @@ def test_decimals_are_read_wherever_they_stand(tmp_path, names, times):
 
 WHOLE = {
     "a name and a frame": (["sim2.0001", "sim2.0002", "sim2.0003"], [1, 2, 3], []),
+    "a name with 0 and a frame": (
+        ["leaf0.001", "leaf0.002"],
+        [1, 2],
+        ["the digits behind the point in the names are taken for the frames 1, 2; if the numbers are decimals"],
+    ),
     "a name of a number and a frame": (
         ["sim_2.0001", "sim_2.0002"],
         [1, 2],

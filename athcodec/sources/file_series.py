@@ -31,9 +31,11 @@ from athcodec.sources.timing import numbered_times, plain_number, times_in_secon
 SAME = 1e-5  # Largest relative difference of times that two places state alike.
 SHOWN = 3  # Times or numbers in a message.
 HEAD_BYTES = 4096  # Where a text states a time, it does so at its beginning.
+# A time in a comment is what the comment, or a part of it, begins with: "export time: 3 s" is none.
 _IN_TEXT = re.compile(
-    r"(?<![^\W_])(?:(?:time|timevalue)\s*[:=]?|t\s*=)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?![\w:/.-]*[\w:/])",
-    re.IGNORECASE,
+    r"(?:^|[,;|(\[]|\b(?:simulation|at)\b)\s*(?:(?:time|timevalue)\s*[:=]?|t\s*=)\s*"
+    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?![\w:/.-]*[\w:/])",
+    re.IGNORECASE | re.MULTILINE,
 )
 
 
@@ -56,8 +58,8 @@ class StatedTime:
 
 def time_in_text(place: str, text: str) -> StatedTime | None:
     """The time that a comment states, as in "time = 0.25 s"; None where it states none."""
-    found = _IN_TEXT.search(text)
-    return StatedTime(f"{place} {found[0].strip()!r}", float(found[1]), Kind.TEXT) if found else None
+    match = _IN_TEXT.search(text)
+    return StatedTime(f"{place} {match[0].strip(' ,;|([')!r}", float(match[1]), Kind.TEXT) if match else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,9 @@ class Series:
 
     def hears(self, stated: Sequence[StatedTime | None]) -> bool:
         """Whether the times that files state are taken, or compared with those of the index."""
-        return len(self.frames) > 1 and (self.times is not None or _usable(stated) is not None)
+        if self.times is not None:
+            return any(time is not None and time.kind is Kind.TIME for time in stated)
+        return len(self.frames) > 1 and _usable(stated) is not None
 
     def clock(
         self, stated: Sequence[StatedTime | None], options: ReadOptions, fps: float | None = None
@@ -121,12 +125,12 @@ class Series:
         """
         rate = options.fps or fps
         if self.times is not None:
-            self._compare(self.times, stated, f"{self.index} has", "and is taken")
+            self._compare(self.times, stated, "the index has", "and is taken")
             return self._in_seconds(self.times, rate)
         seconds = _usable(stated) if len(self.frames) > 1 else None
         if seconds is not None:
             if self.has_decimals and self.numbers is not None:
-                self._compare(self.numbers, stated, "the names of the files have", "which is not taken")
+                self._compare(self.numbers, stated, "the name has", "and is not taken")
             kind = next(time.kind for time in stated if time is not None)
             if kind is not Kind.TIME:
                 self._warn(
@@ -153,19 +157,20 @@ class Series:
 
     def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], who: str, then: str) -> None:
         """Warn where files state another time than `times`."""
-        for time, own, frame in zip(times.tolist(), stated, self.frames):
-            if own is None or own.kind is not Kind.TIME:
+        for time, statement, frame in zip(times.tolist(), stated, self.frames):
+            if statement is None or statement.kind is not Kind.TIME:
                 continue
-            if abs(own.seconds - time) > SAME * max(abs(time), abs(own.seconds)):
+            if abs(statement.seconds - time) > SAME * max(abs(time), abs(statement.seconds)):
                 self._warn(
-                    f"{who} {time:.10g} for {frame[0].name}, {then}; the file has {own.seconds:.10g} in {own.place}"
+                    f"{who} {time:.10g} for {frame[0].name}, {then}; the file has {statement.seconds:.10g} in "
+                    f"{statement.place}"
                 )
                 return
 
     def _warn_of_numbers(self, rate: float | None, stated: Sequence[StatedTime | None]) -> None:
         assert self.numbers is not None
         if any(stated):
-            values = [None if own is None else own.seconds for own in stated]
+            values = [None if time is None else time.seconds for time in stated]
             self._warn(
                 f"{_place(stated)} ({_shown(values)}) states no time for each of the {len(values)} files, and the "
                 f"numbers in their names are taken; {self._advice}"

@@ -47,10 +47,10 @@ class Numbering:
     @classmethod
     def of_pattern(cls, path: Path) -> Numbering | None:
         """Return the pattern of a name with # or %04d in it; None where there is none."""
-        found = NUMBER_PATTERN.fullmatch(path.name)
-        if found is None:
+        match = NUMBER_PATTERN.fullmatch(path.name)
+        if match is None:
             return None
-        prefix, marks, width, suffix = found.groups()
+        prefix, marks, width, suffix = match.groups()
         return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
 
     def path(self, number: int) -> Path:
@@ -59,13 +59,13 @@ class Numbering:
 
     def files(self) -> dict[int, Path]:
         """The files that are there, by their numbers, in that order."""
-        found = {}
+        files = {}
         for name, sign, digits in _numbered(self.folder, self.prefix, self.suffix):
             longer = len(digits) - self.width
             is_padded = longer == 0 or longer > 0 and digits[0] != "0" or longer == -1 and sign  # -001 beside 0000
             if is_padded and len(digits) <= len(str(LARGEST_NUMBER)) and not (sign and int(digits) == 0):
-                found[int(sign + digits)] = self.folder / name
-        return dict(sorted(found.items()))
+                files[int(sign + digits)] = self.folder / name
+        return dict(sorted(files.items()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,10 +124,9 @@ def numbered_files(path: FilePath) -> NumberedFiles:
         if not files.paths:
             raise ClipError(f"{fspath(path)}: got no such files, expected some like {numbering.path(1).name}")
         return files
-    found = _at_end(path)
-    if len(found.paths) == 1 and (behind := _behind_t(path)) is not None:
-        return behind
-    return found
+    files = _at_end(path)
+    behind = _behind_t(path) if len(files.paths) == 1 else None
+    return files if behind is None else behind
 
 
 def _at_end(path: Path) -> NumberedFiles:
@@ -192,12 +191,11 @@ class _Decimals:
     def of(cls, folder: Path, prefix: str, suffix: str, hyphen: str = "") -> _Decimals:
         """hyphen: a sign behind the prefix that may be a hyphen; it is one where all files have it."""
         form = re.compile(re.escape(prefix) + _DECIMAL + re.escape(suffix))
-        found = [(match, name) for name in os.listdir(folder) if (match := form.fullmatch(name))]
-        if hyphen and all(match[1] for match, _ in found):
-            prefix += hyphen
-            found = [(match, name) for name in os.listdir(folder) if (match := _after(prefix, suffix, name))]
+        matches = [(match, name) for name in os.listdir(folder) if (match := form.fullmatch(name))]
+        if hyphen and all(match[1] for match, _ in matches):
+            return cls.of(folder, prefix + hyphen, suffix)
         is_glued = (_word_before(prefix) or "t") not in _TIME_WORDS
-        numbers = [_Decimal(name, match[1] + match[2], match[3] or "", match[4] or "") for match, name in found]
+        numbers = [_Decimal(name, match[1] + match[2], match[3] or "", match[4] or "") for match, name in matches]
         numbers = [number for number in numbers if not (is_glued and number.exponent)]
         numbers = [number for number in numbers if abs(number.value) <= LARGEST_NUMBER]
         return cls(folder, prefix, tuple(sorted(numbers, key=lambda number: (number.value, number.file))))
@@ -222,14 +220,14 @@ class _Decimals:
         digits = {len(number.behind) for number in broken}
         if len(digits) > 1:  # No decimals end with 0 where others are shorter: 2.9, 2.10 count frames.
             return "frames" if any(len(n.behind) > 1 and n.behind.endswith("0") for n in broken) else "decimals"
+        is_wide = digits.pop() >= FRAME_DIGITS
         wholes = {number.whole for number in broken}
         if len(wholes) > 1:
-            if word or (self._follow(broken, named) and not self._are_even()):
-                return "frames"
-            return "decimals"
-        if word:
-            return "decimals" if wholes == {"0"} and digits.pop() < FRAME_DIGITS else "frames"
-        counts = len(broken) == len(self.numbers) and self._follow(broken, broken[0].file)
+            counts = is_wide and self._follow(broken, named) and not self._are_even()
+            return "frames" if word or counts else "decimals"
+        if word:  # tree2.0001 is a frame of tree2, leaf0.25 is none of leaf0, and leaf0.001 may be either.
+            return "frames" if wholes != {"0"} else "doubtful" if is_wide else "decimals"
+        counts = is_wide and len(broken) == len(self.numbers) and self._follow(broken, broken[0].file)
         return "doubtful" if counts and wholes != {"0"} else "decimals"
 
     @staticmethod
@@ -237,8 +235,7 @@ class _Decimals:
         """Whether the digits behind the point, of files with the same before it as the named one, count frames."""
         whole = next((number.whole for number in broken if number.file == named), broken[0].whole)
         behind = sorted(int(number.behind) for number in broken if number.whole == whole)
-        is_wide = len(broken[0].behind) >= FRAME_DIGITS
-        return is_wide and len(behind) > 1 and behind == list(range(behind[0], behind[-1] + 1))
+        return len(behind) > 1 and behind == list(range(behind[0], behind[-1] + 1))
 
     def _are_even(self) -> bool:
         steps = np.diff([number.value for number in self.numbers])
@@ -262,10 +259,6 @@ def _word_before(prefix: str) -> str:
     """The letters, in lower case, that a number follows at once."""
     word = _WORD.search(prefix)
     return word[0].lower() if word else ""
-
-
-def _after(prefix: str, suffix: str, name: str) -> re.Match[str] | None:
-    return re.fullmatch(re.escape(prefix) + _DECIMAL + re.escape(suffix), name)
 
 
 def files_to_read(path: FilePath) -> NumberedFiles:

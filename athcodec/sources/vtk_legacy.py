@@ -258,7 +258,9 @@ class _Legacy:
             size, zero = self._dimensions(), np.zeros(3)
             step = self._axes.get("SPACING", self._axes.get("ASPECT_RATIO", np.ones(3)))
             origin = self._axes.get("ORIGIN", zero)
-            with np.errstate(over="ignore", invalid="ignore"):  # Values that do not fit are refused where they are used.
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # Values that do not fit are refused where they are used.
                 self._points = _lattice([origin[i] + step[i] * np.arange(size[i]) for i in range(3)])
         elif self._kind == "RECTILINEAR_GRID":
             axes = [self._axes.get(name, np.zeros(1)) for name in _AXES]
