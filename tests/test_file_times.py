@@ -143,7 +143,7 @@ def test_numbers_that_do_not_follow_one_another_are_said_and_the_advice_works(tm
         assert clip.time.tolist() == close([0, 40 / 30, 80 / 30])
     (message,) = [str(warning.message) for warning in said]
     assert "0, 40, 80, do not follow one another and are taken for frames, of which 30 are a second" in message
-    rate = re.search(r"--fps RATE says how many are a second, such as (\S+) for 30 files", message)[1]
+    rate = re.search(r"--fps RATE says how many are a second, and --fps (\S+) gives 30 files a second", message)[1]
     assert read(files[0], fps=float(rate)) == ([0, 1, 2], close([0, 1 / 30, 2 / 30]))
 
 

@@ -188,7 +188,8 @@ class Series:
             )
         elif rate is None and (steps != 1).any():
             even = f", {steps[0] / DEFAULT_FPS:.4g} s apart" if (steps == steps[0]).all() else ""
-            advice = f", such as {plain_number(steps[0] * DEFAULT_FPS)} for {DEFAULT_FPS:g} files" if even else ""
+            whole = plain_number(steps[0] * DEFAULT_FPS)
+            advice = f", and --fps {whole} gives {DEFAULT_FPS:g} files a second" if even else ""
             self._warn(
                 f"the numbers in the names, {numbers}, do not follow one another and are taken for frames, of which "
                 f"{DEFAULT_FPS:g} are a second{even}; --fps RATE says how many are a second{advice}"
