@@ -449,7 +449,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument(
         "--allow-outside",
         action="store_true",
-        help="let XDMF, PVD, HDF5 and USD files name files outside of their own folder",
+        help="let XDMF, VTK, .series, HDF5 and USD files name files outside of their own folder",
     )
     source.add_argument(
         "--max-memory",

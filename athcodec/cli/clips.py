@@ -38,7 +38,7 @@ from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
-from athcodec.sources.sequence import each_once
+from athcodec.sources.numbering import each_once
 
 if TYPE_CHECKING:
     from athcodec.exporters.gltf_into import Into

@@ -12,6 +12,7 @@ import os
 import re
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
@@ -65,8 +66,15 @@ ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
     ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
+    **dict.fromkeys(
+        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ),
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
+_MESHES = (".obj", ".ply")
+_VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
+FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
+SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -99,7 +107,8 @@ class ReadOptions:
     root : int or sequence of int, optional
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
-        Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
+        Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
+        refused.
     max_memory : int, optional
         Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
         one file of it takes besides.
@@ -162,6 +171,8 @@ class Format:
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
     magic_places : tuple of int, optional
         Where in its files `magic` may stand.
+    has_series : bool, optional
+        Whether the times of its files may be in an index with the suffix .series behind theirs.
     """
 
     name: str
@@ -172,6 +183,7 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    has_series: bool = False
     magic_places: tuple[int, ...] = (0,)
 
     def begins(self, head: bytes) -> bool:
@@ -222,13 +234,9 @@ FORMATS = (
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
-    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply")),
+    Format("sequence", "OBJ or PLY: numbered files, or their .series", _MESHES, has_series=True),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
-    Format(
-        "vtk",
-        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtp", ".vtk", ".pvd"),
-    ),
+    Format("vtk", "VTK: numbered files, or their .pvd or .series", (*_VTK, ".pvd"), has_series=True),
 )
 
 
@@ -284,9 +292,27 @@ def read(
         clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
+        if clip.frame_count == 1 and not kind.has_series:
+            _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
+
+
+def _warn_of_frames(path: str | PathLike[str]) -> None:
+    """Warn of a file whose format has all frames in one file, where others beside it are numbered like frames."""
+    from athcodec.sources.numbering import numbered_files, some  # They import this module.
+
+    others: list[str] = []
+    with suppress(ClipError, OSError):
+        others = [file.name for file in numbered_files(path).paths if file != Path(path)]
+    if others:
+        warnings.warn(
+            f"{os.fspath(path)}: read as one frame, without {some(others)}: numbered files of this format are not read "
+            "as one motion; write all frames into one file, or numbered OBJ, PLY or VTK files",
+            GuessWarning,
+            stacklevel=3,
+        )
 
 
 def listed(not_read: Mapping[str, Sequence[str]]) -> str:
@@ -318,12 +344,13 @@ def format_named(name: str, formats: Sequence[Format]) -> Format:
 
 def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    suffix = Path(path).suffix.lower()
+    name = Path(path).name.lower()
     for candidate in formats:
-        if suffix in candidate.suffixes:
+        if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
+    hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}{hint}")
 
 
 def find_format(path: str | PathLike[str]) -> Format:

@@ -59,7 +59,7 @@ def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, 
     if missed.any():
         rate = _closer_rate(keys - (keys[0] if start is None else start), fps)
         advice = (
-            f"--fps {rate:.4g} has frames closer to them"
+            f"--fps {plain_number(rate)} has frames closer to them"
             if rate
             else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
         )
@@ -99,6 +99,11 @@ def say_single_frame(path: FilePath) -> None:
             GuessWarning,
             stacklevel=2,
         )
+
+
+def plain_number(number: float) -> str:
+    """The number as an option takes it and a person writes it: without an exponent."""
+    return np.format_float_positional(round(float(number), 6), trim="-")
 
 
 def whole(number: float) -> int | float:
