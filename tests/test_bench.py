@@ -206,7 +206,7 @@ def test_a_clip_is_compared_with_the_smallest_file_of_another_codec_that_kept_th
     assert (row["ours/simple"], row["processor s"]) == ("0.40 -", "12 / 3.25")
     assert (row["levels"], row["ticks"], row["frames x vertices"]) == ("1.50 / 1.25", "2.00 / -", "9 x 1,200")
     table = {row["bytes of"]: row for row in compare.by_codec(POINTS, "tree", (1e-3, 1e-4))}
-    assert table["SZ3"] == {"bytes of": "SZ3", "1e-3": "bound broken", "1e-4": "too slow"}
+    assert table["SZ3"] == {"bytes of": "SZ3", "1e-3": "bound broken", "1e-4": "too slow", "commit": ""}
 
 
 def test_sentences_say_where_others_are_smaller_and_what_has_no_file():
@@ -308,9 +308,9 @@ def test_results_of_a_codec_stay_when_it_is_no_longer_installed(tmp_path, bushy_
 
 def test_results_are_saved_at_once_and_are_invalid_when_code_has_changed(tmp_path):
     file = tmp_path / "results.json"
-    store = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    store = Store(file, {"command": "rd", "commit": "1a"}, {"points": ("clip",)})
     store.add("points", {"clip": "tree", "bytes": 3, "depends": {"zip": "1.0"}})
-    later = Store(file, {"command": "rd"}, {"points": ("clip",)})
+    later = Store(file, {"command": "rd", "commit": "1a"}, {"points": ("clip",)})
     assert later.find("points", {"clip": "tree"}, {"zip": "1.0"})["bytes"] == 3
     assert later.find("points", {"clip": "tree"}, {"zip": "1.1"}) is None
     assert later.find("points", {"clip": "bush"}, {"zip": "1.0"}) is None
@@ -318,14 +318,15 @@ def test_results_are_saved_at_once_and_are_invalid_when_code_has_changed(tmp_pat
 
 def test_results_read_back_as_they_were_saved_one_row_each(tmp_path):
     file = tmp_path / "results.json"
-    store = Store(file, {"command": "rd"}, {"points": ("clip", "bound")})
+    store = Store(file, {"command": "rd", "commit": "1a"}, {"points": ("clip", "bound")})
     depends = {"zip": "1.0"}
     points = [
         store.add("points", {"clip": clip, "bound": bound, "settings": "coarse " * 9, "depends": depends} | more)
         for clip in ("tree", "bush")
         for bound, more in ((0.5, {"bytes": 3, "max": 0.1}), (1, {"why": "1"}))
     ]
-    assert read(file) == {"command": "rd", "points": points}
+    assert read(file) == {"command": "rd", "commit": "1a", "points": points}
+    assert [point["commit"] for point in points] == ["1a"] * 4
     text = file.read_text()
     assert text.count("coarse " * 9) == text.count('"zip"') == 1 and text.count("[0,0.5,") == 1
 

@@ -24,10 +24,10 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
-from athcodec.sources import FORMATS, NUMBER_PATTERN, is_pattern
-from athcodec.sources.sequence import FRAME_SUFFIXES, each_once, sequence_files
+from athcodec.sources import FORMATS, FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, is_pattern
+from athcodec.sources.numbering import each_once, numbered_files
 
-SUFFIXES = tuple(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
+SUFFIXES = (SERIES, *(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES))
 TAGS = (
     "ETag",
     "Last-Modified",
@@ -273,7 +273,7 @@ def is_telling(known: dict[str, Any]) -> bool:
 
 def _frames(path: str) -> list[str]:
     if path.lower().endswith(FRAME_SUFFIXES) or is_pattern(path):
-        return [str(file) for file in sequence_files(path).values()]
+        return [str(file) for file in numbered_files(path).paths]
     return [path]
 
 

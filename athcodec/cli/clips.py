@@ -38,7 +38,7 @@ from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
-from athcodec.sources.sequence import each_once
+from athcodec.sources.numbering import each_once
 
 if TYPE_CHECKING:
     from athcodec.exporters.gltf_into import Into
@@ -55,8 +55,6 @@ def clip_to_encode(
         parts = []
         for path, called in each_once(paths):
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
-            if read is None:
-                _say_takes(whole, path, args)
             parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
         loops, endless = _checked_names(names, len(parts), args)
@@ -79,7 +77,7 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
 
     if len(paths) != 1 or args.output:
         raise ClipError(f"--into: got {len(paths)} inputs or an output besides, expected one GLB and no other output")
-    for name in ("source_format", "mesh", "field", "unit", "up_axis"):
+    for name in ("source_format", "mesh", "field", "dataset", "axes", "unit", "up_axis"):
         if getattr(args, name) is not None:
             raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
     if args.rest not in ("auto", HOST) or args.exact_rest:
@@ -119,16 +117,6 @@ def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[
     if args.strength is None:
         return [()] * clip_count
     return list(zip(args.strength, args.heading or [0.0] * clip_count))
-
-
-def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
-    played, others = (clip.metadata.get(name) for name in ("animations", "other_animations"))
-    if others and not args.only:
-        say(
-            "takes",
-            f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
-            "--takes all makes a clip of each",
-        )
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
@@ -192,6 +180,8 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             fps=args.fps,
             mesh=args.mesh,
             field=args.field,
+            dataset=args.dataset,
+            axes=args.axes,
             only=args.only or (),
             takes=args.takes or (),
             allow_outside=args.allow_outside,
@@ -199,9 +189,18 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             unit=args.unit,
             up_axis=args.up_axis,
         )
-    if clip.not_read:
-        say("not read", f"{path}: {listed(clip.not_read)}")
+    _say_not_read(clip, path)
     return clip
+
+
+def _say_not_read(clip: MotionClip, path: str) -> None:
+    not_read = dict(clip.not_read)
+    if others := not_read.pop("animation", None):
+        played = ", ".join(clip.metadata.get("animations", ["none"]))
+        text = f"this is {played}; there are {', '.join(others)} too, and --takes all makes a clip of each"
+        say("takes", f"{path}: {text}")
+    if not_read:
+        say("not read", f"{path}: {listed(not_read)}")
 
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from athcodec.motion.transitions import Transition
-from athcodec.options import whole
+from athcodec.options import real, whole
 
 Blended: TypeAlias = Callable[[Sequence[tuple[float, float]], int | None], np.ndarray]
 LONGEST = 1e7  # Seconds that a play can last: 115 days.
@@ -56,7 +56,7 @@ class EndlessPlay:
         list of tuple of float
             Seconds since the clip's first frame and weight, of one place or, within a transition, of two.
         """
-        if not 0.0 <= seconds <= LONGEST:
+        if not 0.0 <= (seconds := real("seconds", seconds)) <= LONGEST:
             raise ValueError(f"seconds: got {seconds}, expected 0 to {LONGEST:g}")
         while (begins := self._begins[-1] + self._next.leave - self._runs[-1].enter) <= seconds:
             self._begins.append(begins)

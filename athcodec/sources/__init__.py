@@ -12,6 +12,7 @@ import os
 import re
 import warnings
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
@@ -20,29 +21,60 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
+from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.options import MAX_MEMORY, SAMPLES
+from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
-# Parts of a scene that are not read and are no shapes.
+# Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
+    "animation attribute element empty extension extras field hidden statement other".split(),
+    (
+        "animated property",
+        "class that nothing inherits",
+        "framesPerSecond",
+        "inactive",
+        "keys outside of the stage's range",
+        "layer",
+        "metadata",
+        "skin that no node of the scene has",
+        "variant",
+        "warning of USD",
+    ),
+    (
+        "note of a dataset",
+        "empty dataset",
+        "dataset of references or lists",
+        "pickled object",
+        "member",
+        "sparse matrix",
+    ),
+    NOT_KEPT.values(),
 )
 LISTED = 8
 MEANINGS = {
+    "animation": ' (--takes all, takes="all": a clip of each)',
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
     "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
 }
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
+    **dict.fromkeys(
+        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ),
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
+_MESHES = (".obj", ".ply")
+_VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
+FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
+SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -60,6 +92,11 @@ class ReadOptions:
         The file that has the faces of a point cache, or of the vertices of a plant in MTG.
     field : str, optional
         Name of the displacement that is added to the points of a finite-element result.
+    dataset : str, optional
+        Path of the array with the positions in HDF5, NumPy and MATLAB files, or of its group.
+    axes : str or sequence of str, optional
+        The order of that array's axes, by default "frames,vertices,xyz"; "frames,vertices+xyz" where x, y and z of all
+        vertices lie in one axis, "vertices,xyz" for a single frame.
     only : sequence of str, optional
         Patterns (fnmatch) of the names of the prims, objects or meshes to read; all by default.
     takes : sequence of str or str, optional
@@ -70,7 +107,8 @@ class ReadOptions:
     root : int or sequence of int, optional
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
-        Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
+        Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
+        refused.
     max_memory : int, optional
         Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
         one file of it takes besides.
@@ -78,13 +116,15 @@ class ReadOptions:
     Raises
     ------
     ValueError
-        For values that rest and fps cannot have.
+        For values that rest, fps, axes and max_memory cannot have.
     """
 
     rest: str = "auto"
     fps: float | None = None
     mesh: str | PathLike[str] | None = None
     field: str | None = None
+    dataset: str | None = None
+    axes: str | Sequence[str] | None = None
     only: Sequence[str] = ()
     takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
@@ -95,10 +135,18 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
+        set_numbers(self, reals=("fps",), wholes=("max_memory",))
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
+        if self.axes is not None:
+            parse_order(self.axes)
+
+    @property
+    def order(self) -> Order | None:
+        """The axes as motion/positions.py has them; None where they are not given."""
+        return None if self.axes is None else parse_order(self.axes)
 
 
 @dataclass(frozen=True)
@@ -121,6 +169,10 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    magic_places : tuple of int, optional
+        Where in its files `magic` may stand.
+    has_series : bool, optional
+        Whether the times of its files may be in an index with the suffix .series behind theirs.
     """
 
     name: str
@@ -131,6 +183,12 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    has_series: bool = False
+    magic_places: tuple[int, ...] = (0,)
+
+    def begins(self, head: bytes) -> bool:
+        """Whether the first bytes of a file are those of this format."""
+        return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
 
     @property
     def is_installed(self) -> bool:
@@ -154,8 +212,16 @@ class Format:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), magic=(b"\x89HDF\r\n\x1a\n",)),
-    Format("npz", "NumPy archive of the same schema", (".npz",)),
+    Format(
+        "hdf5",
+        "HDF5 of athcodec's schema or of other programs, VTKHDF, MATLAB 7.3",
+        (".h5", ".hdf5", ".hdf", ".vtkhdf"),
+        magic=(b"\x89HDF\r\n\x1a\n",),
+        magic_places=(0, 512, 1024, 2048),
+    ),
+    Format("npz", "NumPy archive, of the same schema or of other programs", (".npz",)),
+    Format("npy", "NumPy array of positions", (".npy",), magic=(b"\x93NUMPY",)),
+    Format("mat", "MATLAB up to 7.2", (".mat",), "matlab", ("scipy",), (b"MATLAB 5.0 MAT-file",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
@@ -168,13 +234,9 @@ FORMATS = (
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
-    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply")),
+    Format("sequence", "OBJ or PLY: numbered files, or their .series", _MESHES, has_series=True),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
-    Format(
-        "vtk",
-        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtp", ".vtk", ".pvd"),
-    ),
+    Format("vtk", "VTK: numbered files, or their .pvd or .series", (*_VTK, ".pvd"), has_series=True),
 )
 
 
@@ -201,8 +263,8 @@ def read(
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
-        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root, allow_outside,
-        max_memory.
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
+        allow_outside, max_memory.
 
     Returns
     -------
@@ -230,9 +292,27 @@ def read(
         clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
+        if clip.frame_count == 1 and not kind.has_series:
+            _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
+
+
+def _warn_of_frames(path: str | PathLike[str]) -> None:
+    """Warn of a file whose format has all frames in one file, where others beside it are numbered like frames."""
+    from athcodec.sources.numbering import numbered_files, some  # They import this module.
+
+    others: list[str] = []
+    with suppress(ClipError, OSError):
+        others = [file.name for file in numbered_files(path).paths if file != Path(path)]
+    if others:
+        warnings.warn(
+            f"{os.fspath(path)}: read as one frame, without {some(others)}: numbered files of this format are not read "
+            "as one motion; write all frames into one file, or numbered OBJ, PLY or VTK files",
+            GuessWarning,
+            stacklevel=3,
+        )
 
 
 def listed(not_read: Mapping[str, Sequence[str]]) -> str:
@@ -242,6 +322,11 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
         f"{MEANINGS.get(kind, '')}"
         for kind, names in not_read.items()
     )
+
+
+def besides(not_read: Mapping[str, Sequence[str]]) -> str:
+    """The end of an error about a source of which nothing can be read: what it holds instead."""
+    return f"; not read: {listed(not_read)}" if not_read else ""
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:
@@ -259,12 +344,13 @@ def format_named(name: str, formats: Sequence[Format]) -> Format:
 
 def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    suffix = Path(path).suffix.lower()
+    name = Path(path).name.lower()
     for candidate in formats:
-        if suffix in candidate.suffixes:
+        if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
+    hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}{hint}")
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -273,6 +359,11 @@ def find_format(path: str | PathLike[str]) -> Format:
         head = b"#"
     else:
         if os.path.isdir(path):
+            if any(os.path.exists(os.path.join(path, name)) for name in ("zarr.json", ".zarray", ".zgroup")):
+                raise ClipError(
+                    f"{os.fspath(path)}: is a zarr store, expected a file; in Python, athcodec.encode takes one of its "
+                    "arrays"
+                )
             raise ClipError(
                 f"{os.fspath(path)}: is a folder, expected a file: any one of numbered files stands for all, and "
                 "`athcodec batch` encodes many clips"
@@ -282,7 +373,7 @@ def find_format(path: str | PathLike[str]) -> Format:
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
     for candidate in FORMATS:
-        if head.startswith(candidate.magic or ()):
+        if candidate.begins(head):
             return candidate
     if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
         raise ClipError(f"{os.fspath(path)}: {hint}")

@@ -15,6 +15,8 @@ from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
 SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
+MOST_FPS = 1000.0  # Highest rate that is advised.
+MOST_FRAMES = 100_000  # Most frames of a rate that is advised.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -48,16 +50,42 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
     return times - times[0], metadata
 
 
-def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str) -> None:
-    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames."""
-    if missed.any():
-        step = max(np.diff(keys).min(initial=0.25 / fps), SAME_TIME)
-        warnings.warn(
-            f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
-            f"there alone is missed; --fps {1 / step:.4g} has frames closer to them",
-            GuessWarning,
-            stacklevel=2,
-        )
+def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
+    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which is at
+    `start` seconds (default: at the first key that is not missed, else at 0)."""
+    if not missed.any():
+        return
+    met = keys[~missed]
+    if start is None:
+        start = float(met[0]) if len(met) else 0.0
+    rate = _rate_of_all(keys - start, fps)
+    advice = (
+        f"--fps {plain_number(rate)} has a frame at each of them"
+        if rate
+        else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
+    )
+    warnings.warn(
+        f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
+        f"there alone is missed; {advice}",
+        GuessWarning,
+        stacklevel=2,
+    )
+
+
+def _rate_of_all(places: np.ndarray, fps: float) -> float | None:
+    """The lowest rate, a whole number or a multiple of fps, with frames at all of these seconds, one of them at 0; None
+    where that takes more frames than anybody wants."""
+    highest = min(MOST_FPS, MOST_FRAMES / max(float(np.ptp(places)), SAME_TIME))
+    multiples = fps * np.arange(2, int(highest / fps) + 1)
+    for rate in sorted({*multiples.tolist(), *map(float, range(int(fps) + 1, int(highest) + 1))}):
+        if (np.abs(places * rate - np.round(places * rate)) <= min(SAME_TIME * rate, 0.01)).all():
+            return rate
+    return None
+
+
+def plain_number(number: float) -> str:
+    """The number as an option takes it and a person writes it: without an exponent."""
+    return np.format_float_positional(round(float(number), 6), trim="-")
 
 
 def whole(number: float) -> int | float:
