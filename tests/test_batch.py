@@ -129,17 +129,6 @@ def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
         assert (decoder.clip.loop, decoder.frame_count) == (True, 40)
 
 
-def test_clips_get_transitions_by_pattern_and_by_option(sample_file, clips, tmp_path, cluster):
-    out, settings = tmp_path / "out", tmp_path / "s.toml"
-    settings.write_text('["a.h5"]\nendless = false\n')
-    words = ["batch", str(sample_file), str(clips / "a.h5"), "--out", str(out), "--scheduler", cluster, *WORDS]
-    assert cli.main([*words, "--settings", str(settings), "--endless"]) == 0
-    with athcodec.read(sample_file) as clip, athcodec.open(out / f"{sample_file.stem}.ath") as decoder:
-        assert decoder.metadata["transitions"] == athcodec.endless(clip).metadata["transitions"]
-    with athcodec.open(out / "a.ath") as decoder:
-        assert "transitions" not in decoder.metadata
-
-
 def test_a_blend_that_is_too_long_for_a_clip_is_reported(clips, tmp_path, cluster, capsys):
     words = ["batch", str(clips / "a.h5"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
     assert cli.main([*words, "--loop-blend", "7"]) == 1

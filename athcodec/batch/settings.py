@@ -45,7 +45,7 @@ READING = (
     "up_axis",
 )
 # These settings change a clip before it is encoded.
-SHAPING = ("hierarchy", "loop", "loop_blend", "endless", "strength", "heading")
+SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
 
 Settings = dict[str, Any]
 
@@ -91,7 +91,7 @@ def check_settings(settings: Mapping[str, Any], where: str = "settings", folder:
     ----------
     settings : dict
         Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
-        loop_blend, endless, strength and heading.
+        loop_blend, strength and heading.
         Lengths and sizes may be text with a unit, "1mm".
     where : str, optional
         What error messages begin with.
@@ -294,7 +294,6 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "up_axis": _one_of("x", "y", "z"),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
-    "endless": _BOOL,
     "strength": _finite,
     "heading": _finite,
 }

@@ -151,7 +151,7 @@ def _done(
 
 @contextmanager
 def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
-    """The clip as a loop, without an end and on the branches, if its settings ask for that. Raises ClipError where it
+    """The clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
     is another than `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)
@@ -167,7 +167,6 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
             clip = in_wind(clip, item.settings["strength"], item.settings.get("heading", 0.0))
         blend = loop_frames(item.settings)
         clip = clip if blend is None else athcodec.looped(clip, blend)
-        clip = athcodec.endless(clip) if item.settings.get("endless") else clip
         hierarchy = item.settings.get("hierarchy")
         yield clip if hierarchy is None else with_branches(clip, find_or_load(clip, hierarchy))
     _check_source(item, source)

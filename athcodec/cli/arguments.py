@@ -212,13 +212,6 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "them into those at their beginning",
     )
     verb.add_argument(
-        "--endless",
-        metavar="NAME,...",
-        type=_argument(_names),
-        help="clips to find transitions in, between like frames, over which players play them without an end; all: "
-        "every one",
-    )
-    verb.add_argument(
         "--strength",
         metavar="S,...",
         type=_argument(_numbers),
@@ -293,11 +286,6 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
     verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
-    verb.add_argument(
-        "--endless",
-        action="store_true",
-        help="find transitions between like frames, over which players play clips without an end",
-    )
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",

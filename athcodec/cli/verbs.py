@@ -171,7 +171,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    given |= {name: True for name in ("exact_rest", "lossless", "loop", "endless") if getattr(args, name)}
+    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
     given |= {
         name: getattr(args, name)
         for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
