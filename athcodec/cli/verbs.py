@@ -138,7 +138,6 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
 
 def batch(args: argparse.Namespace) -> int:
     from athcodec import batch
-    from athcodec.batch.show import show_of_terminal
 
     inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
     items = batch.find(
@@ -154,7 +153,7 @@ def batch(args: argparse.Namespace) -> int:
     if args.dry_run:
         print_preview(batch.preview(items, args.out, **where), args.json)
         return 0
-    outcome = batch.run(items, args.out, **where, **how, show=show_of_terminal())
+    outcome = batch.run(items, args.out, **where, **how, report=partial(echo, file=sys.stderr))
     print_outcome(outcome, args)
     return 1 if outcome.failed else 0
 

@@ -74,11 +74,7 @@ def print_facts(facts: dict[str, Any]) -> None:
         echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
         echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if (
-        len(facts["clips"]) > 1
-        or facts["clips"][0]["name"]
-        or any(facts["clips"][0][key] for key in ("loop", "wind"))
-    ):
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or any(facts["clips"][0][key] for key in ("loop", "wind")):
         _print_clips(facts)
     for clip in facts["clips"]:
         _print_presence(clip)
