@@ -494,7 +494,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--nanite",
         action="store_true",
         help="with --rig and USD: laid out as Nanite Assemblies of Unreal Engine 5.7, copies as instances on the "
-        "joints, and the JSON of Dynamic Wind beside it",
+        "joints, and the JSON of Dynamic Wind beside it; not run in Unreal",
     )
     verb.add_argument(
         "--instances",

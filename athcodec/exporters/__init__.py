@@ -55,7 +55,7 @@ class WriteOptions:
         is as close as that many allow; `Written` says how close.
     nanite : bool, optional
         For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
-        the joints, and the JSON of Dynamic Wind beside it.
+        the joints, and the JSON of Dynamic Wind beside it. This was not run in Unreal.
 
     Raises
     ------
