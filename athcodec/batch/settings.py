@@ -28,7 +28,7 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
-from athcodec.sources import FORMATS, format_named
+from athcodec.sources import format_named, formats
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
@@ -231,7 +231,7 @@ def _rate(value: Any) -> float:
 
 
 def _format(value: Any) -> str:
-    return format_named(value, FORMATS).name
+    return format_named(value, formats()).name
 
 
 def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:

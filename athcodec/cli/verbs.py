@@ -282,7 +282,7 @@ def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written
 
         write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
-    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
+    name = args.format or sources.format_by_suffix(args.output, exporters.formats()).name
     how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
@@ -373,7 +373,7 @@ def truncate(args: argparse.Namespace) -> int:
 def formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
-    read, written = ({kind.name: kind for kind in module.FORMATS} for module in (sources, exporters))
+    read, written = ({kind.name: kind for kind in module.formats()} for module in (sources, exporters))
     rows = [
         {
             "format": name,
@@ -381,6 +381,7 @@ def formats(args: argparse.Namespace) -> int:
             "writes": _suffixes(written.get(name)),
             "title": kind.title,
             "extra": kind.extra,
+            "package": kind.package or "athcodec",
             "installed": kind.is_installed,
         }
         for name, kind in (written | read).items()
@@ -401,8 +402,8 @@ def _suffixes(kind: Any) -> list[str]:
 
 def _needs(row: dict[str, Any]) -> str:
     if not row["extra"]:
-        return ""
-    return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
+        return "" if row["package"] == "athcodec" else row["package"]
+    return f"{row['package']}[{row['extra']}]" + (", installed" if row["installed"] else "")
 
 
 def view(args: argparse.Namespace) -> int:

@@ -2,7 +2,7 @@
 
 `read` finds the format by what a file begins with, then by its suffix, and imports the module of that format and no
 other. A module has one function, `read_clip(path, options) -> MotionClip`. Most formats name no branches: the clip has
-none then (see motion/branches).
+none then (see motion/branches). Other packages add formats by entry points (registry.py), which are asked last.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import importlib
 import os
 import re
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
@@ -121,6 +122,10 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    module : str, optional
+        The module with its `read_clip` or `write_clip`, if another package adds it.
+    package : str
+        The package that adds it; empty for athcodec's own. Its entry point sets it.
     """
 
     name: str
@@ -131,6 +136,8 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    module: str = ""
+    package: str = ""
 
     @property
     def is_installed(self) -> bool:
@@ -150,7 +157,22 @@ class Format:
         """
         missing = self._missing()
         if missing:
-            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "athcodec[{self.extra}]"')
+            package = (self.package or "athcodec") + (f"[{self.extra}]" if self.extra else "")
+            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "{package}"')
+
+    def function(self, name: str, home: str) -> Callable[..., Any]:
+        """Return a function of the format's module, which is in the package `home` if it is one of athcodec's own.
+
+        Raises ClipError if the module of another package cannot be imported or has no such function.
+        """
+        if not self.package:
+            return getattr(importlib.import_module(f"{home}.{self.name}"), name)
+        try:
+            return getattr(importlib.import_module(self.module), name)
+        except (ImportError, AttributeError) as error:
+            raise ClipError(
+                f"{self.title}: {name} of {self.module} cannot be imported: {error}; update or uninstall {self.package}"
+            ) from error
 
 
 FORMATS = (
@@ -178,6 +200,19 @@ FORMATS = (
 )
 
 
+def formats() -> Iterator[Format]:
+    """Yield the formats that can be read: athcodec's own, and then those of other packages, which are searched for only
+    if somebody asks for more."""
+    yield from FORMATS
+    yield from _others()
+
+
+def _others() -> tuple[Format, ...]:
+    from athcodec.sources.registry import registered  # It imports this module.
+
+    return registered(__name__)[len(FORMATS) :]
+
+
 def read(
     path: str | PathLike[str],
     format: str | None = None,
@@ -193,7 +228,7 @@ def read(
     path : str or path
         The file; of numbered files any one of them, or a name with # or %04d in place of the number.
     format : str, optional
-        Name of one of `athcodec.sources.FORMATS`. By default the format is found by what the file begins with, then
+        Name of one of `athcodec.sources.formats()`. By default the format is found by what the file begins with, then
         by its suffix.
     unit : str, optional
         A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
@@ -225,9 +260,9 @@ def read(
     """
     wanted = ReadOptions(**options)
     with naming_file(path):
-        kind = find_format(path) if format is None else format_named(format, FORMATS)
+        kind = find_format(path) if format is None else format_named(format, formats())
         kind.check()
-        clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
+        clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
         if lost:
@@ -249,22 +284,38 @@ def is_pattern(path: str | PathLike[str]) -> bool:
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
-def format_named(name: str, formats: Sequence[Format]) -> Format:
+def format_named(name: str, formats: Iterable[Format]) -> Format:
     """The one of `formats` with this name. Raises ValueError."""
+    known = []
     for candidate in formats:
         if candidate.name == name:
             return candidate
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
+        known.append(candidate.name)
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(known)}")
 
 
-def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
+def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    suffix = Path(path).suffix.lower()
-    for candidate in formats:
+    suffix, candidates = Path(path).suffix.lower(), iter(formats)
+    known: list[str] = []
+    for candidate in candidates:
         if suffix in candidate.suffixes:
+            _warn_of_others(path, suffix, candidate, candidates)
             return candidate
-    known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
+        known += candidate.suffixes
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {' '.join(known)}")
+
+
+def _warn_of_others(path: str | PathLike[str], suffix: str, chosen: Format, others: Iterable[Format]) -> None:
+    """Warn if the suffix of a format of another package is that of further ones, too."""
+    if chosen.package and (same := [other for other in others if suffix in other.suffixes]):
+        names = " and ".join(f"{other.name} of {other.package}" for other in same)
+        warnings.warn(
+            f"{os.fspath(path)}: {suffix} is taken for {chosen.name} of {chosen.package}, not for {names}; "
+            "--source-format or --format (format=) names another",
+            GuessWarning,
+            stacklevel=4,
+        )
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -281,12 +332,21 @@ def find_format(path: str | PathLike[str]) -> Format:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
-    for candidate in FORMATS:
-        if head.startswith(candidate.magic or ()):
-            return candidate
-    if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
+    if head.startswith(ATH_MAGIC):
+        raise ClipError(f"{os.fspath(path)}: {NO_SOURCES[ATH]}")
+    for candidates in (lambda: FORMATS, _others):  # Others are searched for only if it is none of athcodec's own.
+        known = candidates()
+        if kind := _by_first_bytes(head, known):
+            return kind
+        with suppress(ClipError):
+            return format_by_suffix(path, known)
+    if hint := NO_SOURCES.get(Path(path).suffix.lower()):
         raise ClipError(f"{os.fspath(path)}: {hint}")
-    return format_by_suffix(path, FORMATS)
+    return format_by_suffix(path, formats())
+
+
+def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
+    return next((candidate for candidate in formats if head.startswith(candidate.magic or ())), None)
 
 
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
