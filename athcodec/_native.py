@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec._library import load_library
+from athcodec._library import load_library, misfit
 from athcodec.errors import BoundError
 from athcodec.options import MAX_SEGMENT
 
@@ -272,7 +272,8 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
 def _bind() -> ctypes.CDLL:
     library = load_library()
     for name, (result, arguments) in (_PLAYING | _ENCODING).items():
-        function = getattr(library, name)
+        if (function := getattr(library, name, None)) is None:
+            raise misfit(library._name, f"got a library without {name}()")
         function.restype, function.argtypes = result, arguments
     return library
 
@@ -307,10 +308,7 @@ def check_layouts(mirrors: dict[str, type[ctypes.Structure] | np.dtype]) -> None
         differing = sorted({name for name, _ in layout.items() ^ core.items()})
         if differing:
             got, expected = ({name: side.get(name) for name in differing} for side in (core, layout))
-            raise ImportError(
-                f"athcodec's C core: struct {struct}: got (offset, size) {got}, expected {expected} as in Python; "
-                "pip install builds the core again"
-            )
+            raise misfit(lib._name, f"struct {struct}: got (offset, size) {got}, expected {expected} as in Python")
 
 
 MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
-from typing import SupportsIndex
+from collections.abc import Iterable, Sequence
+from typing import Any, SupportsFloat, SupportsIndex
 
 DEFAULT_REL_ERROR = 1e-4
 LOSSLESS_REL_ERROR = 4e-7  # Error over the diagonal at which a lossless file is about smallest.
@@ -32,6 +32,26 @@ def whole(what: str, number: SupportsIndex, hint: str = "") -> int:
         raise TypeError(f"{what}: got {number!r}, expected a whole number of type int{hint}") from None
 
 
+def real(what: str, number: SupportsFloat) -> float:
+    """Return the number as a float: an int, a NumPy scalar of any real type, an array without dimensions, or anything
+    else that `float` takes. Raises TypeError for truth values, text, complex numbers, and arrays with dimensions."""
+    kind = getattr(getattr(number, "dtype", None), "kind", "f")  # The dtypes of other libraries have no kind.
+    if not isinstance(number, (bool, str, bytes, bytearray)) and kind in "iufO" and not getattr(number, "ndim", 0):
+        try:
+            return float(number)
+        except TypeError:
+            pass
+    raise TypeError(f"{what}: got {number!r}, expected a number")
+
+
+def set_numbers(record: Any, *, reals: Iterable[str] = (), wholes: Iterable[str] = ()) -> None:
+    """Turn fields of a dataclass, frozen ones too, into float and int, unless they are None. Raises TypeError."""
+    for names, number in ((reals, real), (wholes, whole)):
+        for name in names:
+            if (value := getattr(record, name)) is not None:
+                object.__setattr__(record, name, number(name, value))
+
+
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
     """Return the largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas
     between them.
@@ -41,7 +61,8 @@ def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
     if isinstance(ladder, str) and ladder in LADDERS:
         return LADDERS[ladder]
     try:
-        errors = tuple(sorted(map(float, ladder.split(",") if isinstance(ladder, str) else ladder), reverse=True))
+        numbers = map(float, ladder.split(",")) if isinstance(ladder, str) else (real("ladder", one) for one in ladder)
+        errors = tuple(sorted(numbers, reverse=True))
     except (TypeError, ValueError):
         errors = (math.nan,)
     if not all(0 < error < 1 for error in errors):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
 from athcodec.files.atomic import check_target, new_file
-from athcodec.options import whole
+from athcodec.options import real
 
 
 def truncate(
@@ -77,9 +77,9 @@ def truncate(
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:
-            last = _last_within(file, target_size)
+            last = _last_within(file, real("target_size", target_size))
         else:
-            last = _present(file, level)
+            last = file.checked_level(cast(int, level))
         front, chunks = _shortened(file, last)
         for chunk in chunks:
             if not file.is_available(chunk):
@@ -116,15 +116,9 @@ def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
     return ct.pack_front(header, chunks, file.errors[: level + 1]), chunks
 
 
-def _present(file: AthFile, level: Any) -> int:
-    if not 0 <= (last := whole("level", level)) < file.level_count:
-        raise LevelUnavailable(f"level: got {level}; expected 0 to {file.level_count - 1}")
-    return last
-
-
-def _last_within(file: AthFile, target_size: int) -> int:
+def _last_within(file: AthFile, target_size: float) -> int:
     parts = (_shortened(file, level) for level in range(file.level_count))
     sizes = [len(front) + sum(chunk.length for chunk in chunks) for front, chunks in parts]
     if sizes[0] > target_size:
-        raise LevelUnavailable(f"target_size: got {target_size}; expected at least {sizes[0]} bytes")
+        raise LevelUnavailable(f"target_size: got {target_size:.0f}; expected at least {sizes[0]} bytes")
     return max(level for level, size in enumerate(sizes) if size <= target_size)

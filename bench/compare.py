@@ -12,6 +12,7 @@ from typing import Any
 from bench.codec_registry import OURS
 from bench.codecs import simple
 from bench.codecs.ours import Athcodec, LayeredAthcodec, WholeAthcodec
+from bench.store import IN_BRACKETS, commits
 from bench.tables import markdown
 
 Point = dict[str, Any]
@@ -33,8 +34,9 @@ encoding all arrays takes, without other processes that read the source, and tha
 with its search. Levels: largest ratio of a level's error to that of the level before, of the largest error and of the
 RMS, and ticks: largest second difference over frames near a seam between segments, or a loop's, over that of the
 median frame, at the level where it is largest, with the source's in the same frames; both of the file at 1e-4 in the
-default layers. Side information: where the source names no branches, codecs that learn from branches or order
-vertices by them were given those that athcodec finds, and the time for that was not counted; none was given faces.
+default layers. Commits: those that measured ours / the best others. Side information: where the source names no
+branches, codecs that learn from branches or order vertices by them were given those that athcodec finds, and the time
+for that was not counted; none was given faces.
 """
 OVERVIEW = {
     "sample": "finite-element tree in wind, the sample",
@@ -50,7 +52,8 @@ Bytes of files within 1e-4 of the diagonal of the bounding box of all frames. *W
 `athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a rest pose in which faces keep
 their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which is all that the other codecs
 keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of PCA, skeletal tracks, and
-differences with zstd, each tuned for the clip, and how many times as large as *positions* it is.
+differences with zstd, each tuned for the clip, and how many times as large as *positions* it is. Commits that measured
+athcodec / the best others: {} / {}{}.
 """
 
 
@@ -93,6 +96,7 @@ def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict
 
     whole, layers = (sizes.get((kind.name, WHOLE_BOUND), {}) for kind in (WholeAthcodec, LayeredAthcodec))
     best = best_other(sizes, WHOLE_BOUND) or {}
+    made_by = (commits(some) for some in _shown(sizes, bounds))
     ours = {bound: size(Athcodec.name, bound) for bound in bounds}
     shares = [(ours[bound], size(simple.NAME, bound)) for bound in bounds]
     return {
@@ -107,7 +111,14 @@ def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict
         "processor s": " / ".join(_rounded(point.get("encode_cpu_s")) for point in (whole, best)),
         "levels": " / ".join(_rounded(layers.get(name)) for name in ("level_max_ratio", "level_rms_ratio")),
         "ticks": " / ".join(_rounded(layers.get(name)) for name in ("tick_ratio", "source_tick_ratio")),
+        "commits": " / ".join(name or "-" for name in made_by),
     }
+
+
+def _shown(sizes: Sizes, bounds: Collection[float]) -> tuple[list[Point], list[Point]]:
+    """The points of athcodec and the best ones of other codecs."""
+    ours = [point for (_, bound), point in sizes.items() if point["kind"] == OURS and bound in bounds]
+    return ours, [best for bound in bounds if (best := best_other(sizes, bound))]
 
 
 def _rounded(value: float | None) -> str:
@@ -169,6 +180,8 @@ def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> l
         name = point["codec"].removesuffix(", lossless")
         row = table.setdefault(name, {"bytes of": name} | columns)
         row[exponent(point["bound"])] = point["bytes"] if point["status"] == OK else point["status"]
+    for name, row in table.items():
+        row["commit"] = commits(point for point in found if point["codec"].removesuffix(", lossless") == name)
     return list(table.values())
 
 
@@ -191,11 +204,16 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
 
 def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
     """A table of a few clips at 1e-4, below its options, for readers who want one table."""
-    shown = []
+    shown, points = [], ([], [])
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]
+        for clip in clips:
+            for own, more in zip(points, _shown(sizes_of(contents["points"], clip["clip"]), [WHOLE_BOUND])):
+                own += more
         for clip, row in zip(clips, rows(clips, contents["points"], [WHOLE_BOUND])):
             sizes = {"float32": 12 * clip["frames"] * clip["vertices"], "with all arrays": row["all arrays"]}
             sizes |= {"positions": row["ours 1e-4"], "best other": row["best other 1e-4"]}
             shown.append({"clip": OVERVIEW[clip["clip"]], "frames x vertices": row["frames x vertices"]} | sizes)
-    return f"{' '.join(OVERVIEW_CAPTION.split())}\n\n{markdown(shown)}"
+    made_by = [commits(some) for some in points]
+    note = f", {IN_BRACKETS}" if "(" in "".join(made_by) else ""
+    return f"{' '.join(OVERVIEW_CAPTION.format(*made_by, note).split())}\n\n{markdown(shown)}"

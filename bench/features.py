@@ -26,7 +26,7 @@ from athcodec.encoding.progress import Work
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
-from bench.store import Store
+from bench.store import IN_BRACKETS, Store, commits
 from bench.suite import SUITES, cases
 from bench.tables import environment, table
 
@@ -252,5 +252,6 @@ def table_text(contents: Mapping[str, Any]) -> str:
         if name not in bounds:
             bounds.append(name)
     clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
-    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", SOURCES, NOTE, NOT_JUDGED)]
+    made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
+    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", made_by, SOURCES, NOTE, NOT_JUDGED)]
     return "\n\n".join(["\n".join(lines), *paragraphs]) + "\n"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bench.store import commits
 from bench.tables import markdown
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,7 +27,8 @@ class Shown:
     def text(self) -> str:
         result = json.loads((RESULTS / f"{self.results}.json").read_text("utf-8"))
         tables = {table["title"].split(",")[0]: table["rows"] for table in result["tables"]}
-        return f"`{result['command']}`, athcodec {result['versions']['athcodec']}\n\n{markdown(self.rows(tables))}"
+        made_by = f"athcodec {result['versions']['athcodec']}, commit {commits([result])}"
+        return f"`{result['command']}`, {made_by}\n\n{markdown(self.rows(tables))}"
 
 
 def picked(title: str, clips: tuple[str, ...] = (), **columns: str) -> Callable[[dict[str, list[Row]]], list[Row]]:

@@ -1,19 +1,23 @@
 """Results that are saved as they are measured: a JSON file that a long run extends, and that the next run resumes.
 
 A result is identified by a few keys and carries what it depends on (versions, digests); it is up to date as long as
-these are the same. The file holds a table for each kind of result: its columns, and one line per row (null: no such
-value). Values of text, lists and objects repeat: a row has an index into the distinct values of such a column.
+these are the same. It names the command and the commit that made it; of results of the days when they named none, the
+commit that stored them is known. The file holds a table for each kind of result: its columns, and one line per row
+(null: no such value). Values of text, lists and objects repeat: a row has an index into the distinct values of such a
+column.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 Results = list[dict[str, Any]]
+STORED_IN = "stored in "  # Before the commit of a result that was measured when results did not name theirs.
+IN_BRACKETS = "in brackets those that stored rows which name none"
 
 
 class Store:
@@ -34,8 +38,8 @@ class Store:
         return result if is_right else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
-        """Adds or replaces a result of this command, and replaces the file in one step."""
-        result = result | {"command": self._environment["command"]}
+        """Adds or replaces a result of this command and commit, and replaces the file in one step."""
+        result = result | {name: self._environment[name] for name in ("command", "commit")}
         self._results[name][self._key(name, result)] = result
         if self.file is not None:
             part = self.file.with_name(self.file.name + ".part")
@@ -56,6 +60,12 @@ def read(file: Path) -> dict[str, Any]:
         name: _results_of(value) if isinstance(value, dict) and "columns" in value else value
         for name, value in json.loads(file.read_text()).items()
     }
+
+
+def commits(results: Iterable[Mapping[str, Any]]) -> str:
+    """The commits that made some results; in brackets those that stored a result which does not name its own."""
+    names = sorted({result["commit"] for result in results if "commit" in result})
+    return " ".join(f"({name.removeprefix(STORED_IN)})" if name.startswith(STORED_IN) else name for name in names)
 
 
 def _table_of(results: Results) -> dict[str, Any]:

@@ -10,11 +10,15 @@ import json
 import os
 import platform
 import shlex
+import subprocess
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).resolve().parent.parent
+CODE = ("athcodec", "bench", ":!bench/results")  # Paths whose uncommitted changes a result is marked with.
 DISTRIBUTIONS = ("athcodec", "numpy", "h5py", "zstandard")
 MISSING = "-"
 
@@ -25,7 +29,7 @@ def table(title: str, rows: list[dict[str, Any]], *notes: str) -> dict[str, Any]
 
 
 def environment(argv: Sequence[str]) -> dict[str, Any]:
-    """The command (paths by their last part only), versions and machine."""
+    """The command (paths by their last part only), commit, versions and machine."""
     words = [Path(word).name if os.sep in word else word for word in argv]
     versions = {"python": platform.python_version()} | {name: version(name) for name in DISTRIBUTIONS}
     system = f"{platform.system()} {platform.machine()}"
@@ -33,7 +37,23 @@ def environment(argv: Sequence[str]) -> dict[str, Any]:
     if hasattr(os, "getloadavg"):
         machine["load_before"] = round(os.getloadavg()[0], 2)
     command = shlex.join(["python", "-m", "bench", *words])
-    return {"command": command, "versions": versions, "machine": machine}
+    return {"command": command, "commit": commit(), "versions": versions, "machine": machine}
+
+
+@cache
+def commit(code: tuple[str, ...] = CODE) -> str:
+    """The commit of the clone that measures, with a mark if code at these paths has changed since; "unknown" outside a
+    clone."""
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        is_clone = not git("rev-parse", "--show-prefix")  # The folder may lie in the clone of another project.
+        name, changes = git("rev-parse", "--short=8", "HEAD"), git("status", "--porcelain", "--", *code)
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return name + (" + uncommitted changes" if changes else "") if is_clone else "unknown"
 
 
 def cpu_model() -> str:
@@ -49,7 +69,7 @@ def write_json(result: dict[str, Any], file: Path) -> None:
 
 
 def as_text(result: dict[str, Any]) -> str:
-    """The output of a verb: tables, broken lines, machine.
+    """The output of a verb: tables, broken lines, commit, machine.
 
     Notes that several tables have in common are printed below the first one.
     """
@@ -59,7 +79,7 @@ def as_text(result: dict[str, Any]) -> str:
         printed.update(notes)
         parts.append(_table_text(part | {"notes": notes}))
     parts += [f"BROKEN: {line}" for line in result["broken"]]
-    parts.append("; ".join([_pairs(result["machine"]), _pairs(result["versions"])]))
+    parts.append("; ".join([f"commit {result['commit']}", _pairs(result["machine"]), _pairs(result["versions"])]))
     return "\n\n".join([f"`{result['command']}`", *parts])
 
 

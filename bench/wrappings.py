@@ -27,9 +27,9 @@ JOINTS = 1024
 LAYER = '#usda 1.0\n(\n    defaultPrim = "plant"\n)\ndef "plant" (references = @{}@)\n{{\n}}\n'
 NOTE = """
 Bytes of all files together, with faces and branches and no other attributes. Largest error over the diagonal of all
-frames. USD, Alembic and morph targets hold float32 positions of every frame. Our bytes in USD: the .ath file and a
-layer that references it. In a GLB the mesh at rest is there too, for programs that do not know ATH_motion, and is the
-rest pose of the motion.
+frames. USD, Alembic and morph targets hold float32 positions of every frame, and morph targets normals of faces too.
+Our bytes in USD: the .ath file and a layer that references it. In a GLB the mesh at rest is there too, with its
+normals, for programs that do not know ATH_motion, and is the rest pose of the motion.
 """
 
 

@@ -19,11 +19,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-import athcodec
+from bench.store import commits
+from bench.tables import commit
 from spec import robust
 from spec.robust import Row
 
 HERE = Path(__file__).resolve().parent
+CODE = ("athcodec", "spec", "tests", ":!spec/robustness.*")  # Paths whose uncommitted changes a result is marked with.
 COUNTS = ("tried", "crashes", "hangs", "over_limit", "wrong")
 
 
@@ -33,6 +35,7 @@ def classes() -> list[str]:
 
 
 def run_class(name: str, seconds: float) -> dict:
+    tested = commit(CODE)  # Before the run, which may take hours.
     module = importlib.import_module(f"spec.robust.{name}")
     start = time.perf_counter()
     rows = [asdict(row) for row in module.run(seconds)]
@@ -43,7 +46,7 @@ def run_class(name: str, seconds: float) -> dict:
         "figures": figures,
         "seconds": round(time.perf_counter() - start, 1),
         "budget": seconds,
-        "version": athcodec.__version__,
+        "commit": tested,
         "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
     }
 
@@ -54,8 +57,8 @@ def as_markdown(results: dict[str, dict]) -> str:
         "",
         "Written by `python -m spec.robustness`. *over limit*: took more memory or work than its limits allow; "
         "*wrong*: neither refused nor",
-        "decoded as it should be. A section describes the version of athcodec under it; all sections are run again",
-        "before each release.",
+        "decoded as it should be. A section describes the commit under it, in brackets if that only stored it; all",
+        "sections are run again before each release.",
         "",
     ]
     for name, result in sorted(results.items()):
@@ -65,7 +68,7 @@ def as_markdown(results: dict[str, dict]) -> str:
             counts = " | ".join(f"{row[count]:,}" for count in COUNTS)
             lines.append(f"| {row['name']} | {counts} | {row['note']} |")
         lines += ["", *(f"* {key}: {value}" for key, value in result["figures"].items())]
-        lines += ["", f"{result['seconds']:.0f} s, athcodec {result['version']}, {result['machine']}.", ""]
+        lines += ["", f"{result['seconds']:.0f} s, commit {commits([result])}, {result['machine']}.", ""]
     return "\n".join(lines)
 
 

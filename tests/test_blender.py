@@ -286,6 +286,31 @@ def test_meshes_without_branches_are_written_within_the_bound_too(extended_blend
         assert error <= decoder.file.max_error_bound + 2e-6
 
 
+LEFT_OUT = """
+fresh()
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3)
+other = bpy.context.object
+bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3)
+leaf = bpy.context.object
+leaf.data.materials.append(bpy.data.materials.new("bark"))
+leaf.data.uv_layers.new(name="second")
+leaf.data.attributes.new("bend", "FLOAT", "EDGE")
+other.select_set(True)
+bpy.context.scene.frame_end = 3
+import bl_ext.user_default.athcodec.exporter as exporter
+summary = exporter.write_object(bpy.context, leaf, args["ath"], effort="fast")
+save(attributes=summary.not_read["attribute"], materials=summary.not_read["material"])
+named = exporter.left_out_of(bpy.context, summary)
+assert named.startswith("object " + other.name) and "material bark" in named, named
+"""
+
+
+@pytest.mark.programs
+def test_what_of_a_scene_is_not_written_is_named(extended_blender, tmp_path):
+    found = extended_blender.run(LEFT_OUT, ath=str(tmp_path / "a.ath"))
+    assert {"second", "bend"} <= set(found["attributes"]) and found["materials"].tolist() == ["bark"]
+
+
 GLTF = """
 fresh()
 scene = bpy.context.scene

@@ -1,8 +1,8 @@
 """The examples of README.md and docs/ do what they say, and the reference of the Python API is complete.
 
 Blocks marked `sh`, `python`, `c` and `js` are run as they stand, in the order of their page; `bash` marks commands that
-install something or take long, which are not, but for those of the README for a file of yours. Blocks marked `py` take
-packages that athcodec does without: `-m programs` runs them.
+install something or take long, which are not; those of the README are run by `.ci/readme` where nothing is installed.
+Blocks marked `py` take packages that athcodec does without: `-m programs` runs them.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import json
 import os
 import pydoc
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -87,11 +88,18 @@ def test_commands_and_python_of_a_page_run(page, files, tmp_path, monkeypatch):
         assert names["maps"].shape[1:] == (3, 4)
 
 
-def test_the_commands_of_the_readme_for_a_file_of_yours_work_as_typed(tmp_path):
-    [commands] = [text for _, text in blocks(ROOT / "README.md", "bash") if "tree.html" in text]
-    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    run("bash", "-eu", "-c", commands, cwd=tmp_path, env=os.environ | {"PATH": programs})
-    assert {"tree.h5", "tree.ath", "tree.html"} <= {path.name for path in tmp_path.iterdir()}
+def test_the_program_that_runs_the_readme_in_a_fresh_clone_leaves_no_block_out_without_a_word():
+    script = runpy.run_path(str(ROOT / ".ci" / "readme"))["script"]
+    readme, command = (ROOT / "README.md").read_text("utf-8"), blocks(ROOT / "README.md", "bash")[-1][1].strip()
+    runs = script(readme, "/a clone", command)
+    assert "git clone -q '/a clone' athcodec" in runs and command not in runs and "runs elsewhere" in runs
+    for language, text in blocks(ROOT / "README.md", "bash", "python")[:-1]:
+        assert text.replace("git clone ADDRESS", "git clone -q '/a clone'") in runs, language
+    for wrong in ("```js\n1\n```\n", "\n\n    athcodec demo\n", "git clone ADDRESS\n", "```\nathcodec demo\n```\n"):
+        with pytest.raises(SystemExit, match=r"README\.md.*: got .*, expected"):
+            script(readme + wrong, "/a clone", command)
+    with pytest.raises(SystemExit, match="expected the command that runs elsewhere"):
+        script(readme, "/a clone", "make test")
 
 
 @pytest.mark.programs
@@ -177,6 +185,15 @@ def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
     shown = run("node", tmp_path / "example.mjs", files / "tree.ath")
     with athcodec.open(files / "tree.ath") as decoder:
         assert shown == decoder.positions(30).tobytes()
+
+
+def test_the_report_on_robustness_is_that_of_the_stored_results_and_names_the_commit_of_each():
+    from spec.robustness import as_markdown
+
+    results = json.loads((ROOT / "spec" / "robustness.json").read_text())
+    text = (ROOT / "spec" / "robustness.md").read_text()
+    assert text == as_markdown(results)
+    assert len(re.findall(r"^\d+ s, commit \(?[0-9a-f]{8}\)?( \+ uncommitted changes)?, ", text, re.M)) == len(results)
 
 
 def test_the_reference_has_every_public_name():

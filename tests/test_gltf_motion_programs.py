@@ -208,6 +208,13 @@ def flag():
     return MotionClip(positions.astype(np.float32), np.arange(30) / 30, faces=faces, attributes={"normals": normals})
 
 
+def drawn_by(page, engine, name, seconds, box):
+    """The picture, (256, 256, 3)."""
+    words = [engine, name, seconds, box]
+    picture = page.evaluate("([engine, url, seconds, box]) => draw(engine, url, seconds, box)", words)
+    return np.array(picture, np.uint8).reshape(256, 256, 4)[..., :3].astype(int)
+
+
 @pytest.mark.browser
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pictures_are_those_of_the_file_before(engine, page):
@@ -217,9 +224,7 @@ def test_pictures_are_those_of_the_file_before(engine, page):
     box = {"centre": [0.4, 1, 0], "size": [2, 2, 0]}
 
     def draw(name, seconds):
-        words = [engine, name, seconds, box]
-        picture = opened.evaluate("([engine, url, seconds, box]) => draw(engine, url, seconds, box)", words)
-        return np.array(picture, np.uint8).reshape(256, 256, 4)[..., :3].astype(int)
+        return drawn_by(opened, engine, name, seconds, box)
 
     def differing(one, other):
         return (np.abs(one - other).max(axis=2) > 40).mean()
@@ -229,3 +234,22 @@ def test_pictures_are_those_of_the_file_before(engine, page):
     assert drawn > 0.05, "the sheet is in the picture"
     assert differing(draw("source.glb", 0.9), later) < 0.02 * drawn
     assert differing(draw("motion.glb", 0.2), later) > 0.3 * drawn, "it moves"
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("form", ["joints", "morphs", "into"])
+def test_a_leaf_is_green_from_either_side(engine, form, page):
+    opened, folder = page
+    leaf, name = flag().replace(attributes={}), f"{engine}_{form}.glb"
+    write(leaf, folder / name, animation="morphs" if form == "into" else form)
+    if form == "into":
+
+        def strip(gltf):
+            del gltf["materials"], gltf["meshes"][0]["primitives"][0]["material"]
+
+        encoded(rewritten(folder / name, folder / f"bare_{name}", strip), folder / name)
+    for side in (1, -1):
+        box = {"centre": [0.2, 1, 0], "size": [2, 2, 0], "side": side}
+        red, green, blue = drawn_by(opened, engine, name, 0.5, box)[128, 128]
+        assert green > 50 and green > 1.2 * red and green > 1.4 * blue

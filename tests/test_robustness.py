@@ -19,7 +19,7 @@ pytestmark = pytest.mark.tools
 
 def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monkeypatch):
     rows = [Row("files", 1234, wrong=2, note="two of them"), Row("others", 5)]
-    old = {"about": "Kept.", "rows": [], "figures": {"hours": "3"}, "seconds": 1.0, "version": "0", "machine": "m"}
+    old = {"about": "Kept.", "rows": [], "figures": {"hours": "3"}, "seconds": 1.0, "commit": "1a", "machine": "m"}
     (tmp_path / "robustness.json").write_text(json.dumps({"older": old}))
     monkeypatch.setattr("spec.robust.hostile.run", lambda budget: rows)
     monkeypatch.setattr("spec.robust.hostile.figures", lambda: {"slowest": "1 s"})
@@ -27,6 +27,8 @@ def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monk
     text = (tmp_path / "robustness.md").read_text()
     assert "| files | 1,234 | 0 | 0 | 0 | 2 | two of them |" in text and "| others | 5 |" in text
     assert "* slowest: 1 s" in text and "* hours: 3" in text
+    head = printed("git", "rev-parse", "--short=8", "HEAD", cwd=ROOT).strip()
+    assert f"commit {head}" in text and "commit 1a, m." in text
     assert set(json.loads((tmp_path / "robustness.json").read_text())) == {"older", "hostile"}
 
 

@@ -570,7 +570,8 @@ def test_usd_reads_our_file_with_samples_of_what_moves_only(tmp_path):
     arrays = [
         {str(each.GetPrimvarName()) for each in UsdGeom.PrimvarsAPI(prim).GetAuthoredPrimvars()} for prim in prims
     ]
-    assert arrays == [{"st", "branch_id", "age", "normals", "radius"}] * 2 + [{"branch_id", "normals"}] * 2
+    every = {"branch_id", "normals", "displayColor"}
+    assert arrays == [every | {"st", "age", "radius"}] * 2 + [every] * 2
     for i, code in enumerate(range(101, 111)):
         points = np.concatenate([np.array(UsdGeom.PointBased(prim).GetPointsAttr().Get(code)) for prim in prims])
         assert np.array_equal(points, expected[i])

@@ -55,8 +55,6 @@ def clip_to_encode(
         parts = []
         for path, called in each_once(paths):
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
-            if read is None:
-                _say_takes(whole, path, args)
             parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
         loops = _checked_names(names, len(parts), args)
@@ -110,16 +108,6 @@ def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[
     if args.strength is None:
         return [()] * clip_count
     return list(zip(args.strength, args.heading or [0.0] * clip_count))
-
-
-def _say_takes(clip: MotionClip, path: str, args: argparse.Namespace) -> None:
-    played, others = (clip.metadata.get(name) for name in ("animations", "other_animations"))
-    if others and not args.only:
-        say(
-            "takes",
-            f"{path}: this is {', '.join(played or ['none'])}; there are {', '.join(others)} too, and "
-            "--takes all makes a clip of each",
-        )
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
@@ -190,9 +178,18 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             unit=args.unit,
             up_axis=args.up_axis,
         )
-    if clip.not_read:
-        say("not read", f"{path}: {listed(clip.not_read)}")
+    _say_not_read(clip, path)
     return clip
+
+
+def _say_not_read(clip: MotionClip, path: str) -> None:
+    not_read = dict(clip.not_read)
+    if others := not_read.pop("animation", None):
+        played = ", ".join(clip.metadata.get("animations", ["none"]))
+        text = f"this is {played}; there are {', '.join(others)} too, and --takes all makes a clip of each"
+        say("takes", f"{path}: {text}")
+    if not_read:
+        say("not read", f"{path}: {listed(not_read)}")
 
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:

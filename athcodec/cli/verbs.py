@@ -101,11 +101,15 @@ def _last_motion(path: str) -> str:
 
 
 def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
+    from athcodec.sources import listed
+
     with gltf_to_fill(paths, args) as host, scratch_folder(args.into) as folder:
         encoded = os.path.join(folder, "motion.ath")
         with clip_to_encode(paths, args, lambda _: host.clip) as clip:
             summary = _encode(clip, paths[0], encoded, args, attributes="none", host_rest=True)
             host.write(args.into, encoded)
+        if host.lost:
+            say("not written", f"{args.into}: {listed(host.lost)}")
     return summary
 
 

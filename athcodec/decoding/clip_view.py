@@ -58,9 +58,7 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.level if level is None else whole("level", level)
-        if not 0 <= self.level < decoder.file.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {decoder.file.level_count - 1}")
+        self.level = decoder.level if level is None else decoder.file.checked_level(level)
         played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
@@ -143,7 +141,7 @@ class ClipView:
         numpy.ndarray
             (stop - start, N, 3), scene units.
         """
-        parts = []
+        parts, start, stop = [], whole("start", start), whole("stop", stop)
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             part = frames[max(start - first, 0) : max(min(stop, last) - first, 0)]
             if part:
@@ -182,6 +180,7 @@ class ClipView:
         IndexError
             If the view has no such frame.
         """
+        frame = whole("frame", frame)
         for (decoder, frames), (first, last) in zip(self._runs, self.clip_range_frames):
             if first <= frame < last:
                 return decoder.affines(frames[frame - first], self.level)

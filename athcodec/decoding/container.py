@@ -20,6 +20,7 @@ import zstandard
 from athcodec import _native
 from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, address, crc32c, lib
 from athcodec.errors import BadChunk, LimitExceeded
+from athcodec.options import set_numbers
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 13, 0
@@ -90,6 +91,9 @@ class Limits:
     decoded_chunk_bytes: int = 256 << 20
     memory_bytes: int = 2 << 30
     corners: int = 1 << 26
+
+    def __post_init__(self) -> None:
+        set_numbers(self, wholes=self.__dataclass_fields__)
 
 
 @dataclass

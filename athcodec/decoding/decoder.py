@@ -26,7 +26,7 @@ from athcodec.decoding.file_tables import Clip, Level, median_rate
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
-from athcodec.options import whole
+from athcodec.options import real
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
@@ -393,7 +393,7 @@ class Decoder:
         ClipUnavailable
             If no clip has that name.
         """
-        used = {name: float(weight) for name, weight in weights.items() if not weight <= 0}
+        used = {name: number for name, weight in weights.items() if not (number := real("weights", weight)) <= 0}
         if not 0 < len(used) <= core_file.BLEND_CLIPS or not np.isfinite(list(used.values())).all():
             raise ValueError(f"weights: got {dict(weights)}; expected 1 to {core_file.BLEND_CLIPS} that are above 0")
         return self._blending.positions(
@@ -482,11 +482,7 @@ class Decoder:
         return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
 
     def _checked_level(self, level: int | None) -> int:
-        if level is None:
-            return self.level
-        if not 0 <= (level := whole("level", level)) < self.file.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.file.level_count - 1}")
-        return level
+        return self.level if level is None else self.file.checked_level(level)
 
     def _indexed(self, index: Any, level: int, dtype: np.dtype) -> np.ndarray:
         """Return what a NumPy index picks of all positions, after decoding the frames that it reads."""

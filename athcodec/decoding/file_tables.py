@@ -10,7 +10,7 @@ import numpy as np
 from athcodec.decoding import container as ct
 from athcodec.decoding.chunk_file import ChunkFile
 from athcodec.errors import ClipUnavailable, LevelUnavailable, Truncated
-from athcodec.options import whole
+from athcodec.options import real, whole
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,12 @@ class FileTables(ChunkFile):
         late = () if self.complete else self._table["level"][self._is_late].tolist()
         return min([self._damaged_from, *late])
 
+    def checked_level(self, level: int) -> int:
+        """Return the number of a stored level as an int. Raises LevelUnavailable if the file has no such level."""
+        if not 0 <= (level := whole("level", level)) < self.level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
+        return level
+
     @property
     def deepest(self) -> int:
         """The deepest complete level. Raises Truncated if not even level 0 is complete."""
@@ -188,7 +194,7 @@ class FileTables(ChunkFile):
 
     def nodes_at(self, level: int) -> int:
         """Return the number of parts at a stored level: exact stems, and subtrees that move as one."""
-        parts = self.core.cut(level)
+        parts = self.core.cut(self.checked_level(level))
         return len(self.exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     def exact_branches(self, parts: np.ndarray) -> np.ndarray:
@@ -232,7 +238,7 @@ class FileTables(ChunkFile):
         LevelUnavailable
             If the deepest level's largest error is above it.
         """
-        segments = segments or range(self.segment_count)
+        max_error, segments = real("max_error", max_error), segments or range(self.segment_count)
         largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
         if not (within := np.flatnonzero(largest <= max_error)).size:
             raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")

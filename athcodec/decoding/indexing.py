@@ -43,7 +43,8 @@ def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
     if numbers.dtype == bool:
         numbers = np.flatnonzero(numbers)
     elif numbers.size and numbers.dtype.kind not in "iu":
-        whole_numbers = [whole("frame", number, BETWEEN) for number in numbers.ravel().tolist()]
+        items = np.array(chosen, object).ravel()  # NumPy has no common type for all integers.
+        whole_numbers = [whole("frame", number, BETWEEN) for number in items]
         numbers = np.reshape(whole_numbers, numbers.shape)
     numbers = numbers.astype(np.intp)
     for number in numbers[(numbers < -frame_count) | (numbers >= frame_count)].ravel()[:1]:

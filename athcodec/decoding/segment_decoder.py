@@ -12,6 +12,7 @@ from athcodec.decoding import core_file
 from athcodec.decoding.chunk_file import ChunkFile
 from athcodec.errors import LimitExceeded
 from athcodec.files.threads import ThreadPool, default_jobs
+from athcodec.options import whole
 
 Show: TypeAlias = Callable[[int, core_file.Segment], None]
 Room: TypeAlias = Callable[[int], np.ndarray | None]
@@ -60,6 +61,7 @@ class SegmentDecoder(ChunkFile):
         FormatError
             If it is damaged, or needs more memory than is allowed.
         """
+        segment, level = whole("segment", segment), whole("level", level)
         what = f"level {level}, segment {segment}"
         size = self.core.segment_size(level) if to is None else self.core.segment_size_to(segment, level)
         needed = self._checked_need(level, what)

@@ -137,11 +137,13 @@ class StaticData(FileTables):
         return self._as_rest(self.level_rest(level)) if self.rest_is_missing else self.rest_at(level)
 
     def rest_at(self, level: int) -> np.ndarray:
-        """Return the rest pose as decoded with a stored level. Raises Truncated if `rest_is_missing`."""
+        """Return the rest pose as decoded with a stored level. Raises Truncated if `rest_is_missing`,
+        LevelUnavailable."""
         if self.rest_is_missing:
             raise Truncated(
                 f"SOURCE_REST: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
             )
+        level = self.checked_level(level)
         level_read, pose = self._rest_read
         if level_read != level:
             with self._poses_read(level, [ct.SOURCE_REST]):
@@ -161,6 +163,7 @@ class StaticData(FileTables):
         It is (N, 3) float64, scene units, not rounded to the source's type, in core_file.SOURCE_ORDER or FILE_ORDER.
         Raises LevelUnavailable, FormatError.
         """
+        level = self.checked_level(level)
         with self._poses_read(level):
             return self.core.level_rest(level, order)
 

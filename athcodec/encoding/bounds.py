@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
-from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
+from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR, set_numbers
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
 SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
@@ -19,7 +19,8 @@ SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvin
 class BoundOption:
     """At most one of the options of `encode` that set the bound; `lossless` changes the default.
 
-    Raises ValueError for several of them, BoundError for one that is no finite number above 0.
+    Raises ValueError for several of them, TypeError for one that is no number, BoundError for one that is not finite
+    and above 0.
     """
 
     max_error: float | None = None
@@ -32,9 +33,12 @@ class BoundOption:
         options = {name: value for name in names if (value := getattr(self, name)) is not None}
         if len(options) > 1:
             raise ValueError(f"got {' and '.join(options)}; expected one of them")
+        set_numbers(self, reals=names)
         for name, value in options.items():
-            if not (math.isfinite(value) and value > 0):
+            if not 0 < getattr(self, name) < math.inf:
                 raise BoundError(f"{name}: got {value}; expected a finite number above 0")
+        if self.target_size is not None:
+            object.__setattr__(self, "target_size", int(self.target_size))
 
     def in_scene_units(self, source: Source, file_size: Callable[[float], float], filled: float = 0.97) -> float:
         """Return the bound for a clip. Fractions are of the diagonal of all frames, or with the rest pose if these have

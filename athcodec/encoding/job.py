@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 
 from athcodec._native import MEASURES, SHEET
 from athcodec.decoding import container as ct
@@ -77,7 +78,16 @@ from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
 from athcodec.motion.units import Length
-from athcodec.options import DEFAULT_LADDER, EFFORTS, LADDERS, MAX_SEGMENT, MIN_SEGMENT, SMOOTHNESS, ladder_of, whole
+from athcodec.options import (
+    DEFAULT_LADDER,
+    EFFORTS,
+    LADDERS,
+    MAX_SEGMENT,
+    MIN_SEGMENT,
+    SMOOTHNESS,
+    ladder_of,
+    set_numbers,
+)
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
@@ -129,9 +139,7 @@ class EncodingOptions:
         return self.exact_rest or self.host_rest
 
     def __post_init__(self) -> None:
-        for name in ("segment_frames", "jobs"):
-            if getattr(self, name) is not None:
-                whole(name, getattr(self, name))
+        set_numbers(self, wholes=("segment_frames", "jobs", "predicted_frames"))
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
         if self.exact_rest and self.host_rest:
@@ -202,7 +210,7 @@ def _completed(
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
     """Return the clip, which then names its weights, and these as (N,) float64. Raises ClipError."""
     name = weights if isinstance(weights, str) else ERROR_WEIGHTS
-    attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: np.asarray(weights)}
+    attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: _numbers(weights)}
     if name not in attributes:
         raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
     array = attributes[name]
@@ -216,6 +224,12 @@ def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, 
     if bad.size:
         raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
     return clip.replace(attributes=attributes, metadata=clip.metadata | {ERROR_WEIGHTS: name}), values
+
+
+def _numbers(weights: npt.ArrayLike) -> np.ndarray:
+    """Return weights as an array that a file can hold, which has no type for long doubles."""
+    array = np.asarray(weights)
+    return array.astype(np.float64) if array.dtype.kind == "f" and array.itemsize > 8 else array
 
 
 def time_chunk(*times: np.ndarray) -> bytes:

@@ -16,6 +16,7 @@ from athcodec.errors import BoundError
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.units import Length, parse_length
+from athcodec.options import real
 
 OF_BOUND = "bound"
 EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # Largest step of a branch, over the lengths of edges and heights of faces.
@@ -38,13 +39,13 @@ class RestPrecision:
     def of(cls, option: float | str | Length | None) -> RestPrecision:
         if option is None:
             return cls()
-        if option == OF_BOUND:
+        if isinstance(option, str) and option == OF_BOUND:
             return cls(of_bound=True)
         length = parse_length(option) if isinstance(option, str) else option if isinstance(option, Length) else None
         if length is not None and length.unit:
             value, precision = length.value, cls(length=length)
         else:
-            value = float(option if length is None else length.value)
+            value = real("rest_error", option if length is None else length.value)
             precision = cls(fraction=value)
         if not (math.isfinite(value) and value > 0):
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")

@@ -18,6 +18,7 @@ from athcodec.motion.affine_fit import Differences, Pieces, seen_from
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.motion.thresholds import Thresholds
+from athcodec.options import whole
 
 if TYPE_CHECKING:
     from athcodec.motion.clip import MotionClip
@@ -286,7 +287,7 @@ class Ath:
         return _file_order_frames(positions, self.hierarchy, self.rest.mean(axis=0))
 
     def _path(self, node: int) -> tuple[Pieces, int]:
-        if not 0 <= node < self.node_count:
+        if not 0 <= (node := whole("ATH node", node)) < self.node_count:
             raise IndexError(f"ATH node: got {node}, expected 0 to {self.node_count - 1}")
         path = [node]
         while self.node_parent[path[-1]] >= 0:
@@ -297,7 +298,7 @@ class Ath:
 
     def _cut_pieces(self, level: int) -> tuple[Pieces, np.ndarray, np.ndarray]:
         """Return all pieces that the cut's maps depend on, those of the cut by first vertex, and which are stems."""
-        if level < 0:
+        if (level := whole("level of a cut", level)) < 0:
             raise ValueError(f"level of a cut: got {level}, expected 0 to {self.height}")
         hierarchy = self.hierarchy
         nodes = np.flatnonzero(self.node_depth <= level)
@@ -465,7 +466,7 @@ def survey(
     limits = Thresholds(0.0, eta, 0.0 if xi is None else xi, lam)
     if limits.lam and xi is None:
         raise ValueError(f"xi: got None with lam {lam}, expected the distance that lam counts from")
-    if max_depth < 0:
+    if (max_depth := whole("max_depth", max_depth)) < 0:
         raise ValueError(f"max_depth: got {max_depth}, expected a number >= 0")
     if hierarchy is None:
         hierarchy = hierarchy_of(clip)

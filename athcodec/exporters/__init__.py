@@ -22,7 +22,7 @@ from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.files.kinds import add_kind
-from athcodec.options import whole
+from athcodec.options import set_numbers
 from athcodec.sources import Format, format_by_suffix, format_named
 from athcodec.sources.registry import registered
 
@@ -72,7 +72,8 @@ class WriteOptions:
     nanite: bool = False
 
     def __post_init__(self) -> None:
-        if self.rig is not None and not 1 <= whole("rig", self.rig) <= MOST_RIGGED:
+        set_numbers(self, wholes=("rig",))
+        if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
         if self.nanite and self.rig is None:
             raise ValueError("nanite: got no rig, expected one too")

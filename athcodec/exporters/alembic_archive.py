@@ -38,6 +38,7 @@ from athcodec.exporters.scene_objects import (
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.motion.quaternions import rotation_matrices
+from athcodec.sources.alembic_archive import BASES
 from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
 
 SCOPES = {
@@ -233,7 +234,9 @@ def _mesh_sample(obj: SceneObject, held: dict, own: dict) -> Any:
 def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
-    basis = AbcGeom.BasisType.kBsplineBasis if is_cubic else AbcGeom.BasisType.kNoBasis
+    bases = {name: each for each, name in BASES.items()}
+    basis = bases.get(obj.details.get("basis"), AbcGeom.BasisType.kBsplineBasis)
+    basis = basis if is_cubic else AbcGeom.BasisType.kNoBasis
     is_closed = obj.details.get("wrap") == "periodic"
     wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
     return AbcGeom.OCurvesSchemaSample(

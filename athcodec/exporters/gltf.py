@@ -3,8 +3,9 @@
 "joints": a joint for each part that moves as one at the view's level (node or stem of the .ath file, branch of a
 clip), all side by side below one node. A joint has translation, rotation and three scales; a part that this leaves
 further off than the level itself is (of a clip: fitting.OF_CLIP of its size) is cut into shorter ones (fitting.py).
-"morphs": a morph target per frame, exact but for float32, and large. "auto": the smaller of both for a
-short clip, else joints, or morph targets where float32 puts joints further off and they are not too large.
+"morphs": a morph target per frame, exact but for float32, and large: it moves normals too, as these would stay those of
+the rest pose and the light with them. "auto": the smaller of both for a short clip, else joints, or morph targets where
+float32 puts joints further off and they are not too large.
 options.rig makes a hierarchy of joints for engines (rig.py), options.instances nodes of copies of one shape
 (gltf_copies.py). Some engines, three.js among them, move triangles only: lines and points stand still there.
 
@@ -31,6 +32,7 @@ from athcodec.errors import ClipError
 from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import (
+    NORMAL,
     UNKNOWN_BOUND,
     VERTICES,
     Glb,
@@ -46,10 +48,13 @@ from athcodec.exporters.gltf_build import (
 )
 from athcodec.exporters.gltf_copies import PATHS, GltfCopies, Movers, unit_quaternion, with_copies
 from athcodec.exporters.gltf_joints import Joints, fit_joints
+from athcodec.exporters.looks import looks_of
 from athcodec.exporters.rig import fit_rig
-from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays
+from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays, objects_of
+from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import new_file
 from athcodec.files.plain import FilePath
+from athcodec.sources.scene_objects import GUESSED
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -73,10 +78,11 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
 
 
 def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
-    meshes, left_out = meshes_of(motion, Path(fspath(path)).stem)
+    looks = looks_of(motion, objects_of(motion))
+    meshes = meshes_of(motion, looks, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
-    found, lost_copies = with_copies(motion, meshes) if has_copies else (list(meshes), {})
-    write = _writer(motion, options, found, lambda done: report(0.95 * done))
+    found, lost_copies = with_copies(motion, meshes.meshes) if has_copies else (list(meshes.meshes), {})
+    write = _writer(motion, options, looks.surface, found, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
         "unit": str(motion.metadata.get("unit") or ""),
@@ -89,11 +95,12 @@ def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress)
         facts["instances"] = sum(len(shape.copies.rest[0]) for shape in copied)
         write.max_error = max(write.max_error, *(shape.copies.max_error for shape in copied))
     lost = copied[0].lost if copied else []
-    left_out += [key[1:] for key in lost]
+    left_out = meshes.left_out + [key[1:] for key in lost]
     facts |= {"left_out": left_out} if left_out else {}
+    facts |= {GUESSED: ["normals"]} if meshes.has_made_normals else {}
     facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
     glb = Glb(clock(motion) | {"athcodec": facts})
-    add_materials(glb, motion)
+    add_materials(glb, meshes)
     transform = root_transform(motion)
     later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
@@ -104,18 +111,17 @@ def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress)
 
 
 def _writer(
-    motion: Any, options: WriteOptions, found: list[GltfMesh | GltfCopies], report: Progress
+    motion: Any, options: WriteOptions, surface: Surface, found: list[GltfMesh | GltfCopies], report: Progress
 ) -> _Joined | _Morphed:
     """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
-    chosen = np.zeros(motion.vertex_count, bool)
-    for shape in found:
-        if isinstance(shape, GltfMesh):
-            chosen[shape.source] = True
-    count = int(chosen.sum())
-    if not count:
+    shapes = [shape for shape in found if isinstance(shape, GltfMesh)]
+    if not shapes:
         return _Joined(motion, None)
+    chosen = np.zeros(motion.vertex_count, bool)
+    chosen[np.concatenate([shape.source for shape in shapes])] = True
+    offsets = sum(map(_offset_count, shapes))
     wanted, joints = options.animation, None
     if wanted != "morphs":
         joints = fit_joints(motion, allowed_error(motion), MOST_JOINTS, report, None if chosen.all() else chosen)
@@ -125,20 +131,21 @@ def _writer(
             "lower level, or morphs"
         )
     if wanted == "auto":
-        wanted = _smaller(motion, count, joints)
+        wanted = _smaller(motion, offsets, joints)
     if wanted == "joints":
         return _Joined(motion, joints)
-    check_morphs(motion, count)
-    return _Morphed(motion)
+    check_morphs(motion, offsets)
+    return _Morphed(motion, surface)
 
 
 def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
     """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
-    found, left_out = meshes_of(motion, name, more)
-    glb = Glb(clock(motion) | {"athcodec": dict(extras) | ({"left_out": left_out} if left_out else {})})
-    add_materials(glb, motion)
+    meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
+    left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
+    glb = Glb(clock(motion) | {"athcodec": dict(extras) | left_out})
+    add_materials(glb, meshes)
     root = glb.node(name="plant", **root_transform(motion))
-    for shape in found:
+    for shape in meshes.meshes:
         if "TEXCOORD_1" in shape.attributes:  # glTF allows a second set only beside a first
             shape.attributes.setdefault("TEXCOORD_0", np.zeros((len(shape.source), 2), np.float32))
         glb.node(root, name=shape.name, mesh=add_mesh(glb, shape, np.asarray(motion.rest)))
@@ -146,26 +153,31 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
         glb.write(out)
 
 
-def _smaller(motion: Any, vertex_count: int, joints: Joints | None) -> str:
-    morphs = motion.frame_count * (12 * vertex_count + 4 * motion.frame_count + BYTES_PER_TARGET)
+def _offset_count(shape: GltfMesh) -> int:
+    """Return how many vectors a morph target of a mesh has: one for each position and each normal."""
+    return len(shape.source) * (2 if NORMAL in shape.attributes else 1)
+
+
+def _smaller(motion: Any, offset_count: int, joints: Joints | None) -> str:
+    morphs = motion.frame_count * (12 * offset_count + 4 * motion.frame_count + BYTES_PER_TARGET)
     fits = joints is not None and joints.max_error <= allowed_error(motion)
-    if joints is None or not fits and _morphs_fit(motion, vertex_count):
+    if joints is None or not fits and _morphs_fit(motion, offset_count):
         return "morphs"
     is_short = motion.frame_count <= SHORT_FRAMES and morphs <= SHORT_BYTES
     size = len(joints.bind) * (BYTES_PER_JOINT_KEY * motion.frame_count + BYTES_PER_JOINT)
     return "morphs" if is_short and morphs < size else "joints"
 
 
-def _morphs_fit(motion: Any, vertex_count: int) -> bool:
-    return motion.frame_count <= MORPH_FRAMES and 12 * motion.frame_count * vertex_count <= MORPH_BYTES
+def _morphs_fit(motion: Any, offset_count: int) -> bool:
+    return motion.frame_count <= MORPH_FRAMES and 12 * motion.frame_count * offset_count <= MORPH_BYTES
 
 
-def check_morphs(motion: Any, vertex_count: int) -> None:
-    """Raises ClipError where a motion of so many vertices is more than morph targets can sensibly hold."""
-    if not _morphs_fit(motion, vertex_count):
+def check_morphs(motion: Any, offset_count: int) -> None:
+    """Raises ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
+    if not _morphs_fit(motion, offset_count):
         raise ClipError(
-            f"morph targets: got {motion.frame_count} frames of {vertex_count} vertices, expected at most "
-            f"{MORPH_FRAMES} frames and {MORPH_BYTES} bytes, 12 a vertex and frame: choose joints or fewer frames"
+            f"morph targets: got {motion.frame_count} frames of {offset_count} positions and normals, expected at most "
+            f"{MORPH_FRAMES} frames and {MORPH_BYTES} bytes, 12 of each in a frame: choose joints or fewer frames"
         )
 
 
@@ -291,8 +303,8 @@ class _Morphed:
 
     name, facts = "morphs", {}
 
-    def __init__(self, motion: Any):
-        self._motion = motion
+    def __init__(self, motion: Any, surface: Surface):
+        self._motion, self._surface = motion, surface
         self.max_error = 0.0
 
     def add(
@@ -307,47 +319,54 @@ class _Morphed:
             meshes.append(add_mesh(glb, shape, np.asarray(self._motion.rest)))
             node = glb.node(root, name=shape.name, mesh=meshes[-1])
             channels.append({"sampler": 0, "target": {"node": node, "path": "weights"}})
-        frames, count = self._motion.frame_count, sum(len(shape.source) for shape in shapes)
+        frames = self._motion.frame_count
         weights, moving, more = np.eye(frames, dtype=np.float32), takes(self._motion), []
         for take in moving:
             times, values = glb.array(take.times, bounds=True), glb.array(take.of(weights).reshape(-1, 1))
             more.append(([{"input": times, "output": values}], list(channels)))
         _animate(glb, moving, Movers.all_of(movers), more)
-        view = glb.view(12 * count * frames, target=VERTICES, byteStride=12)
-        bounds = self._add_targets(glb, shapes, meshes, view, count)
+        view = glb.view(12 * frames * sum(map(_offset_count, shapes)), target=VERTICES, byteStride=12)
+        bounds = self._add_targets(glb, shapes, meshes, view)
         least, self.max_error = self.max_error, UNKNOWN_BOUND
         return self._targets(glb, shapes, bounds, least, report)
 
-    def _add_targets(
-        self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int, count: int
-    ) -> list[list[dict]]:
-        """The accessors, by frame and mesh, whose bounds are not known yet."""
+    def _add_targets(self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int) -> list[list[dict]]:
+        """The accessors of positions, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for _ in range(self._motion.frame_count):
             accessors.append([])
             for mesh, shape in zip(meshes, found):
                 bounds = {"min": [UNKNOWN_BOUND] * 3, "max": [UNKNOWN_BOUND] * 3}
-                index = glb.accessor(view, np.dtype(np.float32), len(shape.source), 3, byteOffset=place, **bounds)
-                accessors[-1].append(glb.json["accessors"][index])
+                target = {}
+                for key, more in (("POSITION", bounds), (NORMAL, {})):
+                    if key == NORMAL and NORMAL not in shape.attributes:
+                        continue
+                    kind = np.dtype(np.float32), len(shape.source), 3
+                    target[key] = glb.accessor(view, *kind, byteOffset=place, **more)
+                    place += 12 * len(shape.source)
+                accessors[-1].append(glb.json["accessors"][target["POSITION"]])
                 for primitive in glb.json["meshes"][mesh]["primitives"]:
-                    primitive.setdefault("targets", []).append({"POSITION": index})
-                place += 12 * len(shape.source)
+                    primitive.setdefault("targets", []).append(target)
         return accessors
 
     def _targets(
         self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]], least: float, report: Progress
     ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
+        normals = MovingNormals(self._surface, rest)
         largest = least**2
         for start, frames in self._motion.blocks():
             for i, frame in enumerate(frames):
                 offsets = (frame.astype(np.float64) - rest).astype(np.float32)
                 away = rest.astype(np.float64) + offsets - frame
                 largest = max(largest, float(np.einsum("ni,ni->n", away, away).max()))
+                normals.move(frame)
                 for shape, accessor in zip(found, accessors[start + i]):
                     values = offsets[shape.source]
                     accessor["min"], accessor["max"] = values.min(axis=0).tolist(), values.max(axis=0).tolist()
                     yield values.tobytes()
+                    if NORMAL in shape.attributes:
+                        yield normals.offsets(shape.attributes[NORMAL], shape.source).tobytes()
             report((start + len(frames)) / self._motion.frame_count)
         self.max_error = float(np.sqrt(largest))
         glb.json["asset"]["extras"]["athcodec"]["max_error"] = self.max_error

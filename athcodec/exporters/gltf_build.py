@@ -3,7 +3,9 @@
 Polygons are drawn as triangles (which polygon a triangle came from is not kept), edges as lines where an object has no
 faces, vertices as points where it has neither. Vertices keep their order; one whose corners have different texture
 coordinates, normals or colours is written once more behind the others of its object. What a vertex of glTF cannot
-have (rows per face or branch, numbers that float32 does not hold) is left out and named. See gltf.py for motion.
+have (rows per face or branch, numbers that float32 does not hold) is left out and named. Each primitive has a material
+(looks.py), and faces have normals, the clip's or those of its rest pose. What is guessed of a material stands in its
+extras, as names of its members: {"athcodec": {"guessed": ["name"]}}. See gltf.py for motion.
 """
 
 from __future__ import annotations
@@ -19,24 +21,29 @@ import numpy as np
 
 from athcodec import __version__
 from athcodec.errors import ClipError
+from athcodec.exporters.looks import Look, Looks, line_look
 from athcodec.exporters.placing import origin_of
-from athcodec.exporters.scene_objects import face_materials, is_double_sided
+from athcodec.exporters.scene_objects import face_materials
 from athcodec.exporters.timing import start_frame_of
 from athcodec.motion.clip import ClipRange, stated_fps
 from athcodec.motion.joining import metadata_of
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.sources.scene_objects import FACE_MATERIAL, TWO_SIDES
+from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN
 from athcodec.sources.timing import whole
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 VERTICES, INDICES = 34962, 34963
 LARGEST_GLB = 2**32 - 1
+ROUGHNESS = 0.8  # of all materials that are made here, none of which is of metal
+UNLIT = "KHR_materials_unlit"
 UNKNOWN_BOUND = -1.2345678901234567e-300  # as long in JSON as a number gets
 HALF = float(np.sqrt(0.5))
 TURNS = {"y": None, "z": [-HALF, 0.0, 0.0, HALF], "x": [0.0, 0.0, HALF, HALF]}
 NOT_PER_VERTEX = ("part_vertex_counts", "face_vertex_counts", "face_vertex_indices")
-SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": ("NORMAL", (3,)), "colors": ("COLOR_0", (3, 4))}
+COLOUR, NORMAL = "COLOR_0", "NORMAL"
+MEMBERS = {"name": "name", "colour": "pbrMetallicRoughness", "is_two_sided": "doubleSided"}  # of materials, by Look's
+SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": (NORMAL, (3,)), "colors": (COLOUR, (3, 4))}
 
 
 class Glb:
@@ -141,49 +148,63 @@ class Glb:
 @dataclass(frozen=True, eq=False)
 class GltfMesh:
     """One object: source (n,) the clip's vertices that it shows, corners (F, 3) or (E, 2) of them, or None for points;
-    attributes by their semantic, (n, width); the material of each triangle (F,), -1 for none, or None; whether it is
-    seen from both sides."""
+    the material of each row of these, or (1,) of the points; attributes by their semantic, (n, width)."""
 
     name: str
     source: np.ndarray
     corners: np.ndarray | None
+    materials: np.ndarray
     attributes: dict[str, np.ndarray]
-    materials: np.ndarray | None = None
-    is_double_sided: bool = False
+
+    @property
+    def has_faces(self) -> bool:
+        return self.corners is not None and self.corners.shape[1] == 3
 
 
-def meshes_of(motion: Any, name: str, more: Mapping[str, np.ndarray] | None = None) -> tuple[list[GltfMesh], list[str]]:
-    """The objects of a clip, and the names of attributes that they cannot have. `more`: by semantic, (N, width)."""
+@dataclass(frozen=True, eq=False)
+class GltfMeshes:
+    """The objects of a clip, the materials that they number, the names of attributes that they cannot have, and whether
+    their normals are those of the rest pose in place of the clip's."""
+
+    meshes: list[GltfMesh]
+    materials: list[Look]
+    left_out: list[str]
+    has_made_normals: bool
+
+
+def meshes_of(motion: Any, looks: Looks, name: str, more: Mapping[str, np.ndarray] | None = None) -> GltfMeshes:
+    """Return the objects of a clip; `more`: further attributes by semantic, (N, width)."""
     faces = motion.polygons
     triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
     corner_vertex = np.asarray(faces[1], np.int64) if faces is not None else np.zeros(0, np.int64)
     per_vertex, per_corner, left_out = _sorted_attributes(motion, len(corner_vertex))
     per_vertex |= more or {}
+    has_made_normals = bool(len(triangles)) and NORMAL not in per_vertex | per_corner
+    if has_made_normals:
+        per_vertex[NORMAL] = looks.surface.unit_normals(motion.rest)
     source, corner_place = _split(corner_vertex, per_corner, motion.vertex_count)
     values = {key: array[source] for key, array in per_vertex.items()}
     values |= {key: _from_corners(array, corner_place, len(source)) for key, array in per_corner.items()}
     edges = np.asarray(motion.edges, np.int64) if motion.edges is not None else np.zeros((0, 2), np.int64)
-    labels, names = face_materials(motion) or (np.full(0 if faces is None else len(faces[0]), -1), [])
-    labels = np.where((labels >= 0) & (labels < len(names)), labels, -1)
-    if faces is not None:
-        triangles_per_face = np.maximum(np.asarray(faces[0], np.int64) - 2, 0)
-        labels = np.repeat(labels, triangles_per_face)
-    made, parts = [], _objects(motion, name, corner_vertex[triangles], edges)
-    details = motion.metadata.get("part_usd")
-    if not isinstance(details, list) or len(details) != len(parts):
-        details = [{}] * len(parts)
-    for (part_name, start, stop), detail in zip(parts, details):
+    labels = np.repeat(looks.labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0)) if faces is not None else None
+    made, materials = [], list(looks.materials)
+    for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
         rows = np.flatnonzero((source >= start) & (source < stop))
         place = np.full(len(source), -1)
         place[rows] = np.arange(len(rows))
-        own = np.flatnonzero((corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop))
-        mine, materials = triangles[own], labels[own]
-        lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
-        corners = place[corner_place[mine]] if len(mine) else place[lines] if len(lines) else None
         attributes = {key: array[rows] for key, array in values.items()}
-        materials = materials if (materials >= 0).any() else None
-        made.append(GltfMesh(part_name, source[rows], corners, attributes, materials, is_double_sided(detail)))
-    return made, left_out
+        own = np.flatnonzero((corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop))
+        if len(own):
+            made.append(GltfMesh(part_name, source[rows], place[corner_place[triangles[own]]], labels[own], attributes))
+            continue
+        if has_made_normals:
+            del attributes[NORMAL]
+        look = line_look(part_name)
+        materials += [] if look in materials else [look]
+        lines = edges[(edges[:, 0] >= start) & (edges[:, 0] < stop)]
+        label = np.full(max(len(lines), 1), materials.index(look))
+        made.append(GltfMesh(part_name, source[rows], place[lines] if len(lines) else None, label, attributes))
+    return GltfMeshes(made, materials, left_out, has_made_normals)
 
 
 def add_mesh(
@@ -192,48 +213,46 @@ def add_mesh(
     """Adds a mesh to the file, in its rest pose (N, 3)."""
     semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
     for key, values in (mesh.attributes | dict(attributes or {})).items():
-        is_ratio = key == "COLOR_0" or key.startswith("WEIGHTS_")
+        is_ratio = key == COLOUR or key.startswith("WEIGHTS_")
         semantic[key] = glb.array(values, target=VERTICES, normalized=is_ratio and values.dtype.kind == "u")
     primitive |= {"attributes": semantic, "mode": 0}
-    primitives = [primitive]
-    if mesh.corners is not None:
-        primitive["mode"] = 4 if mesh.corners.shape[1] == 3 else 1
+    if mesh.corners is None:
+        primitives = [primitive | {"material": int(mesh.materials[0])}]
+    else:
+        primitive["mode"] = 4 if mesh.has_faces else 1
         dtype = np.uint16 if mesh.corners.max() < 65535 else np.uint32
         primitives = [
-            primitive | more | {"indices": glb.array(corners.astype(dtype).reshape(-1, 1), target=INDICES)}
-            for corners, more in _by_material(glb, mesh)
+            primitive
+            | {"indices": glb.array(corners.astype(dtype).reshape(-1, 1), target=INDICES)}
+            | {"material": label}
+            for label, corners in by_material(mesh.corners, mesh.materials)
         ]
     glb.json["meshes"].append({"name": mesh.name, "primitives": primitives})
     return len(glb.json["meshes"]) - 1
 
 
-def _by_material(glb: Glb, mesh: GltfMesh) -> list[tuple[np.ndarray, dict[str, Any]]]:
-    """The corners of each primitive, and which material it has: those of the first triangle's first."""
-    if mesh.materials is None:
-        return [(mesh.corners, _material(glb, mesh, -1))]
-    labels, first = np.unique(mesh.materials, return_index=True)
-    return [
-        (mesh.corners[mesh.materials == label], _material(glb, mesh, int(label))) for label in labels[np.argsort(first)]
-    ]
+def by_material(corners: np.ndarray, labels: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    """Return the materials of rows of corners, (n, k), and the rows that have each; that of the first row first."""
+    found, first = np.unique(labels, return_index=True)
+    return [(int(label), corners[labels == label]) for label in found[np.argsort(first)]]
 
 
-def _material(glb: Glb, mesh: GltfMesh, label: int) -> dict[str, Any]:
-    """The material of a primitive, -1 for none. One that a mesh of two sides has shows both wherever it is."""
-    is_surface = mesh.is_double_sided and mesh.corners.shape[1] == 3
-    if is_surface and label < 0:
-        materials = glb.json.setdefault("materials", [])
-        label = materials.index(TWO_SIDES) if TWO_SIDES in materials else len(materials)
-        materials[label:] = materials[label:] or [TWO_SIDES]
-    elif is_surface:
-        glb.json["materials"][label] |= TWO_SIDES
-    return {"material": label} if label >= 0 else {}
+def add_materials(glb: Glb, meshes: GltfMeshes) -> None:
+    """Add the materials of meshes, which leave the colours as they are that vertices have."""
+    has_colours = any(COLOUR in mesh.attributes for mesh in meshes.meshes)
+    glb.json["materials"] = [material_of(look, has_colours) for look in meshes.materials]
+    if not all(look.is_lit for look in meshes.materials):
+        glb.json.setdefault("extensionsUsed", []).append(UNLIT)
 
 
-def add_materials(glb: Glb, motion: Any) -> None:
-    """The clip's materials, of which it has the names alone."""
-    _, names = face_materials(motion) or (None, [])
-    if names:
-        glb.json["materials"] = [{"name": name} for name in names]
+def material_of(look: Look, has_colours: bool) -> dict[str, Any]:
+    """Return the material of glTF; has_colours: of vertices that have colours."""
+    colour = [1.0, 1.0, 1.0, 1.0] if has_colours else [*look.colour, 1.0]
+    surface = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
+    material: dict[str, Any] = {"name": look.name, "pbrMetallicRoughness": surface}
+    material |= {"doubleSided": True} if look.is_two_sided else {}
+    material |= {} if look.is_lit else {"extensions": {UNLIT: {}}}
+    return material | {"extras": {OWN: {GUESSED: [MEMBERS[field] for field in look.guessed]}}}
 
 
 def root_transform(motion: Any) -> dict[str, Any]:
@@ -358,13 +377,13 @@ def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
     """As glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
-    if semantic == "COLOR_0" and values.dtype in (np.uint8, np.uint16):
+    if semantic == COLOUR and values.dtype in (np.uint8, np.uint16):
         return values
     if values.dtype.kind != "f" or not np.isfinite(values).all():
         return None
-    if semantic == "COLOR_0" and (values.min() < 0 or values.max() > 1):
+    if semantic == COLOUR and (values.min() < 0 or values.max() > 1):
         return None
-    if semantic == "NORMAL":
+    if semantic == NORMAL:
         length = np.linalg.norm(values.astype(np.float64), axis=1, keepdims=True)
         return (values / length).astype(np.float32) if (length > 1e-12).all() else None
     return values.astype(np.float32)

@@ -17,7 +17,7 @@ import numpy as np
 
 from athcodec.exporters.copies import Copies, fit_copies
 from athcodec.exporters.fitting import allowed_error
-from athcodec.exporters.gltf_build import Glb, GltfMesh, add_mesh
+from athcodec.exporters.gltf_build import NORMAL, Glb, GltfMesh, add_mesh
 from athcodec.exporters.gltf_joints import SLACK, hold
 from athcodec.exporters.scene_objects import SceneObject, lost_copies, objects_of
 
@@ -81,7 +81,8 @@ class GltfCopies:
         extension = {INSTANCING: {"attributes": parts}}
         glb.node(parent, name=self.shape.name, mesh=mesh, extensions=extension, **transform)
         for key in ("extensionsUsed", "extensionsRequired"):  # without it one of them would be shown
-            glb.json[key] = [INSTANCING]
+            names = glb.json.setdefault(key, [])
+            names += [] if INSTANCING in names else [INSTANCING]
 
 
 def with_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
@@ -152,14 +153,12 @@ def _joined(shapes: list[GltfMesh]) -> GltfMesh:
         return shapes[0]
     starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
     corners = [shape.corners + start for shape, start in zip(shapes, starts) if shape.corners is not None]
-    materials = [shape.materials for shape in shapes if shape.materials is not None]
     return GltfMesh(
         shapes[0].name,
         np.concatenate([shape.source for shape in shapes]),
         np.concatenate(corners) if corners else None,
+        np.concatenate([shape.materials for shape in shapes]),
         {key: np.concatenate([shape.attributes[key] for shape in shapes]) for key in shapes[0].attributes},
-        np.concatenate(materials) if materials else None,
-        shapes[0].is_double_sided,
     )
 
 
@@ -186,7 +185,7 @@ def _hold(motion: Any, copies: Copies, allowed: float) -> None:
 
 
 def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies | None:
-    """None where copies have texture coordinates or colours of their own."""
+    """None where copies have materials, texture coordinates or colours of their own."""
     which, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
     if (np.bincount(which) * obj.copies != len(which)).any():
         return None
@@ -196,7 +195,7 @@ def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies 
     shared, own, lost = {}, {}, []
     for key, values in shape.attributes.items():
         each = values[rows]
-        if key == "NORMAL":
+        if key == NORMAL:
             shared[key] = (each[0] @ copies.axes).astype(np.float32)
         elif _same(each, each[:1]):
             shared[key] = each[0]
@@ -210,8 +209,10 @@ def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies 
     place[rows[0]] = np.arange(rows.shape[1])
     corners, materials = shape.corners, shape.materials
     if corners is not None:
-        mine = (which[corners] == 0).all(axis=1)
-        corners, materials = place[corners[mine]], None if materials is None else materials[mine]
+        of_copy = np.argsort(which[corners[:, 0]], kind="stable").reshape(obj.copies, -1)
+        if (materials[of_copy] != materials[of_copy[:1]]).any():
+            return None
+        corners, materials = place[corners[of_copy[0]]], materials[of_copy[0]]
     one = replace(shape, source=local[rows[0]], corners=corners, attributes=shared, materials=materials)
     return GltfCopies(one, copies, own, lost)
 

@@ -2,8 +2,8 @@
 
 What moved them before goes where nothing else needs it: morph targets, skins and their joints, channels of animations,
 and the bytes of these. Meshes keep their bytes where their vertices lie in the motion's space; one that hangs on a
-moving node gets new positions, normals and tangents there and a node of its own. spec/gltf/README.md describes the
-extension.
+moving node gets new positions, normals and tangents there and a node of its own. Primitives that move and have no
+material, which viewers show black, get one (looks.py) and normals. spec/gltf/README.md describes the extension.
 """
 
 from __future__ import annotations
@@ -24,7 +24,20 @@ from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters.gltf import check_morphs
-from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES, takes
+from athcodec.exporters.gltf_build import (
+    COLOUR,
+    COMPONENTS,
+    INDICES,
+    NORMAL,
+    TYPES,
+    UNLIT,
+    VERTICES,
+    by_material,
+    material_of,
+    takes,
+)
+from athcodec.exporters.looks import Look, line_look, looks_of_mesh
+from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import file_ids, keeping, new_file
 from athcodec.files.gltf.document import HARMLESS, MESHOPT, GltfFile
 from athcodec.files.gltf.json import BROKEN, entries
@@ -45,6 +58,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import GltfNode, read_moving
+from athcodec.sources.gltf_scene import POINTER, Target, target_of
 
 # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
 SHARE_OF_TWINS = 1 / 8
@@ -52,7 +66,6 @@ ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
 KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # _references lists every index that these extensions hold.
-POINTING = ("KHR_animation_pointer",)  # to places in the file, as text
 Reference = tuple[str, Any, Any]
 """An array of the file ("accessors" ...), and the holder and key of an index into it."""
 
@@ -61,13 +74,15 @@ class Into:
     """A GLB whose vertices are to move by ATH_motion: `clip` is their motion, with the meshes as its rest pose.
 
     Close it. keep_animation leaves what moved the vertices in the file, for programs that do not know the extension.
-    name: of the motion. What other motions of the file move is left to them.
+    name: of the motion. What other motions of the file move is left to them. `lost`, once it is written: what the file
+    said and the new one does not, by its kind.
     Raises ClipError where the file is no GLB with its bytes inside, nothing in it moves, or what moves has to move to
     another node though it is to be kept.
     """
 
     def __init__(self, path: FilePath, options: ReadOptions, keep_animation: bool = False, name: str | None = None):
         self.path, self._keep, self._name = os.fspath(path), keep_animation, name
+        self.lost: dict[str, list[str]] = {}
         with naming(path, *BROKEN):
             self._file = GltfFile(path)
         try:
@@ -120,7 +135,7 @@ class Into:
             said.setdefault("motions", []).append(motion)
             if EXTENSION not in self._json.setdefault("extensionsUsed", []):
                 self._json["extensionsUsed"].append(EXTENSION)
-            if all(name.startswith(KNOWN) and name not in POINTING for name in self._json["extensionsUsed"]):
+            if _knows_references(self._json):
                 _prune(self._json, used, self._needless)
             data = binary.packed(self._json)
         with keeping(file_ids(self.path)), new_file(path) as out:
@@ -165,12 +180,13 @@ class Into:
         if self._keep:
             self._needless: set[int] = set()
             return
+        meshes = {gltf["nodes"][index]["mesh"] for index in moving}
         for index in sorted(moving):
             if not self._placement.stays(index):
                 self._move_mesh(index)
         freed = moving | {joint for node in self._nodes for joint in node.joints}
         self._needless = _needless_nodes(gltf, freed)
-        _drop_channels(gltf, moving, self._needless)
+        _drop_channels(gltf, moving, meshes, self._needless)
 
     def _replace_part(self, part: GltfNode, mesh: dict | None, binary: _Binary) -> None:
         primitives = part.primitives
@@ -181,17 +197,17 @@ class Into:
                 for number, one in enumerate(originals)
                 if any(one is own for own in primitives)
             ]
+        faces = [self._faces(part, primitive) for primitive in primitives]
         attributes = self._attributes(part, binary)
         if self._keep and ("POSITION" in attributes or not self._placement.stays(part.index)):
             raise ClipError(
                 f"mesh {part.name!r}: got one that lies elsewhere than its motion, expected no animation to keep"
             )
-        for primitive in primitives:
+        for primitive, rows in zip(primitives, faces):
             if not self._keep:
                 primitive.pop("targets", None)
-                if part.mirrored.any() and len(rows := triangles(self._file, primitive, part.count)):
-                    corners = rows[:, ::-1].reshape(-1, 1).astype(np.uint32)
-                    primitive |= {"indices": binary.array(corners), "mode": 4}
+                if part.mirrored.any() and len(rows):
+                    primitive |= _drawn(binary, rows)
             kept = {
                 key: value
                 for key, value in primitive["attributes"].items()
@@ -204,6 +220,51 @@ class Into:
                 {"firstVertex": part.first} if part.first and self._vertex is None else {}
             )
             primitive.setdefault("extensions", {})[EXTENSION] = said
+        shown = self._json["meshes"][part.mesh] if mesh is None else mesh
+        self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
+
+    def _faces(self, part: GltfNode, primitive: dict) -> np.ndarray:
+        """The triangles of a primitive, (F, 3), as they are to face in the motion's space."""
+        rows = triangles(self._file, primitive, part.count)
+        return rows[:, ::-1] if part.mirrored.any() and not self._keep else rows
+
+    def _dress(
+        self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: _Binary
+    ) -> None:
+        """Gives primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
+        if all("material" in primitive for primitive, _ in drawn):
+            return
+        faces = np.concatenate([rows for _, rows in drawn])
+        rest = self.clip.source_rest[self._vertices(part)]
+        surface = Surface(np.full(len(faces), 3), faces.ravel(), rest)
+        looks, normals, first = looks_of_mesh(surface, part.name), None, 0
+        for primitive, rows in drawn:
+            first += len(rows)
+            if "material" in primitive:
+                continue
+            has_colours = COLOUR in primitive["attributes"]
+            if not len(rows):
+                primitive["material"] = self._material(line_look(part.name), has_colours)
+                continue
+            if NORMAL not in primitive["attributes"] and not primitive.get("targets"):
+                if normals is None:
+                    normals = binary.attribute(surface.unit_normals(rest))
+                primitive["attributes"][NORMAL] = normals
+            groups = by_material(rows, looks.labels[first - len(rows) : first])
+            further = [copy.deepcopy(primitive) for _ in groups[1:]]
+            siblings += further  # at the end, so that the others keep their places
+            for each, (label, own) in zip([primitive, *further], groups):
+                each["material"] = self._material(looks.materials[label], has_colours)
+                each |= _drawn(binary, own) if further else {}
+
+    def _material(self, look: Look, has_colours: bool) -> int:
+        """The number of a material, which is added where the file has not got it."""
+        materials, material = self._json.setdefault("materials", []), material_of(look, has_colours)
+        if material not in materials:
+            materials.append(material)
+            used = self._json.setdefault("extensionsUsed", []) if not look.is_lit else [UNLIT]
+            used += [] if UNLIT in used else [UNLIT]
+        return materials.index(material)
 
     def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
         """The attributes of a part that change, as new accessors."""
@@ -230,6 +291,8 @@ class Into:
         """Its mesh to a node of its own, in the motion's space."""
         gltf, node = self._json, self._json["nodes"][index]
         matrix = self._placement.space
+        if not self._placement.is_always_shown(index):
+            self.lost.setdefault("visibility in time", []).append(node.get("name") or f"node {index}")
         own = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
         if not np.array_equal(matrix, np.eye(4)):
             own["matrix"] = matrix.T.ravel().tolist()
@@ -237,6 +300,11 @@ class Into:
         scene = gltf["scenes"][gltf.get("scene", 0)] if gltf.get("scenes") else None
         if scene is not None:
             scene.setdefault("nodes", []).append(len(gltf["nodes"]) - 1)
+
+
+def _drawn(binary: _Binary, faces: np.ndarray) -> dict[str, int]:
+    """The members of a primitive that draws these triangles, (F, 3)."""
+    return {"indices": binary.array(faces.reshape(-1, 1).astype(np.uint32), INDICES), "mode": 4}
 
 
 def _named(clip: MotionClip) -> MotionClip:
@@ -253,19 +321,20 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
 
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
     """
-    for view in views:
-        check_morphs(view, view.vertex_count)
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         gltf, used, binary, needless = file.json, _used(file.json), _Binary(file), set[int]()
         numbers = [view.decoder.file.source.number for view in views]
-        for number, view, places in zip(numbers, views, [places_of(file, number) for number in numbers]):
+        places_of_views = [places_of(file, number) for number in numbers]
+        for view, places in zip(views, places_of_views):
+            check_morphs(view, sum(len(vertices) * (1 + _has_normals(primitive)) for primitive, vertices in places))
+        for number, view, places in zip(numbers, views, places_of_views):
             said = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
-            _add_targets(gltf, binary, places, view)
+            _add_targets(file, binary, places, view)
             needless |= _morph_nodes(gltf, binary, places, view, said)
             for primitive, _ in places:
                 _pop_extension(primitive)
         _remove_motions(gltf, set(numbers))
-        if all(name.startswith(KNOWN) and name not in POINTING for name in gltf.get("extensionsUsed", ())):
+        if _knows_references(gltf):
             _prune(gltf, used, needless)
         data = binary.packed(gltf)
     with keeping(file_ids(path)), new_file(out) as written:
@@ -308,17 +377,28 @@ def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
         return written.tell()
 
 
-def _add_targets(gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
+def _has_normals(primitive: dict) -> bool:
+    return NORMAL in primitive["attributes"]
+
+
+def _add_targets(file: GltfFile, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
     """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
-    rest = np.asarray(motion.rest).astype(np.float32)
+    gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
+    normals, at_rest = MovingNormals(Surface(*(motion.polygons or ((), ())), rest), rest), {}
     for primitive, _ in places:
         primitive["targets"] = []
         primitive["attributes"].pop(VERTEX_ATTRIBUTE, None)
+        if _has_normals(primitive):
+            at_rest[id(primitive)] = file.floats(primitive["attributes"][NORMAL])
     for _, frames in motion.blocks():
         for frame in frames:
             offsets = (frame.astype(np.float64) - rest).astype(np.float32)
+            normals.move(frame)
             for primitive, vertices in places:
-                primitive["targets"].append({"POSITION": binary.attribute(offsets[vertices], bounds=True)})
+                target = {"POSITION": binary.attribute(offsets[vertices], bounds=True)}
+                if id(primitive) in at_rest:
+                    target[NORMAL] = binary.attribute(normals.offsets(at_rest[id(primitive)], vertices))
+                primitive["targets"].append(target)
     moved = {id(primitive) for primitive, _ in places}
     for mesh in gltf["meshes"]:
         if moved.isdisjoint(map(id, mesh["primitives"])):
@@ -347,7 +427,7 @@ def _morph_nodes(
     for index in moving:
         gltf["nodes"][index].pop("weights", None)
     needless = _needless_nodes(gltf, moving | {joint for skin in skins for joint in gltf["skins"][skin]["joints"]})
-    _drop_channels(gltf, moving, needless)
+    _drop_channels(gltf, moving, {gltf["nodes"][index]["mesh"] for index in moving}, needless)
     weights = np.eye(motion.frame_count, dtype=np.float32)
     for take, clip_range in zip(takes(motion), motion.clip_ranges):
         mine = said.get(clip_range.name, {})
@@ -423,16 +503,19 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
     )
 
 
-def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
-    """Return the channels of these nodes' weights, and of needless ones."""
+def _drop_channels(gltf: dict, moving: set[int], meshes: set[int], needless: set[int]) -> None:
+    """Removes the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
+
+    def stays(target: Target | str) -> bool:
+        if isinstance(target, str):
+            return True
+        if target.holder == "meshes":
+            return target.index not in meshes
+        return target.index not in needless and not (target.path == "weights" and target.index in moving)
+
     kept = []
     for animation in gltf.get("animations", []):
-        targets = [(channel["target"].get("node"), channel["target"].get("path")) for channel in animation["channels"]]
-        channels = [
-            channel
-            for channel, (node, path) in zip(animation["channels"], targets)
-            if node not in needless and not (path == "weights" and node in moving)
-        ]
+        channels = [channel for channel in animation["channels"] if stays(target_of(channel))]
         samplers = sorted({channel["sampler"] for channel in channels})
         animation["samplers"] = [animation["samplers"][sampler] for sampler in samplers]
         for channel in channels:
@@ -442,6 +525,21 @@ def _drop_channels(gltf: dict, moving: set[int], needless: set[int]) -> None:
     gltf.pop("animations", None)
     if kept:
         gltf["animations"] = kept
+    if not any(_has_pointer(channel) for animation in kept for channel in animation["channels"]):
+        for key in ("extensionsUsed", "extensionsRequired"):
+            if POINTER in gltf.get(key, ()):
+                gltf[key].remove(POINTER)
+                if not gltf[key]:
+                    del gltf[key]
+
+
+def _has_pointer(channel: dict) -> bool:
+    return POINTER in (channel["target"].get("extensions") or {})
+
+
+def _knows_references(gltf: dict) -> bool:
+    """Whether _references lists every index of the file: not where pointers to places in it remain, which are text."""
+    return all(name.startswith(KNOWN) and name != POINTER for name in gltf.get("extensionsUsed", ()))
 
 
 def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
@@ -601,10 +699,12 @@ class _Binary:
         self._json.setdefault("accessors", []).append(accessor)
         return len(self._json["accessors"]) - 1
 
-    def array(self, values: np.ndarray) -> int:
+    def array(self, values: np.ndarray, target: int | None = None) -> int:
         """An accessor of (count, 1) numbers without gaps, with its bounds."""
         index = self.attribute(values, bounds=True)
-        self._json["bufferViews"][self._json["accessors"][index]["bufferView"]].pop("target")
+        view = self._json["bufferViews"][self._json["accessors"][index]["bufferView"]]
+        del view["target"]
+        view |= {} if target is None else {"target": target}
         return index
 
     def packed(self, gltf: dict) -> bytes:

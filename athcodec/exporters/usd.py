@@ -3,7 +3,9 @@
 Faces, texture coordinates, names of materials and other static arrays are written once. Frames are written as they come
 and saved now and then: what has been saved leaves memory, so that a clip may be longer than memory. USD's points are
 float32, a clip in float64 is rounded. The root has a translation if a plant is far from the origin; of other prims only
-copies of one shape have transforms: they become a PointInstancer if options.instances asks for it. What USD has no
+copies of one shape have transforms: they become a PointInstancer if options.instances asks for it. Every object has a
+displayColor, and open faces are doubleSided (looks.py). Meshes whose points have no time samples, as those of a rig,
+have normals; of others renderers make those of flat faces, which follow the motion and take no bytes. What USD has no
 place for (branches, arrays per branch, bytes) lies in the namespace "athcodec" of the root prim, from where
 sources/usd.py takes it back.
 """
@@ -24,6 +26,7 @@ from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters import usd_nanite as nanite
 from athcodec.exporters.copies import Copies, cost_of, fit_copies, one_copy, rows_of_one
 from athcodec.exporters.gltf_joints import Joints
+from athcodec.exporters.looks import Looks, line_look, looks_of
 from athcodec.exporters.placing import origin_of
 from athcodec.exporters.rig import fit_rig
 from athcodec.exporters.scene_objects import (
@@ -45,7 +48,7 @@ from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, SCHEME
+from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN, SCHEME
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
@@ -141,21 +144,24 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Progress) -> d
         UsdGeom.Xformable(root).AddTranslateOp().Set(tuple(origin))
     _describe_stage(stage, motion, max((codes[a:b] for a, b in motion.clip_range_frames), key=len), rate)
     objects = objects_of(motion)
+    looks = looks_of(motion, objects)
     if joints is not None and options.nanite:
-        return _write_assembly(stage, motion, joints, objects, codes, report)
+        return _write_assembly(stage, motion, joints, objects, looks, codes, report)
     instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
     names = distinct(_identifier(obj.name) for obj in objects)
     for number, (obj, name) in enumerate(zip(objects, names)):
         if number in instanced:
             _define_instanced(stage, f"/clip/{name}", obj, instanced[number])
+            _set_normals(obj, motion, _normals_of_one(motion, obj, instanced[number], looks))
         else:
             obj.copies, obj.target = 1, _define(stage, f"/clip/{name}", obj)
+        _show(obj, motion, looks)
     _bind_materials(stage, motion, objects, names)
     left = _static_arrays(stage, motion, objects)
     _own_arrays(root, motion, left)
     _write_presence(objects, codes)
     if joints is not None:
-        return _write_rigged(stage, motion, joints, objects, codes, report) | hidden_copies(objects)
+        return _write_rigged(stage, motion, joints, objects, looks, codes, report) | hidden_copies(objects)
     _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
     _write_frames(stage, motion, objects, codes, report)
     return cost_of(instanced) | hidden_copies(objects, options.instances)
@@ -170,18 +176,26 @@ def _time_codes(motion: Any) -> np.ndarray:
 
 
 def _write_rigged(
-    stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray, report: Progress
+    stage: Usd.Stage,
+    motion: Any,
+    joints: Joints,
+    objects: list[SceneObject],
+    looks: Looks,
+    codes: np.ndarray,
+    report: Progress,
 ) -> dict[str, Any]:
-    _set_rest(motion, objects)
+    _set_rest(motion, objects, looks)
     write_rig(stage, "/clip", motion, joints, objects, codes)
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     report(1.0)
     return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
 
 
-def _set_rest(motion: Any, objects: list[SceneObject]) -> None:
+def _set_rest(motion: Any, objects: list[SceneObject], looks: Looks) -> None:
     rest = np.asarray(motion.rest, np.float32)
+    normals = looks.surface.unit_normals(motion.rest)
     for obj in objects:
+        _set_normals(obj, motion, normals[obj.vertices])
         own = rest[obj.vertices]
         obj.target.GetPointsAttr().Set(_vec3(own))
         if len(own):
@@ -189,7 +203,13 @@ def _set_rest(motion: Any, objects: list[SceneObject]) -> None:
 
 
 def _write_assembly(
-    stage: Usd.Stage, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray, report: Progress
+    stage: Usd.Stage,
+    motion: Any,
+    joints: Joints,
+    objects: list[SceneObject],
+    looks: Looks,
+    codes: np.ndarray,
+    report: Progress,
 ) -> dict[str, Any]:
     """As Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
@@ -200,13 +220,15 @@ def _write_assembly(
             mesh = nanite.define_part(stage, f"{nanite.ROOT_PRIM}/{name}", name)
             obj.target = _define(stage, mesh, one_copy(obj))
             obj.instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath(f"{nanite.ROOT_PRIM}/{name}"))
+            _set_normals(obj, motion, _normals_of_one(motion, obj, parts[number].copies, looks))
         else:
             obj.copies, obj.target = 1, _define(stage, f"{nanite.BASE}/{name}", obj)
+        _show(obj, motion, looks)
     _bind_materials(stage, motion, objects, ["base", *names])
     nanite.mark_root(stage.GetDefaultPrim())
     _own_arrays(stage.GetDefaultPrim(), motion, _static_arrays(stage, motion, objects))
     base = [obj for number, obj in enumerate(objects) if number not in parts]
-    _set_rest(motion, base)
+    _set_rest(motion, base, looks)
     write_rig(stage, nanite.BASE, motion, joints, base, codes)
     for number, part in parts.items():
         nanite.place_part(stage, f"{nanite.ROOT_PRIM}/{names[number]}", names[number], objects[number], part, joints)
@@ -270,6 +292,43 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
     schema.CreatePointsAttr()
     schema.CreateExtentAttr()
     return schema
+
+
+def _show(obj: SceneObject, motion: Any, looks: Looks) -> None:
+    """Sets the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
+    that have colours keep these, which are written with the clip's other arrays."""
+    colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
+    if obj.kind == "mesh":
+        labels = looks.labels[obj.face_rows].reshape(obj.copies, -1)[0]
+        found, of_face = np.unique(labels, return_inverse=True)
+        colours = [looks.materials[label].colour for label in found]
+        if not is_double_sided(obj.details) and looks.surface.is_open[obj.face_rows].any():
+            _mark_guess(obj.target.CreateDoubleSidedAttr(True))
+    if "colors" in motion.attributes or not colours:
+        return
+    has_one = len(set(colours)) == 1
+    primvar = obj.target.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant if has_one else UsdGeom.Tokens.uniform)
+    primvar.Set(_vec3(colours[:1] if has_one else colours))
+    if not has_one:
+        primvar.SetIndices(_int_array(of_face))
+    _mark_guess(primvar.GetAttr())
+
+
+def _set_normals(obj: SceneObject, motion: Any, normals: np.ndarray) -> None:
+    """Sets the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
+    if obj.kind == "mesh" and "normals" not in motion.attributes:
+        attribute = obj.target.CreateNormalsAttr(_vec3(normals))
+        obj.target.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+        _mark_guess(attribute)
+
+
+def _normals_of_one(motion: Any, obj: SceneObject, copies: Copies, looks: Looks) -> np.ndarray:
+    """The normals of the shape of which an object's vertices are copies."""
+    return looks.surface.unit_normals(motion.rest)[obj.vertices][: len(copies.shape)] @ copies.axes
+
+
+def _mark_guess(attribute: Usd.Attribute) -> None:
+    attribute.SetCustomDataByKey(f"{OWN}:{GUESSED}", True)
 
 
 def _bind_materials(stage: Usd.Stage, motion: Any, objects: list[SceneObject], taken: Iterable[str]) -> None:

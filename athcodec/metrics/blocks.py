@@ -7,6 +7,8 @@ from math import sqrt
 
 import numpy as np
 
+from athcodec.options import real
+
 SLICE_VALUES = 1 << 20
 _SHIFT = 15  # bits of a float32 that a bin leaves away: 256 bins for each power of two
 
@@ -87,7 +89,7 @@ class Spread:
         """The value that this fraction of all do not exceed, at most 0.4 % too large; 0 of no values."""
         if not self.count:
             return 0.0
-        found = np.searchsorted(np.cumsum(self._bins), np.ceil(fraction * self.count))
+        found = np.searchsorted(np.cumsum(self._bins), np.ceil(real("fraction", fraction) * self.count))
         infinite = np.float32(np.inf).view(np.uint32) >> _SHIFT
         end = found if found in (0, infinite) else found + 1
         return float(np.array(end << _SHIFT, np.uint32).view(np.float32))

@@ -11,6 +11,7 @@ from math import frexp, inf, sqrt
 import numpy as np
 
 from athcodec.metrics.blocks import Meter
+from athcodec.options import whole
 
 
 class ErrorMeter(Meter):
@@ -105,7 +106,8 @@ class ErrorMeter(Meter):
 
 def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:
     """Size in bits per vertex and frame."""
-    return 8.0 * byte_count / (frame_count * vertex_count)
+    count = whole("frame_count", frame_count) * whole("vertex_count", vertex_count)
+    return 8.0 * whole("byte_count", byte_count) / count
 
 
 def _scale(values: np.ndarray) -> float:

@@ -12,6 +12,7 @@ from athcodec.metrics.error import ErrorMeter
 from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter
 from athcodec.motion.clip import MotionClip
+from athcodec.options import real
 
 if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
@@ -59,7 +60,8 @@ class MotionMeter(Meter):
         edges: np.ndarray | None = None,
         file_bound: float | None = None,
     ) -> None:
-        self._file_bound = bound if file_bound is None else file_bound
+        bound = real("bound", bound)
+        self._file_bound = bound if file_bound is None else real("file_bound", file_bound)
         self.bounds = bound if weights is None else bound * weights / weights.max()
         self.error = ErrorMeter(clip.rest, weights)
         self.smoothness = SmoothnessMeter(clip.frame_count, self.bounds, starts, loop)

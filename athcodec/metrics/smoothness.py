@@ -8,6 +8,7 @@ from math import inf, nan, sqrt
 import numpy as np
 
 from athcodec.metrics.blocks import Meter
+from athcodec.options import real, whole
 
 NEAR_SEAM = 2
 """Frames on either side of a seam that count as near it."""
@@ -46,7 +47,8 @@ class SmoothnessMeter(Meter):
     def __init__(
         self, frame_count: int, bound: float | np.ndarray = 1.0, starts: Sequence[int] = (), loop: bool = False
     ) -> None:
-        self.seams = [start for start in starts if start > 0] + ([0] if loop else [])
+        frame_count = whole("frame_count", frame_count)
+        self.seams = [start for start in (whole("starts", start) for start in starts) if start > 0] + [0] * loop
         self.source_acceleration, self.acceleration, self.error_acceleration, self.share = np.full(
             (4, frame_count), nan
         )
@@ -120,7 +122,7 @@ class SmoothnessMeter(Meter):
         frames, series = np.arange(len(self.acceleration)), np.nan_to_num(self.source_acceleration)
         near = frames[:, None] + np.arange(-NEAR_SEAM, NEAR_SEAM + 1)
         near = near % len(frames) if self._loop else near.clip(0, len(frames) - 1)
-        allowed = np.maximum(series[near].max(axis=1), 0.5 * bound)
+        allowed = np.maximum(series[near].max(axis=1), 0.5 * real("bound", bound))
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nan_to_num(self.acceleration / allowed, posinf=inf)
 

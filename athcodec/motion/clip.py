@@ -16,11 +16,13 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
+from athcodec.options import real, set_numbers, whole
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
 CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
+PLAIN_TYPES = frozenset((str, int, float, bool, type(None)))
 NOT_KEPT = {
     "c": "complex array (store real and imaginary parts as two)",
     "V": "array of raw bytes (store unsigned integers)",
@@ -68,6 +70,9 @@ class ClipRange:
     name: str
     frame_count: int
     loop: bool = False
+
+    def __post_init__(self) -> None:
+        set_numbers(self, wholes=("frame_count",))
 
 
 @dataclass(eq=False, repr=False)
@@ -276,7 +281,11 @@ class MotionClip:
         self._check_branches(vertex_count)
         self.edges = check_indices("edges", self.edges, vertex_count, width=2)
         self.attributes, left_out = check_attributes(self.attributes)
-        self.not_read, self.metadata = {**self.not_read, **left_out}, dict(self.metadata or {})
+        self.not_read = {**self.not_read, **left_out}
+        try:
+            self.metadata = _plain(dict(self.metadata or {}))
+        except RecursionError:
+            raise ClipError("metadata: got data that holds itself or is nested deeply, expected plain data") from None
         self._take_padding_off()
         self.faces = check_indices("faces", self.faces, vertex_count)
         check_polygons(self.polygons, vertex_count)
@@ -323,6 +332,7 @@ class MotionClip:
         ClipError
             If a position is NaN, infinite or beyond 1e18, or cannot be read.
         """
+        start, stop = whole("start", start), whole("stop", stop)
         if not 0 <= start < stop <= self.frame_count:
             raise IndexError(f"frames {start} to {stop}: expected 0 <= start < stop <= {self.frame_count}")
         try:
@@ -359,7 +369,7 @@ class MotionClip:
             yield start, self.block(start, min(start + length, self.frame_count))
 
     def _block_length(self, max_frames: int | None) -> int:
-        if max_frames is not None and max_frames < 1:
+        if max_frames is not None and (max_frames := whole("max_frames", max_frames)) < 1:
             raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
         length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))
         length = min(length, max_frames or length)
@@ -506,10 +516,11 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
 
 def stated_fps(metadata: Mapping[str, Any]) -> float | None:
     """Return the frames per second in `metadata["fps"]`; None if it is missing or no positive number."""
-    fps = metadata.get("fps")
-    if isinstance(fps, (int, float)) and not isinstance(fps, bool) and 0 < fps < float("inf"):
-        return float(fps)
-    return None
+    try:
+        fps = real("fps", cast(Any, metadata.get("fps")))
+    except TypeError:
+        return None
+    return fps if 0 < fps < float("inf") else None
 
 
 def frame_rate(metadata: Mapping[str, Any]) -> float:
@@ -636,6 +647,26 @@ def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield name, array
     for field_name in array.dtype.names or ():
         yield from _columns(f"{name}.{field_name}", array[field_name])
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of metadata with Python's numbers in place of NumPy's and those of other libraries."""
+    if type(value) in PLAIN_TYPES:
+        return value
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):  # Lists of names may be long.
+        return value if PLAIN_TYPES.issuperset(map(type, value)) else [_plain(item) for item in value]
+    if isinstance(value, np.ndarray) and value.ndim:
+        return [_plain(item) for item in value]
+    if isinstance(value, np.bool_):
+        return bool(value)
+    for number in (whole, real):
+        try:
+            return number("metadata", value)
+        except TypeError:
+            pass
+    return value
 
 
 def _check_parents(branch_parent: np.ndarray) -> np.ndarray:

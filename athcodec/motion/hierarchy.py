@@ -304,7 +304,7 @@ class _EulerTour:
 
 def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
     axis, sign = _parse_axis(up_axis)
-    vertices = np.atleast_1d([] if root is None else root)
+    vertices = np.array([] if root is None else root, object).ravel()  # NumPy has no common type for all integers.
     wanted = np.array([whole("root", vertex) for vertex in vertices], np.int64)
     if ((wanted < 0) | (wanted >= len(part))).any():
         raise ClipError(f"root: got {wanted.tolist()}, expected vertices 0 to {len(part) - 1}")

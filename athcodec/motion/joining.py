@@ -19,7 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
 from athcodec.motion.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.motion.frames import Frames
-from athcodec.options import whole
+from athcodec.options import real, whole
 
 BLEND = "loop_blend"  # Key of metadata: number of frames that were blended.
 OWN = "clips"  # Key of metadata: by name, what only one of several clips has.
@@ -150,11 +150,12 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     ...     athcodec.in_wind(tree, 8.0, 45.0).metadata["strength"]
     8.0
     """
-    if not (math.isfinite(strength) and strength >= 0 and math.isfinite(heading)):
+    strength, heading = real("wind strength", strength), real("wind heading", heading)
+    if not (0 <= strength < math.inf and math.isfinite(heading)):
         raise ClipError(
             f"wind: got strength {strength} and heading {heading}, expected finite numbers, the first 0 or more"
         )
-    return clip.replace(metadata=clip.metadata | {STRENGTH: float(strength), HEADING: float(heading) % 360})
+    return clip.replace(metadata=clip.metadata | {STRENGTH: strength, HEADING: heading % 360})
 
 
 def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
@@ -191,7 +192,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     100
     """
     clip_range = _only_clip_range("", clip)
-    if not 0 <= whole("blend", blend) <= clip.frame_count // 3:
+    if not 0 <= (blend := whole("blend", blend)) <= clip.frame_count // 3:
         raise ClipError(
             f"loop: got {blend} frames to blend, expected 0 to {clip.frame_count // 3}, a third of the clip"
         )

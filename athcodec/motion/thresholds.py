@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from athcodec.options import whole
+from athcodec.options import set_numbers
 
 THRESHOLDS = "hierarchy_thresholds"  # Key of metadata.
 
@@ -42,11 +42,10 @@ class Thresholds:
     lam: int
 
     def __post_init__(self) -> None:
-        for name, kind in (("epsilon", float), ("eta", int), ("xi", float), ("lam", int)):
-            value = getattr(self, name)
-            if not value >= 0:
-                raise ValueError(f"threshold {name}: got {value}, expected a number >= 0")
-            object.__setattr__(self, name, float(value) if kind is float else whole(f"threshold {name}", value))
+        set_numbers(self, reals=("epsilon", "xi"), wholes=("eta", "lam"))
+        for name in ("epsilon", "eta", "xi", "lam"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"threshold {name}: got {getattr(self, name)}, expected a number >= 0")
 
     @property
     def in_metadata(self) -> dict[str, float]:

@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 from athcodec.errors import BoundError
+from athcodec.options import set_numbers
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
 BYTES = {
@@ -52,6 +53,9 @@ class Length:
 
     value: float
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        set_numbers(self, reals=("value",))
 
     def __str__(self) -> str:
         return f"{self.value:g}{self.unit}"

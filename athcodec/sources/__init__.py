@@ -28,14 +28,26 @@ from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.units import METRES, unit_symbol
-from athcodec.options import MAX_MEMORY, SAMPLES
+from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
-# Parts of a scene that are not read and are no shapes.
+# Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "attribute element empty field hidden statement other".split(), NOT_KEPT.values()
-)
+    "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
+) | {
+    "animated property",
+    "class that nothing inherits",
+    "framesPerSecond",
+    "inactive",
+    "keys outside of the stage's range",
+    "layer",
+    "metadata",
+    "skin that no node of the scene has",
+    "variant",
+    "warning of USD",
+}
 LISTED = 8
 MEANINGS = {
+    "animation": ' (--takes all, takes="all": a clip of each)',
     "Material": " (names are kept for each face, contents only in a GLB by `encode --into`)",
     "attribute": " (they change in time, do not fit their object, or are of a kind that is not kept)",
 }
@@ -96,6 +108,7 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
+        set_numbers(self, reals=("fps",), wholes=("max_memory",))
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
@@ -277,6 +290,11 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
         f"{MEANINGS.get(kind, '')}"
         for kind, names in not_read.items()
     )
+
+
+def besides(not_read: Mapping[str, Sequence[str]]) -> str:
+    """The end of an error about a source of which nothing can be read: what it holds instead."""
+    return f"; not read: {listed(not_read)}" if not_read else ""
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:

@@ -25,7 +25,7 @@ from alembic3d import Abc, AbcGeom
 from athcodec.errors import ClipError
 from athcodec.files.reading import FileWatch
 from athcodec.motion.clip import MotionClip
-from athcodec.sources import ReadOptions
+from athcodec.sources import LISTED, ReadOptions, besides
 from athcodec.sources.scene_objects import (
     DESCRIPTOR,
     OWN,
@@ -56,6 +56,12 @@ SCOPES = {
     AbcGeom.GeometryScope.kConstantScope: "constant",
 }
 NAMED_PARAMS = (("uv", "getUVsParam"), ("normals", "getNormalsParam"), ("radius", "getWidthsParam"))
+BASES = {  # Those of cubic curves, as USD calls them.
+    AbcGeom.BasisType.kBezierBasis: "bezier",
+    AbcGeom.BasisType.kBsplineBasis: "bspline",
+    AbcGeom.BasisType.kCatmullromBasis: "catmullRom",
+}
+VISIBLE = "visible"  # The property of an object's visibility.
 UNREAD = (*SURFACE, "faceVaryingInterpolateBoundary", "velocities", "knots", "orders", "positionWeights")
 PARAMS = tuple(
     getattr(AbcGeom, f"I{name}GeomParam")
@@ -213,7 +219,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         _statics(obj, times[0])
         _name_unread(obj)
         if len(obj.places) > 1:
-            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.leave_out("normals")  # They turn with each copy.
             obj.repeat(len(obj.places))
         if obj.kind == "mesh":  # whose corners are clockwise in the file
             frames = range(len(times) if obj.moves else 1)
@@ -248,7 +254,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
 
 def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
     """All objects that are read, those of instances too; adds the others to not_read, by the names of their kinds."""
-    objects, visited = [], 0
+    objects, visited, refused = [], 0, list[str]()
     waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
         parent, place, above = waiting.pop()
@@ -260,12 +266,32 @@ def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> 
             child = parent.getChild(i)
             source = child.instanceSourcePath() if child.isInstanceRoot() else f"{above}/{child.getName()}"
             below = _Place(f"{place.path}/{child.getName()}", place.xforms, [*_visibility(child), *place.visibilities])
-            children.append((child, _add(child, source, below, objects, only, not_read), source))
+            if only and _is_shape(child) and not _is_named(child, only):
+                refused.append(below.path)
+            else:
+                below = _add(child, source, below, objects, not_read)
+            children.append((child, below, source))
         waiting += reversed(children)
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
-        raise ClipError(f"objects: got none with points{what}, expected a visible mesh, curves or points")
+        names = f", or {', '.join(refused[:LISTED])}" if refused else ""
+        raise ClipError(
+            f"objects: got none with points{what}, expected a visible mesh, curves or points{names}{besides(not_read)}"
+        )
     return objects
+
+
+def _schema(child: Any) -> str:
+    return child.getHeader().getMetaData().get("schema") or ""
+
+
+def _is_shape(child: Any) -> bool:
+    return any(_schema(child).startswith(start) for start in SCHEMAS)
+
+
+def _is_named(child: Any, patterns: Sequence[str]) -> bool:
+    names = (child.getName(), child.getFullName())
+    return any(fnmatchcase(name, pattern) for pattern in patterns for name in names)
 
 
 def _together(objects: list[_Object]) -> list[_Object]:
@@ -284,21 +310,20 @@ def _together(objects: list[_Object]) -> list[_Object]:
     return found
 
 
-def _add(
-    child: Any, source: str, place: _Place, objects: list[_Object], only: Sequence[str], not_read: dict[str, list[str]]
-) -> _Place:
+def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]) -> _Place:
     """Adds an object that has points and is shown; returns where its children hang."""
-    name = child.getHeader().getMetaData().get("schema") or ""
+    name = _schema(child)
+    if unread := _unread_properties(child):
+        not_read.setdefault("attribute", []).extend(f"{child.getFullName()}.{each}" for each in unread)
     if name.startswith("AbcGeom_Xform"):
         return replace(place, xforms=_above(child, place.xforms))
     found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
-    names = (child.getName(), child.getFullName())
     if name.startswith("AbcGeom_FaceSet"):
         return place  # A mesh is read together with its face sets.
     if found is None and name:
         kind = name.partition("_")[2].rpartition("_")[0] or name  # For example NuPatch of AbcGeom_NuPatch_v2.
-        not_read.setdefault(kind, []).append(names[1])
-    if found is None or only and not any(fnmatchcase(name, pattern) for pattern in only for name in names):
+        not_read.setdefault(kind, []).append(child.getFullName())
+    if found is None:
         return place
     kind, wrap = found
     schema = wrap(child, EXISTING).getSchema()
@@ -308,9 +333,26 @@ def _add(
     elif not place.is_seen:
         not_read.setdefault("hidden", []).append(place.path)
     else:
-        track = _track(points)
+        names, track = (child.getName(), child.getFullName()), _track(points)
         objects.append(_Object(kind, *names, schema=schema, places=[place], points=points, track=track, source=source))
     return place
+
+
+def _unread_properties(child: Any) -> list[str]:
+    """The names of properties beside the schema of an object, and, of a transform, of what users add to it."""
+    if child.isInstanceRoot() or child.isInstanceDescendant():
+        return []  # They are named where the instance's source stands.
+    schema = (child.getHeader().getMetaData().get("schemaObjTitle") or "").rpartition(":")[2]
+    beside = [name for name in _names_of(child.getProperties()) if name not in (schema, VISIBLE)]
+    if not _schema(child).startswith("AbcGeom_Xform"):
+        return beside
+    transform = AbcGeom.IXform(child, EXISTING).getSchema()
+    further = (transform.getArbGeomParams(), transform.getUserProperties())
+    return beside + [name for each in further if each.valid() for name in _names_of(each) if not _is_own(transform)]
+
+
+def _names_of(properties: Any) -> list[str]:
+    return [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
 
 
 def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
@@ -355,6 +397,8 @@ def _topology(obj: _Object) -> None:
             obj.details["wrap"] = "periodic"
         if sample.getType() == AbcGeom.CurveType.kCubic:
             obj.details["type"] = "cubic"
+            if basis := BASES.get(sample.getBasis()):
+                obj.details["basis"] = basis
     elif obj.kind == "mesh":
         obj.face_counts = _fixed(obj, obj.schema.getFaceCountsProperty())
         obj.face_indices = _fixed(obj, obj.schema.getFaceIndicesProperty())
@@ -380,7 +424,9 @@ def _name_unread(obj: _Object) -> None:
 def _bind_materials(obj: _Object) -> None:
     """By the names of face sets, in which programs write those of materials."""
     for name in obj.schema.getFaceSetNames():
-        faces = np.array(obj.schema.getFaceSet(name).getSchema().getValue().getFaces(), np.int64)
+        face_set = obj.schema.getFaceSet(name).getSchema()
+        obj.left_out += [f"{name} (a face set that changes)"] * (not face_set.isConstant())
+        faces = np.array(face_set.getValue().getFaces(), np.int64)
         if len(faces) and 0 <= faces.min() and faces.max() < len(obj.face_counts):
             obj.bind(str(name), faces)
 
@@ -493,8 +539,7 @@ def _own_properties(schema: Any) -> Any:
     properties = schema.getUserProperties()
     if not properties.valid():
         return None
-    names = [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
-    return properties if OWN in names else None
+    return properties if OWN in _names_of(properties) else None
 
 
 def _is_own(schema: Any) -> bool:
@@ -513,7 +558,7 @@ def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
     properties = _own_properties(AbcGeom.IXform(child, EXISTING).getSchema())
     if properties is None:
         return None, []
-    names = [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
+    names = _names_of(properties)
     kept = []
     for name in names:
         if name != OWN and name + DESCRIPTOR in names:

@@ -7,9 +7,8 @@ when a frame needs them. Frames lie at `fps`; by default at the rate that the ke
 Animations that move different nodes run together, of several for the same nodes the first; `only` takes patterns of the
 names of nodes and meshes, and "animation:NAME" for another animation; `takes` makes a clip of its own of each. One
 whose extras say {"loop": true} is a loop, and loses its last frame where that is the first again. The attribute
-"face_material" numbers the materials, whose names are the metadata "material_names". Not read: Draco; what is in
-materials, cameras, lights, other scenes and other attributes, which the clip's `not_read` names; normals of a mesh that
-moves.
+"face_material" numbers the materials, whose names are the metadata "material_names". Draco is refused. What else
+the file holds is named in the clip's `not_read` (gltf_unread.py).
 """
 
 from __future__ import annotations
@@ -32,9 +31,10 @@ from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionC
 from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.joining import join
 from athcodec.motion.quaternions import rotation_matrices
-from athcodec.sources import ReadOptions
+from athcodec.sources import ReadOptions, besides
 from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
-from athcodec.sources.scene_objects import FACE_MATERIAL, FLIPPED, MATERIAL_NAMES, TWO_SIDES, Facing, presence_metadata
+from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING, guessed, not_read
+from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, Facing, presence_metadata
 from athcodec.sources.timing import warn_of_missed
 
 WORK_BYTES = 64 << 20
@@ -49,11 +49,7 @@ KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
 MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
-TAKEN = ("POSITION", *NAMES)
 ANIMATION = "animation:"
-INSTANCING = "EXT_mesh_gpu_instancing"
-COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
-INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over its largest coordinate.
 SAME = 1e-5  # Distance between the ends of a loop, over the plant's size.
 
@@ -126,7 +122,7 @@ def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[
     Where nodes or skins leave meshes together as they are stored but for one matrix, the space is that of the meshes:
     the rest pose has their very numbers. Closes nothing. Raises ClipError.
     """
-    if not options.takes and len(Scene(file).played) < len(file.items("animations")):
+    if not options.takes and _other_animations(Scene(file)):
         options = replace(options, takes="all")
     with np.errstate(all="ignore"):
         scenes = _scenes(file, options)
@@ -177,6 +173,10 @@ class Placement:
             each.animates({index}) for each in self._scenes
         )
 
+    def is_always_shown(self, index: int) -> bool:
+        """Whether a node is visible at all keys of all takes."""
+        return all(scene.shown(index, scene.keys).all() for scene in self._scenes)
+
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
         """(n, 3) unit directions at a node's vertices, in this space without animation."""
         return self._motion.turned(node, directions, is_normal)
@@ -205,8 +205,11 @@ def _clip(
     motions = {name: _Motion(take, nodes, from_world) for name, take in scenes.items()}
     motion = next(iter(motions.values()))
     timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
-    still = all(len(timing.times) == 1 for timing in timings.values())
-    attributes, branches = _attributes(scene, nodes, options.skip, motion, keep_normals=still)
+    keeps_normals = all(len(timing.times) == 1 for timing in timings.values()) and not any(
+        node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
+    )
+    are_guessed = NAMES["NORMAL"] in guessed(file.json["asset"])
+    attributes, branches = _attributes(scene, nodes, options.skip, motion, keeps_normals and not are_guessed)
     facings = [Facing() for _ in nodes]
     for name, take in motions.items():
         take.add_facings(timings[name].times, facings)
@@ -219,6 +222,9 @@ def _clip(
         attributes[FACE_MATERIAL] = face_material
         said = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
     rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
+    unread = not_read(list(scenes.values()), nodes, keeps_normals or are_guessed) | (
+        {} if _chooses(options) else _other_animations(scene)
+    )
     clips = {}
     for name, timing in timings.items():
         clips[name] = MotionClip(
@@ -239,7 +245,7 @@ def _clip(
             | said
             | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
-            not_read=_not_read(scene, nodes),
+            not_read=unread,
             **branches,
         )
         clips[name].rest_given = options.rest == "auto"
@@ -272,14 +278,21 @@ def _positions(motion: _Motion, times: np.ndarray) -> Frames:
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
     """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
     patterns = [name[len(ANIMATION) :] for name in options.only if name.startswith(ANIMATION)]
+    if not _chooses(options):
+        return {"": Scene(file)}
+    still = Scene(file, [])
     if not options.takes:
-        chosen = list(_animations(file, patterns, f"only: got {ANIMATION}").values()) if patterns else None
-        return {"": Scene(file, chosen)}
+        return {"": Scene(file, list(_animations(still, patterns, f"only: got {ANIMATION}").values()))}
     if patterns:
         raise ClipError(f"takes: got only {ANIMATION}{patterns[0]} too, expected one of both")
     takes = [options.takes] if isinstance(options.takes, str) else list(options.takes)
-    chosen = _animations(file, ["*"] if takes == ["all"] else takes, "takes: got ")
+    chosen = _animations(still, ["*"] if takes == ["all"] else takes, "takes: got ")
     return {name: Scene(file, [index]) for name, index in chosen.items()}
+
+
+def _chooses(options: ReadOptions) -> bool:
+    """Whether the options name animations."""
+    return bool(options.takes) or any(name.startswith(ANIMATION) for name in options.only)
 
 
 def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
@@ -299,7 +312,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
         raise ClipError(
             f"only: got {', '.join(patterns)}, expected names such as {names}"
             if patterns and seen
-            else "meshes: got none in the scene, expected at least one"
+            else f"meshes: got none in the scene, expected at least one{besides(not_read([scene], []))}"
         )
     file.budget.take(VERTEX_BYTES * _number(nodes), "meshes")
     return nodes
@@ -316,13 +329,15 @@ def _number(nodes: Sequence[GltfNode]) -> int:
     return first
 
 
-def _animations(file: GltfFile, patterns: Sequence[str], what: str) -> dict[str, int]:
-    """Return the animations that any of the patterns names, in the file's order."""
-    numbers, wanted = _animation_numbers(file), set()
+def _animations(scene: Scene, patterns: Sequence[str], what: str) -> dict[str, int]:
+    """Return the animations that any of the patterns names and that move something, in the file's order."""
+    every, wanted = _animation_numbers(scene.file), set()
+    numbers = {name: index for name, index in every.items() if scene.targets(index)}
     for pattern in patterns:
         found = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
         if not found:
-            raise ClipError(f"{what}{pattern}, expected one of {brief(list(numbers))}")
+            unmoving = ", which moves no node of the scene" if pattern in every else ""
+            raise ClipError(f"{what}{pattern}{unmoving}, expected one of {brief(list(numbers))}")
         wanted |= found
     return {name: index for name, index in numbers.items() if name in wanted}
 
@@ -416,49 +431,13 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
 def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
     """Numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
     extras = scene.nodes[index].get("extras")
-    if _mark(scene, int(scene.parent[index])) is None or not isinstance(extras, dict):
+    if scene.says_copies(int(scene.parent[index])) is None or not isinstance(extras, dict):
         return {}
     found = {}
     for key, value in extras.items():
         row = value if isinstance(value, list) else [value]
         if 1 <= len(row) <= 4 and all(_is_number(number) for number in row):
             found[f"_{key}"] = np.array([row], np.int64 if all(type(n) is int for n in row) else np.float32)
-    return found
-
-
-def _mark(scene: Scene, index: int) -> bool | None:
-    """Return what a node states by COPIES about those below it: whether they are one object; None for nothing."""
-    extras = scene.nodes[index].get("extras") if index >= 0 else None
-    said = extras.get(COPIES) if isinstance(extras, dict) else None
-    return said if isinstance(said, bool) else None
-
-
-def _not_read(scene: Scene, nodes: Sequence[GltfNode]) -> dict[str, list[str]]:
-    """Return what else is in the file; parts of a node by the node's name."""
-    file, found = scene.file, {}
-
-    def add(kind: str, number: int, item: Any) -> None:
-        name = item.get("name") if isinstance(item, dict) else None
-        found.setdefault(kind, []).append(name if isinstance(name, str) and name else f"{kind.lower()} {number}")
-
-    for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
-        for number, item in enumerate(file.items(items)):
-            if item != TWO_SIDES and (kind != "scene" or number != file.json.get("scene", 0)):
-                add(kind, number, item)
-    for index in scene.order:
-        if extension(scene.nodes[index], "KHR_lights_punctual") is not None:
-            add("Light", index, scene.nodes[index])
-        if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
-            add("hidden", index, scene.nodes[index])
-    for node in nodes:
-        if node.is_flipped and node.kind == "mesh":
-            found.setdefault(FLIPPED, []).append(node.name)
-        instancing = extension(scene.nodes[node.index], INSTANCING)
-        own = () if instancing is None else entry(instancing, "attributes")
-        left = [key for key in node.attributes if not key.startswith(("_", "JOINTS_", "WEIGHTS_")) and key not in TAKEN]
-        left += [key for key in own if key not in INSTANCE_PARTS and not key.startswith("_")]
-        for key in left:
-            found.setdefault("attribute", []).append(f"{node.name}.{key}")
     return found
 
 
@@ -743,7 +722,7 @@ def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode
     parts: list[tuple[int, str, list[GltfNode]]] = []
     for node in nodes:
         above = int(scene.parent[node.index])
-        if not _mark(scene, above) or node.skin is not None or node.targets or node.copies is not None:
+        if not scene.says_copies(above) or node.skin is not None or node.targets or node.copies is not None:
             parts.append((-1, node.name, [node]))
         elif parts and parts[-1][0] == above and _is_alike(parts[-1][2][-1], node):
             parts[-1][2].append(node)
@@ -768,8 +747,9 @@ def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
-    materials = [primitive.get("material") for primitive in node.primitives]
-    return all(number is not None and file.item("materials", number).get("doubleSided") is True for number in materials)
+    numbers = [primitive.get("material") for primitive in node.primitives]
+    materials = [{} if number is None else file.item("materials", number) for number in numbers]
+    return all(item.get("doubleSided") is True and "doubleSided" not in guessed(item) for item in materials)
 
 
 def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
@@ -783,8 +763,15 @@ def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     names = list(_animation_numbers(scene.file))
     movers = {node.index for node in nodes}.union(scene.ancestors(_movers(nodes)))
     played = [names[i] for i in scene.played if not movers.isdisjoint(scene.targets(i))]
-    others = [name for i, name in enumerate(names) if i not in scene.played]
+    others = _other_animations(scene).get("animation")
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
+
+
+def _other_animations(scene: Scene) -> dict[str, list[str]]:
+    """The names of animations that are not played and would move something, as a kind of what is not read."""
+    numbers = _animation_numbers(scene.file)
+    others = [name for name, i in numbers.items() if i not in scene.played and scene.targets(i)]
+    return {"animation": others} if others else {}
 
 
 def _connections(
@@ -792,7 +779,7 @@ def _connections(
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
     found: dict[int, list[np.ndarray]] = {2: [], 3: []}
-    materials = []
+    materials, numbers = [], _material_numbers(file)
     for node in nodes:
         own: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
@@ -806,8 +793,7 @@ def _connections(
             own[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
-                label = -1 if label >= 0 and file.items("materials")[label] == TWO_SIDES else label
-                labels.append(np.full(len(rows), label, np.int32))
+                labels.append(np.full(len(rows), label if label < 0 else numbers[label], np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
         for size, parts in own.items():
             if parts:
@@ -823,26 +809,28 @@ def _connections(
     return faces, edges, face_material if (face_material >= 0).any() else None
 
 
+def _material_numbers(file: GltfFile) -> list[int]:
+    """Return the number of each material among those that have names; -1 of one that athcodec's writer made up."""
+    is_stated = np.array(["name" not in guessed(item) for item in file.items("materials")], bool)
+    return np.where(is_stated, np.cumsum(is_stated) - 1, -1).tolist()
+
+
 def _material_names(file: GltfFile) -> list[str]:
-    materials = file.items("materials")
-    names = [item.get("name") for item in (materials[:-1] if materials[-1:] == [TWO_SIDES] else materials)]
+    names = [item.get("name") for item in file.items("materials") if "name" not in guessed(item)]
     return [name if isinstance(name, str) and name else f"material {number}" for number, name in enumerate(names)]
 
 
 def _attributes(
-    scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keep_normals: bool
+    scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keeps_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
-    keep_normals = keep_normals and not any(
-        node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
-    )
     file = scene.file
     keys = dict.fromkeys(
         key
         for node in nodes
         for key in (*node.attributes, *node.of_copies)
-        if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keep_normals and key == "NORMAL"
+        if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keeps_normals and key == "NORMAL"
     )
     found: dict[str, np.ndarray] = {}
     for key in keys:

@@ -1,7 +1,9 @@
 """Nodes and animations of a glTF file, evaluated: the matrices of all nodes, and morph weights, at any times.
 
 Follows the glTF 2.0 specification: STEP, LINEAR (rotations along the shorter arc) and CUBICSPLINE, values held before
-the first key and after the last. Matrices of many frames are made at once. It knows no meshes (gltf.py).
+the first key and after the last. KHR_animation_pointer may address transforms, weights and visibility of nodes, and
+weights of meshes, all of them or a single one; `unplayed` names what else it addresses. Matrices of many frames are
+made at once. It knows no vertices (gltf.py).
 """
 
 from __future__ import annotations
@@ -10,20 +12,67 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
-from athcodec.files.gltf.json import brief, entries, entry, indices, integer, vector
+from athcodec.files.gltf.json import brief, entries, entry, extension, indices, integer, vector
 from athcodec.motion.quaternions import normalized, rotation_matrices
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
+COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 POINTER, NODE_VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
-POINTED = re.compile(rf"/nodes/(\d+)/(?:({'|'.join(TRS)}|weights)|extensions/{NODE_VISIBILITY}/(visible))")
+PLAYED = (*TRS, "weights", "visible")  # Properties of nodes that animations move.
+_NUMBER = "(0|[1-9][0-9]{0,9})"  # An index in a JSON pointer.
+POINTED = (  # What a pointer may address, each with the number of a node or a mesh.
+    re.compile(rf"/nodes/{_NUMBER}/({'|'.join(TRS)})"),
+    re.compile(rf"/nodes/{_NUMBER}/extensions/{NODE_VISIBILITY}/(visible)"),
+    re.compile(rf"/(?:nodes|meshes)/{_NUMBER}/(weights)(?:/{_NUMBER})?"),
+)
+QUOTES = "'\""
 INTERPOLATIONS = ("STEP", "LINEAR", "CUBICSPLINE")
 RATES = (30.0, 24.0, 25.0, 60.0, 24000 / 1001, 30000 / 1001, 60000 / 1001, 12.0, 15.0, 48.0, 50.0, 100.0, 120.0)
 SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart are meant to be interpolated
+
+
+class Target(NamedTuple):
+    """What a channel animates: a property in PLAYED of an entry of `holder`, "nodes" or "meshes"; of weights the one
+    with the number `weight`, or all by -1."""
+
+    holder: str
+    index: int
+    path: str
+    weight: int = -1
+
+    def __str__(self) -> str:
+        return f"/{self.holder}/{self.index}/{self.path}{f'/{self.weight}' if self.weight >= 0 else ''}"
+
+
+class Channel(NamedTuple):
+    """A channel that moves a node of the scene: its target's property, and the number of its sampler."""
+
+    node: int
+    target: Target
+    sampler: int
+
+
+def target_of(channel: dict) -> Target | str:
+    """What a channel animates; where that is nothing that is played, its pointer or a name for it. Raises ClipError."""
+    target = entry(channel, "target")
+    said = extension(target, POINTER)
+    if said is None:
+        node, path = target.get("node"), target.get("path")
+        if node is None or path not in PLAYED[:-1]:
+            return f"{brief(path).strip(QUOTES)} of node {brief(node)}"
+        return Target("nodes", integer(target, "node"), path)
+    pointer = said.get("pointer")
+    for pattern in POINTED if isinstance(pointer, str) else ():
+        if found := pattern.fullmatch(pointer):
+            index, path, *weight = found.groups()
+            return Target(pointer.split("/")[1], int(index), path, int(weight[0]) if any(weight) else -1)
+    return brief(pointer).strip(QUOTES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +130,11 @@ class Scene:
         self.nodes = file.items("nodes")
         self.parent = self._parents()
         self.order = self._reached()
+        self._channels_of: dict[int, tuple[list[Channel], list[str]]] = {}
         self.played = self._together() if play is None else play
         self._times: dict[int, np.ndarray] = {}
         self._tracks: dict[tuple[int, str], Track] = {}
+        self._weights: dict[int, list[tuple[Target, Track]]] = {}
         for index in self.played:
             self._add_animation(index)
         self._groups = self._grouped()
@@ -92,6 +143,12 @@ class Scene:
         """The name of a node, "" where it has none."""
         name = self.nodes[node].get("name")
         return name if isinstance(name, str) else ""
+
+    def says_copies(self, node: int) -> bool | None:
+        """What a node states by COPIES about those below it: whether they are one object; None for nothing."""
+        extras = self.nodes[node].get("extras") if node >= 0 else None
+        said = extras.get(COPIES) if isinstance(extras, dict) else None
+        return said if isinstance(said, bool) else None
 
     # ---- structure ----
 
@@ -148,36 +205,64 @@ class Scene:
 
     def targets(self, index: int) -> set[int]:
         """The nodes of the scene that an animation moves."""
-        return {node for node, _, _ in self._channels(self.file.item("animations", index))}
+        return {channel.node for channel in self._channels(index)[0]}
 
-    def _channels(self, animation: dict) -> list[tuple[int, str, int]]:
-        """(node, path, sampler) of the channels that move nodes of the scene."""
-        found, inside = [], set(self.order)
-        for channel in entries(animation, "channels"):
-            target = entry(channel, "target")
-            pointer = (target.get("extensions") or {}).get(POINTER) or {}
-            if pointed := POINTED.fullmatch(str(pointer.get("pointer"))):
-                target = {"node": int(pointed[1]), "path": pointed[2] or pointed[3]}
-            if target.get("node") is not None and target.get("path") in (*TRS, "weights", "visible"):
-                node = integer(target, "node", stop=max(len(self.nodes), 1))
-                if node in inside:
-                    found.append((node, target["path"], integer(channel, "sampler")))
-        return found
+    def unplayed(self, index: int) -> list[str]:
+        """What an animation addresses that moves no node of the scene, as `target_of` names it."""
+        return self._channels(index)[1]
+
+    def _channels(self, index: int) -> tuple[list[Channel], list[str]]:
+        """The channels of an animation that move nodes of the scene, and what the others address."""
+        if index in self._channels_of:
+            return self._channels_of[index]
+        played, others, inside = [], [], set(self.order)
+        for channel in entries(self.file.item("animations", index), "channels"):
+            target = target_of(channel)
+            if isinstance(target, str):
+                others.append(target)
+                continue
+            count = len(self.file.items(target.holder))
+            if target.index >= count:
+                raise ClipError(
+                    f"animation {index}: got entry {target.index} of {target.holder}, expected one below {count}"
+                )
+            moved = [target.index] if target.holder == "nodes" else self._showing.get(target.index, [])
+            found = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
+            played += found
+            if not found:
+                others.append(str(target))
+        self._channels_of[index] = played, others
+        return played, others
+
+    @cached_property
+    def _showing(self) -> dict[Any, list[int]]:
+        """By mesh the nodes of the scene that show it with its weights and have none of their own."""
+        showing: dict[Any, list[int]] = {}
+        for index in self.order:
+            node = self.nodes[index]
+            if isinstance(node.get("mesh"), int) and node.get("weights") is None:
+                showing.setdefault(node["mesh"], []).append(index)
+        return showing
 
     def _add_animation(self, index: int) -> None:
-        animation = self.file.item("animations", index)
-        samplers = entries(animation, "samplers")
-        for node, path, sampler in self._channels(animation):
+        samplers = entries(self.file.item("animations", index), "samplers")
+        for node, target, sampler in self._channels(index)[0]:
             if sampler >= len(samplers):
                 raise ClipError(f"animation {index}: got sampler {sampler}, expected one below {len(samplers)}")
-            if "matrix" in self.nodes[node] and path in TRS:
+            if "matrix" in self.nodes[node] and target.path in TRS:
                 raise ClipError(
                     f"animation {index}: moves node {node}, which has a matrix, expected translation, "
                     "rotation and scale"
                 )
-            self._tracks[node, path] = self._track(samplers[sampler], path, f"animation {index}, sampler {sampler}")
+            track = self._track(samplers[sampler], target, f"animation {index}, sampler {sampler}")
+            if target.path == "weights":
+                self._weights.setdefault(node, []).append((target, track))
+            else:
+                self._tracks[node, target.path] = track
+        for tracks in self._weights.values():  # A node's weights count more than its mesh's, and single ones than all.
+            tracks.sort(key=lambda each: (each[0].holder == "nodes", each[0].weight >= 0))
 
-    def _track(self, sampler: dict, path: str, where: str) -> Track:
+    def _track(self, sampler: dict, target: Target, where: str) -> Track:
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
             raise ClipError(
@@ -192,7 +277,9 @@ class Scene:
         self.file.budget.take(32 * self.file.count(integer(sampler, "output")), where)
         values = self.file.floats(integer(sampler, "output"))
         values_per_key = 3 if interpolation == "CUBICSPLINE" else 1
-        width = len(TRS[path]) if path in TRS else values.size // (len(times) * values_per_key)
+        path, width = target.path, values.size // (len(times) * values_per_key)
+        if path != "weights" or target.weight >= 0:
+            width = len(TRS.get(path, "1"))
         if width == 0 or values.size != len(times) * values_per_key * width:
             raise ClipError(
                 f"{where}: got {values.size} numbers for {len(times)} keys, expected "
@@ -202,8 +289,8 @@ class Scene:
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
-        """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once. Weights of
-        morph targets and visibilities remain in _tracks."""
+        """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
+        Visibilities remain in _tracks."""
         alike: dict[tuple, list[int]] = {}
         for (node, path), track in self._tracks.items():
             if path in TRS:
@@ -218,7 +305,8 @@ class Scene:
     @cached_property
     def keys(self) -> np.ndarray:
         """The times of all keys, ascending, each once."""
-        tracks = [*self._tracks.values(), *(track for _, _, track in self._groups)]
+        weights = (track for tracks in self._weights.values() for _, track in tracks)
+        tracks = [*self._tracks.values(), *weights, *(track for _, _, track in self._groups)]
         tables = {id(track.times): track.times for track in tracks}
         return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
 
@@ -251,18 +339,20 @@ class Scene:
 
     def morphs(self, node: int) -> bool:
         """Whether an animation that is played changes the weights of a node's mesh."""
-        return (node, "weights") in self._tracks
+        return node in self._weights
 
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
         """(k, targets) of a node's mesh; times None: without animation, k = 1."""
-        track = self._tracks.get((node, "weights"))
-        if track is None or times is None:
-            return default[None]
-        found = track.at(times)
-        if found.shape[1] != len(default):
-            raise ClipError(f"node {node}: got {found.shape[1]} animated weights, expected {len(default)}")
+        tracks = () if times is None else self._weights.get(node, ())
+        found = np.repeat(default[None], len(times) if tracks else 1, axis=0)
+        for target, track in tracks:
+            values = track.at(times)
+            if target.weight >= len(default) or target.weight < 0 and values.shape[1] != len(default):
+                got = f"weight {target.weight}" if target.weight >= 0 else f"{values.shape[1]} weights"
+                raise ClipError(f"node {node}: got {got} animated, expected those of its {len(default)} morph targets")
+            found[:, slice(None) if target.weight < 0 else [target.weight]] = values
         return found
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:

@@ -29,7 +29,7 @@ CHANGING = (
     ": points that appear or vanish cannot be read; write them as copies of a mesh with ids, or read other objects "
     "with --only"
 )
-TWO_SIDES = {"doubleSided": True}  # glTF's material of faces that are seen from both sides and have no other
+GUESSED = "guessed"  # In what our writers add: names of what the clip does not state, so that it is not read as stated.
 SCHEME = "subdivisionScheme"  # The key of USD's word in the details of a mesh; without it the faces are the surface.
 SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
@@ -177,11 +177,16 @@ class SceneObject:
         if normals is None or normals.values.shape[1:] != (3,):
             return
         if moves or not np.linalg.det(matrix[:3, :3]):
-            del self.statics["normals"]
+            self.leave_out("normals")
         elif not np.array_equal(matrix[:3, :3], np.eye(3)):
             turned = normals.values @ np.linalg.inv(matrix[:3, :3]).T
             turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-30)
             self.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
+
+    def leave_out(self, name: str) -> None:
+        """Removes a static array, if there is one of this name, and notes that it is left out."""
+        if self.statics.pop(name, None) is not None:
+            self.left_out.append(name)
 
     def halve_widths(self, matrix: np.ndarray) -> None:
         """Replaces the widths in "radius" by radii in world space."""
@@ -234,7 +239,10 @@ def clip_of_objects(
     left_out = [f"{obj.path}.{name}" for obj in objects for name in obj.left_out if name not in options.skip]
     shaping = [name for name in left_out if name.rpartition(".")[2] in SURFACE]
     kinds = {"subdivision": shaping, "attribute": [name for name in left_out if name not in shaping]}
-    not_read = more.pop("not_read", {}) | {kind: names for kind, names in kinds.items() if names}
+    not_read = dict(more.pop("not_read", {}))
+    for kind, names in kinds.items():
+        if names:
+            not_read[kind] = [*not_read.get(kind, ()), *names]
     if flipped := [obj.path for obj in objects if obj.is_flipped]:
         not_read[FLIPPED] = flipped
     return MotionClip(

@@ -14,7 +14,8 @@ from athcodec.errors import GuessWarning
 from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
-SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
+RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0, 480.0, 500.0, 1000.0)
+MOST_FPS, MOST_FRAMES = 1000.0, 100_000  # Of a rate that is advised.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -48,16 +49,35 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
     return times - times[0], metadata
 
 
-def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str) -> None:
-    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames."""
+def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
+    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, which begin at `start`
+    seconds (default: with the first key)."""
     if missed.any():
-        step = max(np.diff(keys).min(initial=0.25 / fps), SAME_TIME)
+        rate = _closer_rate(keys - (keys[0] if start is None else start), fps)
+        advice = (
+            f"--fps {rate:.4g} has frames closer to them"
+            if rate
+            else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
+        )
         warnings.warn(
             f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
-            f"there alone is missed; --fps {1 / step:.4g} has frames closer to them",
+            f"there alone is missed; {advice}",
             GuessWarning,
             stacklevel=2,
         )
+
+
+def _closer_rate(places: np.ndarray, fps: float) -> float | None:
+    """The lowest sensible rate whose frames hit keys at these seconds after the first frame, else the rate of their
+    shortest step; None where that has more frames than anybody wants."""
+    shortest = np.diff(places).min(initial=0.25 / fps)
+    steps = (fps * factor for factor in range(2, 9))
+    for rate in sorted(rate for rate in (*steps, *RATES, 1 / shortest if shortest > 0 else 0.0) if rate > fps):
+        off = np.abs(places * rate - np.round(places * rate))
+        hits = off.max(initial=0.0) <= 0.01 or rate * shortest >= 1 - 1e-6
+        if hits:
+            return rate if rate <= MOST_FPS and rate * float(places[-1]) <= MOST_FRAMES else None
+    return None
 
 
 def whole(number: float) -> int | float:

@@ -2,17 +2,18 @@
 
 Every prim of the kinds Mesh, BasisCurves, NurbsCurves, HermiteCurves and Points with the purpose "default" or "render"
 that some frame shows is read, also inside instances, into world space: time samples (interpolated as USD does),
-transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a prototype
-of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The frames
-are the whole time codes of the stage's range where it has one, else the time codes that have samples; options.fps sets
-another rate. Static primvars become attributes, the names of materials the metadata "material_names", of which the
-attribute "face_material" says the number for each face.
+splines, transforms, and of UsdSkel the skinning and the blend shapes. Visibility becomes presence. Each such prim in a
+prototype of a PointInstancer becomes one object, of as many copies as the frames show; ids say which copy is which. The
+frames are the whole time codes of the stage's range where it has one, else, where there are splines, those from the
+first key to the last, else the time codes that have samples; options.fps sets another rate. Static primvars become
+attributes, the names of materials the metadata "material_names", of which the attribute "face_material" says the number
+for each face.
 
 Points are float32 in USD and so they are here, unless a transform places them far from the origin. The stage is opened
 as it is composed (layers, payloads, value clips); what else it holds, such as layers that cannot be found, patches,
-tetrahedra, what is in materials, velocities, creases, is named in the clip's `not_read`. A stage is opened by its
-structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file even where it is
-damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
+spheres, other variants, what is in materials, velocities, creases, is named in the clip's `not_read` (usd_unread.py). A
+stage is opened by its structure; positions are read frame by frame. USD trusts the lengths of arrays in a binary file
+even where it is damaged: it is imported by the process of reader_main.py alone, under a limit of memory.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdSkel, Vt
+from pxr import Ar, Gf, Sdf, Tf, Ts, Usd, UsdGeom, UsdShade, UsdSkel, Vt
 
 from athcodec.errors import ClipError
 from athcodec.files.plain import open_plain
@@ -35,9 +36,10 @@ from athcodec.files.reading import FileWatch, check_inside
 from athcodec.motion.clip import MotionClip, Skin
 from athcodec.motion.frames import is_far
 from athcodec.motion.units import METRES
-from athcodec.sources import ReadOptions
+from athcodec.sources import LISTED, ReadOptions, besides
 from athcodec.sources.crate import check_crates
 from athcodec.sources.scene_objects import (
+    GUESSED,
     OWN,
     SCHEME,
     ArrayDescriptor,
@@ -50,19 +52,14 @@ from athcodec.sources.scene_objects import (
     transformed,
 )
 from athcodec.sources.timing import warn_of_missed
+from athcodec.sources.usd_unread import PLACES, clip_layers, is_array, left_out_of_stage, unread_properties
 
 MAX_FRAMES = 1 << 24
 # Types of prims that need no note when they are not read.
 READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))
 WHOLE = ("Material",)  # prims that are named without those below them
 KNOWN = ("Material", "Camera", "GeomSubset")
-PLACES = ("positions", "orientations", "orientationsf", "scales", "protoIndices", "ids", "invisibleIds")
-OBJECT_PROPERTIES = frozenset(  # Attributes of objects, or their namespaces, that are read or named one by one.
-    (*PLACES, "points", "extent", "normals", "widths", "orientation", "doubleSided", SCHEME, "faceVertexCounts")
-    + ("faceVertexIndices", "curveVertexCounts", "type", "basis", "wrap", "visibility", "purpose", "xformOpOrder")
-    + ("creaseLengths", "creaseSharpnesses", "cornerSharpnesses", "primvars", "xformOp", "material", "skel")
-    + ("subsetFamily",)
-)
+ABOVE = frozenset(("", "Xform", "Scope", "SkelRoot"))  # Those whose properties are named as those of objects are.
 PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 NAMES = {"st": "uv", "displayColor": "colors"}
 DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "uniform": "face", "constant": "constant"}
@@ -71,16 +68,19 @@ DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "un
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
     """The clip in a USD file. Raises ClipError, OSError."""
     check_crates(path)
-    with quietly():
-        return _clip(_Stage(path, options.allow_outside), options)
+    with quietly() as trap:
+        clip = _clip(_Stage(path, options.allow_outside), options)
+        if warnings := _warnings(trap):
+            clip.not_read["warning of USD"] = warnings
+        return clip
 
 
 @contextmanager
-def quietly() -> Iterator[None]:
+def quietly() -> Iterator[Tf.DiagnosticTrap]:
     """Keeps USD's messages off stderr; its errors become ClipErrors of one line."""
     with Tf.DiagnosticTrap() as trap:
         try:
-            yield
+            yield trap
         except Tf.ErrorException as error:
             raise ClipError(f"stage: {_one_line(error)}") from None
         finally:
@@ -97,6 +97,12 @@ def _one_line(error: Exception) -> str:
     return text[-1].rstrip("'")
 
 
+def _warnings(trap: Tf.DiagnosticTrap) -> list[str]:
+    """What USD has warned of, but for layers that cannot be found, which are named as missing."""
+    texts = dict.fromkeys(" ".join(str(warning.commentary).split()) for warning in trap.GetWarnings())
+    return [text for text in texts if not text.startswith("In <") and "clip layer" not in text]
+
+
 class _Stage:
     """An open stage, and whether the files that it is made of have stayed as they were."""
 
@@ -109,7 +115,10 @@ class _Stage:
         if not self.stage:
             raise ClipError("stage: cannot be opened")
         self.errors = [" ".join(str(error).split()) for error in self.stage.GetCompositionErrors()]
-        files = [layer.realPath for layer in self.stage.GetUsedLayers() if os.path.isfile(layer.realPath)]
+        layers = [layer.realPath for layer in self.stage.GetUsedLayers()]
+        clips, missing = clip_layers(self.stage)
+        self.errors += missing
+        files = [file for file in dict.fromkeys([*layers, *clips]) if os.path.isfile(file)]
         self.unchanged = FileWatch(*files)
         for file in files:
             check_inside(Path(self.stage.GetRootLayer().realPath).parent, file, allow_outside)
@@ -163,7 +172,7 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     not_read: dict[str, list[str]] = {"missing": source.errors} if source.errors else {}
     objects = _find_objects(stage, options.only, not_read)
     skins = _bind_skeletons(stage, objects, not_read)
-    codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False))
+    codes, rate = _time_codes(stage, objects, options.fps, layer.pop("irregular", False), not_read)
     objects = _shown(objects, codes, not_read)
     cache = UsdGeom.XformCache()
 
@@ -195,35 +204,57 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
 # ---- prims ----
 
 
+class _Choice:
+    """The prims that the patterns of options.only name, all by default; `refused` are the paths of others."""
+
+    def __init__(self, patterns: Sequence[str] = ()):
+        self.patterns, self.refused = patterns, list[str]()
+
+    def takes(self, prim: Usd.Prim) -> bool:
+        names = (prim.GetName(), str(prim.GetPath()))
+        return not self.patterns or any(fnmatchcase(name, pattern) for pattern in self.patterns for name in names)
+
+
 def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Prim]:
     """All with points. What has none, or is no object, is added to not_read by the name of its type."""
-    objects = []
+    objects, choice, prototypes = list[_Prim](), _Choice(only), set[Sdf.Path]()
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
             prims.PruneChildren()
-            objects += _instanced(UsdGeom.PointInstancer(prim), only, not_read)
+            objects += _instanced(UsdGeom.PointInstancer(prim), choice, prototypes, not_read)
             continue
-        obj = _object(prim, only, not_read)
+        obj = _object(prim, choice, not_read)
         if obj is not None:
             objects.append(obj)
         if prim.GetTypeName() in WHOLE:
             prims.PruneChildren()
+    _add_all(not_read, left_out_of_stage(stage, prototypes))
     if not objects:
         what = f" named like {', '.join(only)}" if only else ""
+        names = f", or {', '.join(choice.refused[:LISTED])}" if choice.refused else ""
         raise ClipError(
-            f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points"
+            f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points{names}"
+            f"{besides(not_read)}"
         )
     return objects
 
 
-def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]]) -> _Prim | None:
+def _add_all(not_read: dict[str, list[str]], more: dict[str, list[str]]) -> None:
+    for kind, names in more.items():
+        not_read.setdefault(kind, []).extend(names)
+
+
+def _object(prim: Usd.Prim, choice: _Choice, not_read: dict[str, list[str]]) -> _Prim | None:
     kind, path = _kind(prim), str(prim.GetPath())
     if kind is None:
         if prim.GetTypeName() not in READ and not _is_material_subset(prim):
             not_read.setdefault(_kind_not_read(prim), []).append(path)
+        if prim.GetTypeName() in ABOVE and (names := unread_properties(prim)):
+            not_read.setdefault("attribute", []).extend(f"{path}.{name}" for name in names)
         return None
-    if not _wanted(prim, only):
+    if not choice.takes(prim):
+        choice.refused.append(path)
         return None
     points = Usd.AttributeQuery(UsdGeom.PointBased(prim).GetPointsAttr())
     if UsdGeom.Imageable(prim).ComputePurpose() not in PURPOSES:
@@ -233,19 +264,6 @@ def _object(prim: Usd.Prim, only: Sequence[str], not_read: dict[str, list[str]])
     else:
         not_read.setdefault("empty", []).append(path)
     return None
-
-
-def _unread(prim: Usd.Prim) -> list[str]:
-    """The names of attributes, or their namespaces, and metadata that are authored on an object, differ from their
-    fallback and are not read."""
-    found = {}
-    for attribute in prim.GetAuthoredAttributes():
-        name, value = attribute.GetName(), attribute.Get(Usd.TimeCode.EarliestTime())
-        is_empty = value is None or _is_array(value) and not len(value)
-        if not is_empty and value != prim.GetPrimDefinition().GetAttributeFallbackValue(name):
-            found[name.partition(":")[0]] = None
-    metadata = [key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key)]
-    return [name for name in found if name not in OBJECT_PROPERTIES] + metadata
 
 
 def _is_material_subset(prim: Usd.Prim) -> bool:
@@ -259,34 +277,63 @@ def _kind_not_read(prim: Usd.Prim) -> str:
 
 
 def _instanced(
-    instancer: UsdGeom.PointInstancer, only: Sequence[str], not_read: dict[str, list[str]]
-) -> Iterator[_Prim]:
-    """Return the meshes in the prototypes of a PointInstancer, each as often as the instancer has it."""
-    path, indices = instancer.GetPath(), instancer.GetProtoIndicesAttr()
+    instancer: UsdGeom.PointInstancer, choice: _Choice, shown: set[Sdf.Path], not_read: dict[str, list[str]]
+) -> list[_Prim]:
+    """Return the meshes in the prototypes of a PointInstancer, each as often as the instancer has it. Adds to `shown`
+    the paths of the prototypes."""
+    prim, path, indices = instancer.GetPrim(), instancer.GetPath(), instancer.GetProtoIndicesAttr()
     times = indices.GetTimeSamples() or [Usd.TimeCode.Default()]
     used = set().union(*(indices.Get(time) or () for time in times))
-    copies = _Copies(instancer)
     if UsdGeom.Imageable(instancer).ComputePurpose() not in PURPOSES:
         not_read.setdefault("hidden", []).append(str(path))
-        return
-    for number, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
-        prototype = instancer.GetPrim().GetStage().GetPrimAtPath(target)
-        if number not in used or not prototype:
+        return []
+    targets = instancer.GetPrototypesRel().GetForwardedTargets()
+    prototypes = {number: prim.GetStage().GetPrimAtPath(target) for number, target in enumerate(targets)}
+    if not used:
+        not_read.setdefault("empty", []).append(str(path))
+    if used - prototypes.keys():  # USD places no copy then.
+        text = f"{path} (protoIndices are {min(used)} to {max(used)}, of {len(targets)} prototypes)"
+        not_read.setdefault("PointInstancer", []).append(text)
+        return []
+    gone = [f"prototype {targets[number]} of {path}" for number in sorted(used) if not prototypes[number]]
+    _add_all(not_read, {"missing": gone} if gone else {})
+    read = {number: prototype for number, prototype in prototypes.items() if number in used and prototype}
+    shown.update(prototype.GetPath() for prototype in read.values())
+    for other in _unshown(prim, shown):
+        not_read.setdefault("hidden", []).append(str(other.GetPath()))
+    inner = _Choice() if choice.takes(prim) else choice
+    copies, objects = _Copies(instancer), []
+    for number, prototype in read.items():
+        for obj in _in_prototype(prototype, inner, not_read):
+            obj.path = f"{path}:{obj.path.removeprefix(f'{path}/')}"
+            obj.instances = _Instances(copies, number, prototype)
+            objects.append(obj)
+    return objects
+
+
+def _in_prototype(prototype: Usd.Prim, choice: _Choice, not_read: dict[str, list[str]]) -> Iterator[_Prim]:
+    prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
+    for prim in prims:
+        if prim.IsA(UsdGeom.PointInstancer):
+            not_read.setdefault("PointInstancer inside a PointInstancer", []).append(str(prim.GetPath()))
+            prims.PruneChildren()
             continue
-        prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
-        for prim in prims:
-            if prim.IsA(UsdGeom.PointInstancer):
-                not_read.setdefault("PointInstancer inside a PointInstancer", []).append(str(prim.GetPath()))
-                prims.PruneChildren()
-                continue
-            if prim.GetTypeName() in WHOLE:
-                prims.PruneChildren()
-            wanted = only if not _wanted(instancer.GetPrim(), only) else ()
-            obj = _object(prim, wanted, not_read)
-            if obj is not None:
-                obj.path = f"{path}:{obj.path.removeprefix(f'{path}/')}"
-                obj.instances = _Instances(copies, number, prototype)
-                yield obj
+        if prim.GetTypeName() in WHOLE:
+            prims.PruneChildren()
+        obj = _object(prim, choice, not_read)
+        if obj is not None:
+            yield obj
+
+
+def _unshown(instancer: Usd.Prim, prototypes: set[Sdf.Path]) -> Iterator[Usd.Prim]:
+    """The first prims with a shape below an instancer that are in no prototype: USD shows none of these."""
+    prims = iter(Usd.PrimRange(instancer, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
+    for prim in prims:
+        if prim.GetPath() in prototypes:
+            prims.PruneChildren()
+        elif prim != instancer and (_kind(prim) or prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer)):
+            prims.PruneChildren()
+            yield prim
 
 
 class _Copies:
@@ -409,7 +456,7 @@ class _Instances:
 
     def add_arrays(self, obj: _Prim, codes: np.ndarray) -> None:
         """Adds the static arrays that the instancer has for each of its copies."""
-        obj.left_out += _unread(self.instancer.GetPrim())
+        obj.left_out += unread_properties(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), _numbers(_value(primvar, codes[0]))
             changes = _changes(primvar, codes) or self.all.follows_ids
@@ -426,11 +473,6 @@ def _kind(prim: Usd.Prim) -> str | None:
         if prim.IsA(schema):
             return kind
     return None
-
-
-def _wanted(prim: Usd.Prim, only: Sequence[str]) -> bool:
-    names = (prim.GetName(), str(prim.GetPath()))
-    return not only or any(fnmatchcase(name, pattern) for pattern in only for name in names)
 
 
 def _lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
@@ -475,7 +517,7 @@ def _shown(objects: list[_Prim], codes: np.ndarray, not_read: dict[str, list[str
     if hidden := list(dict.fromkeys(not_read.pop("hidden", ()))):
         not_read["hidden"] = hidden
     if not chosen:
-        raise ClipError(f"prims: got {len(objects)} that no frame shows, expected a visible one")
+        raise ClipError(f"prims: got {len(objects)} that no frame shows, expected a visible one{besides(not_read)}")
     return chosen
 
 
@@ -524,7 +566,7 @@ def _measure(objects: list[_Prim], codes: np.ndarray, matrix: Callable[[_Prim, i
         _topology(obj, codes)
         _statics(obj, codes, np.array(cache.GetLocalToWorldTransform(obj.prim)))
         if obj.instances is not None:
-            obj.statics.pop("normals", None)  # they turn with each copy
+            obj.leave_out("normals")  # They turn with each copy.
             obj.repeat(len(obj.instances.rows))
             obj.instances.add_arrays(obj, codes)
         if obj.kind == "mesh":
@@ -543,7 +585,7 @@ def _follow_ids(obj: _Prim, codes: np.ndarray) -> None:
         return
     attribute = UsdGeom.Points(obj.prim).GetIdsAttr()
     first = _array(attribute.Get(codes[0]), np.int64)
-    times = Usd.AttributeQuery(attribute).GetTimeSamplesInInterval(_interval(codes)) if attribute else ()
+    times = _samples(attribute, codes) if attribute else ()
     if len(np.unique(first)) == len(first) and not all(np.array_equal(attribute.Get(time), first) for time in times):
         obj.ids = np.sort(first)
 
@@ -553,7 +595,7 @@ def _topology(obj: _Prim, codes: np.ndarray) -> None:
         mesh = UsdGeom.Mesh(obj.prim)
         obj.face_counts = _fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
         obj.face_indices = _fixed(obj, mesh.GetFaceVertexIndicesAttr(), codes)
-        if mesh.GetDoubleSidedAttr().Get():
+        if mesh.GetDoubleSidedAttr().Get() and not _is_guessed(mesh.GetDoubleSidedAttr()):
             obj.details["doubleSided"] = "true"
         _note(obj, SCHEME, mesh.GetSubdivisionSchemeAttr(), "none")
         _bind_materials(obj)
@@ -596,7 +638,7 @@ def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarra
     query = Usd.AttributeQuery(attribute)
     first = _array(query.Get(codes[0]), np.int32)
     if query.GetNumTimeSamples() > 1 and query.ValueMightBeTimeVarying():
-        for sample in query.GetTimeSamplesInInterval(_interval(codes)):
+        for sample in _samples(attribute, codes):
             if not np.array_equal(_array(query.Get(sample), np.int32), first):
                 frame = int(np.searchsorted(codes, sample - 1e-9))
                 raise ClipError(
@@ -604,6 +646,17 @@ def _fixed(obj: _Prim, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarra
                     f"(time code {sample:g}), expected the same vertices and faces in all"
                 )
     return first
+
+
+def _samples(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> Sequence[float]:
+    """The time codes in the stage's range, or all, at which an attribute or primvar may change: those of its samples,
+    or, where it has a spline, those of all frames or knots."""
+    attribute = source.GetAttr() if isinstance(source, UsdGeom.Primvar) else source
+    if not _has_range(attribute.GetStage()):
+        return [*attribute.GetSpline().GetKnots().keys()] if attribute.HasSpline() else source.GetTimeSamples()
+    if attribute.HasSpline():
+        return codes
+    return source.GetTimeSamplesInInterval(_interval(codes))
 
 
 def _interval(codes: np.ndarray) -> Gf.Interval:
@@ -617,46 +670,116 @@ def _array(value: Any, dtype: Any) -> np.ndarray:
 # ---- time ----
 
 
-def _time_codes(stage: Usd.Stage, objects: list[_Prim], fps: float | None, irregular: bool) -> tuple[np.ndarray, float]:
-    """Time codes to read, and frames per second."""
+@dataclass
+class _Keys:
+    """Time codes, ascending, at which what is read has samples or knots of splines; whether there are splines, and the
+    paths of those that go on moving before their first knot or behind their last."""
+
+    times: np.ndarray
+    has_splines: bool
+    endless: list[str]
+
+
+def _time_codes(
+    stage: Usd.Stage, objects: list[_Prim], fps: float | None, irregular: bool, not_read: dict[str, list[str]]
+) -> tuple[np.ndarray, float]:
+    """Time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
     own = stage.GetTimeCodesPerSecond()
     if not 0 < own < math.inf:
         raise ClipError(f"timeCodesPerSecond: got {own}, expected a positive number")
-    start, end, samples = stage.GetStartTimeCode(), stage.GetEndTimeCode(), None
-    if not stage.HasAuthoredTimeCodeRange() or not start <= end or irregular:
-        samples = _sampled(objects)
-        if not fps:
-            return (np.array(samples) if samples else np.zeros(1)), own
-        start, end = (samples[0], samples[-1]) if samples else (0.0, 0.0)
+    keys = _keys(objects)
+    start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    if _has_range(stage) and not irregular:
+        _name_keys_outside(keys.times, start, end, not_read)
+    else:
+        if stage.HasAuthoredTimeCodeRange() and not start <= end:
+            not_read["range of the stage"] = [f"{start:g} to {end:g}, which runs backward"]
+        if keys.endless:
+            not_read["motion beyond the knots of splines"] = keys.endless
+        if not fps and not keys.has_splines:
+            return (keys.times if len(keys.times) else np.zeros(1)), _rate(stage, keys, 0.0, not_read)
+        start, end = (keys.times[0], keys.times[-1]) if len(keys.times) else (0.0, 0.0)
     if not (math.isfinite(start) and math.isfinite(end)):
         raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
+    rate = fps or _rate(stage, keys, start, not_read)
+    step = own / rate
     if not fps:
-        times = np.array([time for time in _sampled(objects) if start <= time <= end])
-        missed = np.abs(times - start - np.round(times - start)) > 1e-3
-        warn_of_missed(times / own, missed, own, stage.GetRootLayer().realPath)
-    step = own / fps if fps else 1.0
+        times = keys.times[(keys.times >= start) & (keys.times <= end)]
+        missed = _off_grid(times, start, step)
+        warn_of_missed(times / own, missed, rate, stage.GetRootLayer().realPath, start / own)
     count = math.floor((end - start) / step + 1e-6) + 1
     if count > MAX_FRAMES:
         raise ClipError(f"time codes: got {start:g} to {end:g}, expected at most {MAX_FRAMES} frames")
-    return start + np.arange(count) * step, fps or own
+    return start + np.arange(count) * step, rate
 
 
-def _sampled(objects: list[_Prim]) -> list[float]:
+def _has_range(stage: Usd.Stage) -> bool:
+    return stage.HasAuthoredTimeCodeRange() and stage.GetStartTimeCode() <= stage.GetEndTimeCode()
+
+
+def _off_grid(times: np.ndarray, start: float, step: float) -> np.ndarray:
+    """(K,) whether time codes lie between frames."""
+    places = (times - start) / step
+    off: np.ndarray = np.abs(places - np.round(places)) > 1e-3
+    return off
+
+
+def _rate(stage: Usd.Stage, keys: _Keys, start: float, not_read: dict[str, list[str]]) -> float:
+    """Frames per second: a frame for each time code, unless framesPerSecond has frames at keys that these miss, or more
+    frames of splines; where it is another rate and is not taken, it is added to not_read."""
+    own, stated = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
+    if not stage.HasAuthoredMetadata("framesPerSecond") or not 0 < stated < math.inf or math.isclose(stated, own):
+        return own
+    misses = [bool(_off_grid(keys.times, start, step).any()) for step in (1.0, own / stated)]
+    if misses == [True, False] or keys.has_splines and stated > own and not misses[1]:
+        return stated
+    not_read["framesPerSecond"] = [f"{stated:g} (frames are time codes, {own:g} per second)"]
+    return own
+
+
+def _name_keys_outside(times: np.ndarray, start: float, end: float, not_read: dict[str, list[str]]) -> None:
+    outside = times[(times < start - 1e-6) | (times > end + 1e-6)]
+    if len(outside):
+        what = f"time codes {outside[0]:g} to {outside[-1]:g} ({len(outside)} keys; the range is {start:g} to {end:g})"
+        not_read["keys outside of the stage's range"] = [what]
+
+
+def _keys(objects: list[_Prim]) -> _Keys:
     found: set[float] = set()
+    splines: dict[str, Any] = {}
+    seen: set[Sdf.Path] = set()
+
+    def add(attribute: Usd.Attribute) -> None:
+        if attribute.GetPath() in seen:
+            return
+        seen.add(attribute.GetPath())
+        found.update(attribute.GetTimeSamples())
+        if attribute.HasSpline():
+            splines[str(attribute.GetPath())] = spline = attribute.GetSpline()
+            with quietly():  # USD says each time that inner loops are deprecated; not every version bakes them.
+                found.update(getattr(spline, "GetKnotsWithInnerLoopsBaked", spline.GetKnots)().keys())
+
     for obj in objects:
-        found.update(obj.points.GetTimeSamples())
         prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
-        attributes = [] if obj.instances is None else list(obj.instances.all.attributes)
+        attributes = [obj.points.GetAttribute(), *(() if obj.instances is None else obj.instances.all.attributes)]
         attributes += filter(None, map(_visibility, _hiding(obj)))
-        for attribute in attributes:
-            found.update(attribute.GetTimeSamples())
         for prim in prims:
-            if prim.IsA(UsdGeom.Xformable):
-                found.update(UsdGeom.Xformable(prim).GetTimeSamples())
+            if prim.IsA(UsdGeom.Xformable) and prim.GetPath() not in seen:
+                seen.add(prim.GetPath())
+                attributes += [operation.GetAttr() for operation in UsdGeom.Xformable(prim).GetOrderedXformOps()]
+        for attribute in attributes:
+            add(attribute)
         if obj.skeleton is not None and obj.skeleton.animation:
             found.update(obj.skeleton.animation.GetJointTransformTimeSamples())
             found.update(obj.skeleton.animation.GetBlendShapeWeightTimeSamples())
-    return sorted(time for time in found if math.isfinite(time))
+    endless = [path for path, spline in splines.items() if _goes_on(spline)]
+    return _Keys(np.array(sorted(filter(math.isfinite, found)), np.float64), bool(splines), endless)
+
+
+def _goes_on(spline: Ts.Spline) -> bool:
+    """Whether a spline moves before its first knot or behind its last."""
+    still = (Ts.ExtrapHeld, Ts.ExtrapValueBlock)
+    return any(each.mode not in still for each in (spline.GetPreExtrapolation(), spline.GetPostExtrapolation()))
 
 
 def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any]:
@@ -680,6 +803,8 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
             continue  # which has moved it
+        if _is_guessed(primvar.GetAttr()):
+            continue
         if primvar.HasValue() and _changes(primvar, codes):
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
@@ -695,7 +820,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
     if obj.ids is not None:  # Arrays that keep their order do not follow the points.
         obj.left_out += [name for name, static in obj.statics.items() if static.domain == "vertex"]
         obj.statics = {name: static for name, static in obj.statics.items() if static.domain != "vertex"}
-    obj.left_out += _unread(obj.prim)
+    obj.left_out += unread_properties(obj.prim)
     rest = obj.statics.get("rest")
     if rest is not None and rest.values.shape[1:] == (3,) and rest.values.dtype.kind == "f":
         placed = transformed(rest.values, matrix)
@@ -725,7 +850,7 @@ def _keep_unless_it_changes(
     obj: _Prim, codes: np.ndarray, name: str, attribute: Usd.Attribute, interpolation: str
 ) -> None:
     """Keep an array of the schema that no primvar replaces, or note that it is left out."""
-    if not attribute.HasAuthoredValue() or name in obj.statics:
+    if not attribute.HasAuthoredValue() or name in obj.statics or _is_guessed(attribute):
         return
     if _changes(attribute, codes):
         obj.left_out.append(attribute.GetName())
@@ -745,8 +870,10 @@ def _changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool
     """Whether an array has other values in any frame than in the first."""
     if not source.ValueMightBeTimeVarying():
         return False
-    first, samples = np.array(_value(source, codes[0])), source.GetTimeSamplesInInterval(_interval(codes))
-    return any(not np.array_equal(np.array(_value(source, code)), first) for code in (*samples, codes[-1]))
+    first = np.array(_value(source, codes[0]))
+    return any(
+        not np.array_equal(np.array(_value(source, code)), first) for code in (*_samples(source, codes), codes[-1])
+    )
 
 
 def _keep(obj: _Prim, name: str, values: Any, interpolation: str, primvar: UsdGeom.Primvar | None = None) -> None:
@@ -770,11 +897,12 @@ def _numbers(values: Any) -> np.ndarray | None:
         return None
     if array.dtype.kind not in "biuf" or not isinstance(values, (bool, int, float)) and array.ndim == 0:
         return None
-    return array.reshape(-1) if array.ndim == 0 else array if _is_array(values) else array[None]
+    return array.reshape(-1) if array.ndim == 0 else array if is_array(values) else array[None]
 
 
-def _is_array(values: Any) -> bool:
-    return type(values).__module__.startswith("pxr.Vt")
+def _is_guessed(attribute: Usd.Attribute) -> bool:
+    """Whether athcodec's writer has made up the value, so that it says nothing of the clip."""
+    return attribute.GetCustomDataByKey(f"{OWN}:{GUESSED}") is True
 
 
 def _said(attribute: Usd.Attribute, key: str) -> str | None:
@@ -884,17 +1012,36 @@ def _bind_skeletons(
             queries.append((cache, query))  # the cache owns what the query refers to
             for target in binding.GetSkinningTargets():
                 obj = by_path.get(target.GetPrim().GetPath())
-                if obj is not None and query and (target.HasJointInfluences() or target.HasBlendShapes()):
-                    if obj.instances is not None:
-                        not_read.setdefault("Skeleton of an instance", []).append(obj.path)
-                        continue
+                moves = query and (target.HasJointInfluences() or target.HasBlendShapes())
+                if obj is not None and moves and obj.instances is None:
                     obj.skeleton = _Skeleton(query, target)
     for _, query in queries:
         if query.GetAnimQuery():
             animations.pop(query.GetAnimQuery().GetPrim().GetPath(), None)
+        elif query and (source := _missing_animation(query.GetPrim())):
+            not_read.setdefault("missing", []).append(source)
     if animations:
         not_read["SkelAnimation"] = list(animations.values())
+    for obj in objects:
+        if obj.skeleton is None and _is_bound(obj.prim):
+            kind = "Skeleton of an instance" if obj.instances is not None else "skinning"
+            not_read.setdefault(kind, []).append(obj.path)
     return queries
+
+
+def _is_bound(prim: Usd.Prim) -> bool:
+    """Whether a prim says that joints or blend shapes move it."""
+    binding = UsdSkel.BindingAPI(prim)
+    return binding.GetJointIndicesAttr().HasAuthoredValue() or binding.GetBlendShapesAttr().HasAuthoredValue()
+
+
+def _missing_animation(skeleton: Usd.Prim) -> str | None:
+    """The animation that a skeleton names, or a prim above it does, and that is not there; None where none is named."""
+    for prim in _lineage(skeleton):
+        relationship = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
+        if relationship and relationship.HasAuthoredTargets():
+            return f"animation {', '.join(map(str, relationship.GetTargets()))} of {skeleton.GetPath()}"
+    return None
 
 
 def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:

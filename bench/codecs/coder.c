@@ -1,7 +1,8 @@
 /* athcodec's own entropy coder for what the baselines have to store, so that opponents do not lose for
  * want of a good one. Compiled twice, as the core's models are: with ATH_ENCODING it writes, without it
  * reads. Rows of three axes over frequency are coded as stems are (code_row), tables of other integers
- * under the magnitude of their neighbours, hierarchy and corrections as in a file. Encoders return the
+ * under the magnitude of their neighbours. Hierarchies, poses and corrections are those of a file: the installed
+ * encoder writes them, and what follows reads them with the core's functions. Encoders return the
  * size, -1 (no space) or -2 (not something the stream can hold), decoders 1 or 0 (not valid). */
 #include <stdint.h>
 #include <stdlib.h>
@@ -94,6 +95,7 @@ BENCH_API int64_t bench_table(stream_bytes bytes, int64_t size, int32_t row_coun
     return finish(&coder, 1);
 }
 
+#ifndef ATH_ENCODING
 BENCH_API int64_t bench_hierarchy(stream_bytes bytes, int64_t size, int32_t branch_count, int32_t vertex_count,
                                   ath_branch *branches, int32_t *branch_source, int32_t *vertex_source)
 {
@@ -106,17 +108,17 @@ BENCH_API int64_t bench_hierarchy(stream_bytes bytes, int64_t size, int32_t bran
     return finish(&coder, valid);
 }
 
-#ifndef ATH_ENCODING
 /* The pose that athcodec's encoder writes for these branches, vertex_count x 3. */
 BENCH_API int64_t bench_pose(stream_bytes bytes, int64_t size, const ath_branch *branches, int32_t branch_count,
                              double step, double *pose)
 {
     ath_coder coder;
-    rest_layer layer = {0};
     rest_model *model = malloc(sizeof *model);
     if (!model) abort();
+    model->layer = (rest_layer){.branches = branches, .branch_count = branch_count, .step = step, .rest = pose};
     coder_start(&coder, bytes, (size_t)size);
-    int valid = code_rest(&coder, model, &layer, branches, branch_count, step, 0, pose);
+    start_rest(&coder, model);
+    int valid = code_rest(&coder, model, NULL, NULL);
     free(model);
     return finish(&coder, valid);
 }

@@ -1,4 +1,4 @@
-"""The entropy coder of the baselines, which is athcodec's (coder.c, compiled here with the core's flags).
+"""The entropy coder of the baselines, which is athcodec's (coder.c, compiled here with the core's headers and flags).
 
 It takes arrays of integers: rows of three axes over frequency, and tables of anything else.
 `Writer` concatenates such arrays and a few numbers, each with its shape and length, and `Reader` parses them, so that a
@@ -28,8 +28,14 @@ from athcodec._native import BRANCH, SEGMENT_FRAMES
 from athcodec.encoding import quantise, streams
 from athcodec.motion.hierarchy import Hierarchy
 
-CORE = Path(__file__).resolve().parents[2] / "athcodec" / "core"
+ROOT = Path(__file__).resolve().parents[2]
+CORE = ROOT / "athcodec" / "core"
 CORE_SOURCES = [CORE / "model" / name for name in ("basis.c", "motion.c", "refine.c", "rotations.c")]
+OPTIMISATION = "-O3"  # The level of the core in CMakeLists.txt; no level changes a bit of what is coded.
+# A call that no longer fits a function of the core ends the build, even where its arguments can be converted.
+STRICT = tuple(
+    f"-Werror={name}" for name in ("implicit-function-declaration", "incompatible-pointer-types", "int-conversion")
+)
 LARGEST = 1 << 30
 LOW_BITS = 24
 
@@ -48,13 +54,22 @@ def compiler() -> list[str] | None:
 
 
 def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
-    """Compiles C with the options that CMakeLists.txt gives the core."""
+    """Compiles C with the options that CMakeLists.txt gives the core.
+
+    Raises SystemExit with the compiler's line about the first error.
+    """
     command = compiler()
     if command is None:
         raise SystemExit("C compiler: found none of cc, gcc and clang; expected one, or its name in CC")
     flags = re.findall(r"^\s*(-f[\w=-]+)", (CORE / "CMakeLists.txt").read_text(), re.MULTILINE)
-    command += ["-std=c11", "-O3", *flags, f"-I{CORE}", f"-I{CORE / 'include'}", *options]
-    subprocess.run([*command, "-o", target, *sources, "-lm"], check=True)
+    command += ["-std=c11", OPTIMISATION, *flags, *STRICT, f"-I{CORE}", f"-I{CORE / 'include'}", *options]
+    done = subprocess.run(
+        [*command, "-o", target, *sources, "-lm"], stderr=subprocess.PIPE, text=True, env=os.environ | {"LC_ALL": "C"}
+    )
+    if done.returncode:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        first = next((line for line in lines if re.search(r"\berror: |\bundefined ", line)), lines[-1])
+        raise SystemExit(f"C compiler, {sources[0].name}: {first.replace(f'{ROOT}/', '')}")
 
 
 @cache
@@ -63,15 +78,12 @@ def library(writes: bool) -> ctypes.CDLL:
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
-    options = ["-shared", "-fPIC", *(["-DATH_ENCODING"] if writes else [])]
-    compile_c(file, [Path(__file__).with_name("coder.c"), *CORE_SOURCES], *options)
+    sources, way = ([], ["-DATH_ENCODING"]) if writes else (CORE_SOURCES, [])
+    compile_c(file, [Path(__file__).with_name("coder.c"), *sources], "-shared", "-fPIC", *way)
     loaded = ctypes.CDLL(str(file))
-    arguments = {
-        "bench_rows": [c_int32] * 3 + [c_void_p],
-        "bench_table": [c_int32] * 2 + [c_void_p],
-        "bench_hierarchy": [c_int32] * 2 + [c_void_p] * 3,
-    }
+    arguments = {"bench_rows": [c_int32] * 3 + [c_void_p], "bench_table": [c_int32] * 2 + [c_void_p]}
     if not writes:
+        arguments["bench_hierarchy"] = [c_int32] * 2 + [c_void_p] * 3
         arguments["bench_corrections"] = [c_int32, c_int32, c_double, c_int32, c_void_p]
         arguments["bench_pose"] = [c_void_p, c_int32, c_double, c_void_p]
     for name, rest in arguments.items():

@@ -1,4 +1,5 @@
-// In a browser: draw(engine, url, seconds) gives the picture of a GLB at a time of its first animation, 4 numbers per pixel.
+// In a browser: draw(engine, url, seconds, box) gives the picture of a GLB at a time of its first animation, 4 numbers per
+// pixel, from the front of a box or, where box.side is -1, from behind.
 // Bundled by gltf_motion_bundle.mjs.
 import * as three from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -27,16 +28,17 @@ function pixels(from) {
 }
 
 // Where the camera stands, so that a box is in the picture.
-const stand = (box) => ({ centre: box.centre, away: 1.5 * Math.max(...box.size) });
+const stand = (box) => ({ centre: box.centre, away: 1.5 * Math.max(...box.size) * (box.side ?? 1) });
 
 const engines = {
   async three(url, seconds, box) {
     const renderer = new three.WebGLRenderer({ canvas: canvas(), preserveDrawingBuffer: true });
     const gltf = await new GLTFLoader().register(athMotion(new ATHLoader().setDecoderPath("/viewer/web/"))).loadAsync(url);
     const scene = new three.Scene(), camera = new three.PerspectiveCamera(50, 1, 0.01, 1000), { centre, away } = stand(box);
-    scene.add(gltf.scene); // of metal, and so black without surroundings
+    scene.add(gltf.scene, new three.HemisphereLight(0xffffff, 0x000000, 3));
     scene.background = new three.Color(0x4080c0);
     camera.position.set(centre[0], centre[1], centre[2] + away);
+    camera.lookAt(...centre);
     const mixer = new three.AnimationMixer(gltf.scene);
     mixer.clipAction(gltf.animations[0]).play();
     mixer.setTime(seconds);

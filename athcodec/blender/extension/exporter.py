@@ -76,12 +76,22 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
             self.report({"ERROR"}, " ".join(str(error).split()) or type(error).__name__)
             return {"CANCELLED"}
         self.report({"INFO"}, f"{summary.bytes:,} bytes, {summary.ratio:.1f} times smaller")
+        if left_out := left_out_of(context, summary):
+            self.report({"WARNING"}, f"not written: {left_out}")
         return {"FINISHED"}
 
     def _bound(self) -> dict:
         if self.bound == "LENGTH":
             return {"max_error": self.max_error}
         return {"lossless": True} if self.bound == "LOSSLESS" else {"rel_error": self.rel_error}
+
+
+def left_out_of(context, summary) -> str:
+    """What is selected besides the active object, and what of that is not in the file, in words; "" for nothing."""
+    from athcodec.sources import listed
+
+    others = [obj.name for obj in context.selected_objects if obj != context.active_object]
+    return listed({**({"object": others} if others else {}), **summary.not_read})
 
 
 def write_object(
@@ -174,8 +184,17 @@ class Recording:
             "part_kinds": ["mesh"],
             "domains": static.pop("domains"),
         }
+        materials = [slot.material.name for slot in self._obj.material_slots if slot.material]
+        not_read = {"attribute": static.pop("left_out"), "material": materials}
         skin = _skin(self._obj, self.vertex_count)
-        return MotionClip(positions, np.arange(len(positions)) / rate, metadata=metadata, skin=skin, **static)
+        return MotionClip(
+            positions,
+            np.arange(len(positions)) / rate,
+            metadata=metadata,
+            skin=skin,
+            not_read={kind: names for kind, names in not_read.items() if names},
+            **static,
+        )
 
 
 def _shape(mesh) -> tuple[int, int, int, int]:
@@ -207,7 +226,7 @@ def _unit(scene, world: bool) -> dict:
 
 
 def _static(mesh, obj) -> dict:
-    """Arguments of MotionClip that do not move, and the domains of the attributes."""
+    """Arguments of MotionClip that do not move, the domains of the attributes, and the names of those left out."""
     found, arrays, domains = {}, {}, {}
     counts = np.empty(len(mesh.polygons), np.int32)
     corners = np.empty(len(mesh.loops), np.int32)
@@ -226,22 +245,26 @@ def _static(mesh, obj) -> dict:
         uv = np.empty(2 * len(corners), np.float32)
         mesh.uv_layers.active.data.foreach_get("uv", uv)
         arrays["uv"], domains["uv"] = uv.reshape(-1, 2), "corner"
-    _add_attributes(mesh, arrays, domains)
+    left_out = _add_attributes(mesh, arrays, domains)
     _take_branches(obj, arrays, found)
-    return {**found, "attributes": arrays, "domains": domains}
+    return {**found, "attributes": arrays, "domains": domains, "left_out": left_out}
 
 
-def _add_attributes(mesh, arrays: dict, domains: dict) -> None:
+def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
+    """Adds the attributes that an .ath file holds, and returns the names of the others."""
     from athcodec.motion.clip import RESERVED_NAMES
 
+    active = mesh.uv_layers.active
+    left_out = [layer.name for layer in mesh.uv_layers if active is None or layer.name != active.name]
     uv_names = {layer.name for layer in mesh.uv_layers}
     kept = ("vertex_branch", "stem_index")
     for layer in mesh.attributes:
-        known = layer.domain in DOMAINS and layer.data_type in FIELDS and len(layer.data)
-        own = layer.is_internal or layer.name.startswith(".") or layer.name in uv_names or layer.name in arrays
-        if not known or own or layer.name in RESERVED_NAMES and layer.name not in kept:
+        if layer.is_internal or layer.name.startswith(".") or layer.name in uv_names or layer.name == "position":
             continue
-        if layer.name in ("position", "sharp_face", "material_index"):
+        known = layer.domain in DOMAINS and layer.data_type in FIELDS and len(layer.data)
+        is_taken = layer.name in arrays or layer.name in RESERVED_NAMES and layer.name not in kept
+        if not known or is_taken or layer.name in ("sharp_face", "material_index"):
+            left_out += [layer.name] if len(layer.data) else []
             continue
         row = WIDTHS[layer.data_type]
         dtype = {"INT": np.int32, "BOOLEAN": bool}.get(layer.data_type, np.float32)
@@ -250,6 +273,7 @@ def _add_attributes(mesh, arrays: dict, domains: dict) -> None:
         arrays[layer.name] = values.reshape(len(layer.data), *row)
         if layer.domain != "POINT":
             domains[layer.name] = DOMAINS[layer.domain]
+    return left_out
 
 
 def _take_branches(obj, arrays: dict, found: dict) -> None:

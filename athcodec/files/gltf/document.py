@@ -45,6 +45,7 @@ HARMLESS = (
     "ADOBE_materials_",
     "KHR_mesh_quantization",
     "KHR_animation_pointer",
+    "KHR_node_visibility",
     "ATH_motion",
     "EXT_mesh_gpu_instancing",
     *MESHOPT,
