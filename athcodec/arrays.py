@@ -3,25 +3,39 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from typing import Any, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.atomic import keeping
 from athcodec.motion.clip import DEFAULT_FPS, MotionClip, frame_rate
-from athcodec.motion.frames import Frames
+from athcodec.motion.positions import (
+    FRAMES,
+    Order,
+    facts_of,
+    in_floats,
+    looks_turned,
+    order_of,
+    order_of_labels,
+    ordered,
+    parse_order,
+    seconds_of_dates,
+    turned_advice,
+)
 from athcodec.motion.units import unit_symbol
 
 Source: TypeAlias = Any
 """An array (frames, vertices, 3), a MotionClip, a Decoder or ClipView, or a path."""
-OF_ARRAYS = ("faces", "vertex_branch", "branch_parent")
+OF_ARRAYS = ("faces", "vertex_branch", "branch_parent", "axes")
 OF_FILES = ("fps", "unit", "up_axis")
+OF_PATHS = (*OF_FILES, "dataset", "axes")
+LISTED = 12  # Arrays that a message names.
 OF_VIEWS = "positions time vertex_branch branch_parent stem_index rest edges faces".split()
 OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 
@@ -30,11 +44,11 @@ OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
     """Give a source as a clip, and a sentence on how its numbers were converted, empty if they were not.
 
-    The options are OF_ARRAYS and OF_FILES, as far as they are given. A file that is opened here is closed when the
-    block ends. Raises ClipError, ValueError, and the errors of `read`.
+    The options are OF_ARRAYS, OF_FILES and OF_PATHS, as far as they are given. A file that is opened here is closed
+    when the block ends. Raises ClipError, ValueError, and the errors of `read`.
     """
     is_path, is_view = isinstance(source, (str, os.PathLike)), isinstance(source, (Decoder, ClipView))
-    allowed = OF_FILES if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
+    allowed = OF_PATHS if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
     for name in given.keys() - set(allowed):
         raise ValueError(f"{name}: got it beside {type(source).__name__} {source!r:.80}, which states its own")
     if is_path:
@@ -54,25 +68,47 @@ def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
 def _clip_of_array(source: Source, given: dict[str, Any]) -> tuple[MotionClip, str]:
     if isinstance(source, np.ma.MaskedArray) and np.ma.is_masked(source):
         raise ClipError("positions: got an array with masked items, expected a number for each; fill them first")
+    if hasattr(source, "keys") and not hasattr(source, "shape"):
+        raise ClipError(f"positions: got a {type(source).__name__}, expected one of its arrays: {_held(source)}")
     is_sliced = hasattr(source, "shape") and isinstance(getattr(source, "dtype", None), np.dtype)
-    positions, converted = _in_floats(source if is_sliced else np.asarray(source))
+    array = source if is_sliced else np.asarray(source)
+    axes, facts = given.pop("axes", None), facts_of(given)
+    order = order_of_labels(_labels(source)) if axes is None else parse_order(axes)
+    order = order_of(array.shape, facts, order)
+    positions, converted = in_floats(ordered(array, order))
+    if axes is None and looks_turned(positions, facts):
+        warnings.warn(turned_advice(positions.shape), GuessWarning, stacklevel=2)
+    stated = {name: value for name, value in dict(getattr(source, "attrs", {})).items() if name in OF_FILES}
+    time = _seconds(source, order, positions.shape[0]) if "fps" not in given else None
+    given = stated | given
     rate = frame_rate({"fps": given.pop("fps", DEFAULT_FPS)})
     metadata: dict[str, Any] = {name: given.pop(name) for name in OF_FILES if name in given}
     if "unit" in metadata:
         metadata["unit"] = unit_symbol(metadata["unit"])
-    frame_count = positions.shape[0] if positions.shape else 0
-    return MotionClip(positions, np.arange(frame_count) / rate, metadata=metadata, **given), converted
+    time = np.arange(positions.shape[0]) / rate if time is None else time
+    return MotionClip(positions, time, metadata=metadata, **given), converted
 
 
-def _in_floats(positions: Any) -> tuple[Any, str]:
-    """Return positions in float32 or float64, whichever holds them, and a sentence if that is another type."""
-    before = positions.dtype
-    if before.kind not in "iuf" or len(positions.shape) != 3 or (before.kind == "f" and before.itemsize in (4, 8)):
-        return positions, ""
-    after: npt.DTypeLike = np.float32 if np.result_type(before, np.float32) == np.float32 else np.float64
+def _held(source: Source) -> str:
+    """Return the arrays of a mapping with their shapes; those of an archive of NumPy would have to be read for that."""
+    names = list(source.keys())
+    shapes = ["" if isinstance(source, np.lib.npyio.NpzFile) else getattr(source[name], "shape", "") for name in names]
+    shown = [f"{name} {shape}".strip() for name, shape in zip(names[:LISTED], shapes)]
+    return ", ".join(shown) + (f" and {len(names) - LISTED} more" if len(names) > LISTED else "")
 
-    def read(start: int, stop: int) -> np.ndarray:
-        return np.asarray(positions[start:stop]).astype(after)
 
-    frame_count, vertex_count, _ = positions.shape
-    return Frames(read, frame_count, vertex_count, after), f"positions: {before} became {np.dtype(after)}"
+def _labels(source: Source) -> list[str]:
+    """Return the names of the dimensions of an array of xarray, HDF5 or zarr, as far as it has them."""
+    dimensions = getattr(source, "dims", None) or getattr(getattr(source, "metadata", None), "dimension_names", None)
+    dimensions = dimensions or dict(getattr(source, "attrs", {})).get("_ARRAY_DIMENSIONS")
+    return [str(getattr(each, "label", each)) for each in dimensions] if np.iterable(dimensions) else []
+
+
+def _seconds(source: Source, order: Order | None, frame_count: int) -> np.ndarray | None:
+    """Return the coordinates that an array of xarray has along its frames, in seconds; None without any."""
+    labels, coordinates = _labels(source), getattr(source, "coords", None)
+    if coordinates is None or order is None or len(labels) != len(order) or (FRAMES,) not in order:
+        return None
+    label = labels[order.index((FRAMES,))]
+    values = seconds_of_dates(np.asarray(coordinates[label]) if label in coordinates else np.zeros(0))
+    return values if values.shape == (frame_count,) and values.dtype.kind in "fiu" else None

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, TypedDict, Unpack, overload
 import numpy as np
 import numpy.typing as npt
 
-from athcodec.arrays import OF_ARRAYS, OF_FILES, Source, clip_of
+from athcodec.arrays import OF_ARRAYS, OF_PATHS, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
 from athcodec.encoding.progress import Progress
 from athcodec.motion.thresholds import Thresholds
@@ -28,6 +28,8 @@ class EncodeOptions(TypedDict, total=False):
     fps: float | None
     unit: str | None
     up_axis: str | None
+    axes: str | Sequence[str] | None
+    dataset: str | None
     max_error: float | None
     rel_error: float | None
     target_size: int | None
@@ -67,9 +69,9 @@ def encode(
 
     Other Parameters
     ----------------
-    faces, vertex_branch, branch_parent, fps, unit, up_axis : optional
-        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. With a
-        path, fps, unit and up_axis are those of `read`.
+    faces, vertex_branch, branch_parent, fps, unit, up_axis, axes, dataset : optional
+        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. axes is
+        the order of its axes, such as "vertices,frames,xyz". With a path, all from fps on are those of `read`.
     max_error, rel_error, target_size : optional
         At most one: the largest distance of any vertex in any frame from the source in scene units, the same over the
         diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7), or the bytes that the file may take.
@@ -119,7 +121,7 @@ def encode(
     if unknown := options.keys() - EncodeOptions.__annotations__.keys():
         raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
-    of_source = {name: given.pop(name) for name in (*OF_ARRAYS, *OF_FILES) if name in given}
+    of_source = {name: given.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in given}
     out = io.BytesIO() if target is None else target
     with clip_of(source, **of_source) as (clip, converted):
         summary = replace(encode_clip(clip, out, **given), converted=converted)

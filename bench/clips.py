@@ -15,7 +15,8 @@ from typing import Any
 import athcodec
 from athcodec.metrics import ErrorMeter
 from athcodec.options import EFFORTS, LADDERS, ladder_of
-from athcodec.sources.sequence import FRAME_SUFFIXES, sequence_files
+from athcodec.sources import FRAME_SUFFIXES
+from athcodec.sources.numbering import numbered_files
 
 REL_ERROR = 1e-4
 
@@ -32,7 +33,7 @@ class Encoded:
 def files_of(path: Path) -> list[Path]:
     """The files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
     beside = path.parent.glob(f"{path.stem}.h5") if path.suffix == ".xdmf" else ()
-    frames = sequence_files(path).values() if path.suffix in FRAME_SUFFIXES else ()
+    frames = numbered_files(path).paths if path.suffix in FRAME_SUFFIXES else ()
     return sorted({path, *frames, *beside})
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.exporters import write_hdf5
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.motion import clip as clip_module
@@ -194,11 +194,10 @@ REFUSED = {
         {"ABC/abc": [0]},
         "archive: got Alembic in HDF5, expected .* abcconvert -toOgawa",
     ),
-    "float16 positions": ([], {"positions": np.zeros((5, 6, 3), "f2")}, "float16"),
-    "empty positions": ([], {"positions": h5py.Empty("f4")}, "positions: got a group or an empty dataset"),
+    "complex positions": ([], {"positions": np.zeros((5, 6, 3), "c8")}, "complex64"),
+    "empty positions": ([], {"positions": h5py.Empty("f4")}, "positions: got an empty dataset"),
     "a cycle of edges": (BRANCHES, {"edges": [[0, 1], [1, 2], [2, 0]]}, "closes a cycle"),
     "NaN at rest": ([], {"rest": np.full((6, 3), np.nan)}, "rest: vertex 0"),
-    "empty static array": ([], {"radius": h5py.Empty("f4")}, "radius: got an empty dataset"),
 }
 
 
@@ -210,6 +209,31 @@ def test_an_unusable_file_is_refused_by_name_and_closed(forked, tmp_path, leave_
     assert str(path) in str(caught.value)
     with h5py.File(path, "a"):
         pass
+
+
+def test_what_cannot_be_kept_is_named_and_the_rest_is_read(forked, tmp_path):
+    path = write_source(tmp_path / "a.h5", forked, radius=h5py.Empty("f4"))
+    with h5py.File(path, "a") as file:
+        lists = file.create_dataset("lists", (2,), h5py.vlen_dtype(np.int32))
+        lists[0] = [1, 2, 3]
+        file["positions"].attrs["note"] = "by hand"
+        file["gone"] = h5py.SoftLink("/nowhere")
+    with pytest.warns(SourceWarning, match="not read: link gone"), read_hdf5(path) as clip:
+        assert clip.attributes == {}
+        named = {
+            "link": ["gone"],
+            "empty dataset": ["radius"],
+            "dataset of references or lists": ["lists"],
+            "note of a dataset": ["positions@note"],
+        }
+        assert dict(clip.not_read) == named
+
+
+@pytest.mark.parametrize("dtype", ["f2", "i2", "u1"])
+def test_positions_of_another_type_are_converted_and_that_is_said(forked, tmp_path, dtype):
+    path = write_source(tmp_path / "a.h5", forked, positions=np.arange(90).reshape(5, 6, 3).astype(dtype))
+    with pytest.warns(GuessWarning, match="became float32"), read_hdf5(path) as clip:
+        assert np.array_equal(clip.block(1, 3).reshape(-1), np.arange(18, 54)) and clip.dtype == np.float32
 
 
 def test_what_is_no_hdf5_file_is_refused(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from moving_meshes import damaged
 
 import athcodec
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, SourceWarning
 from athcodec.motion.clip import MotionClip
 from athcodec.sources.mtg import mtg_branches, read_mtg
 
@@ -126,6 +126,21 @@ def test_features_belong_to_the_last_entity_or_to_all_of_a_run(tmp_path):
     assert mtg.labels == ["U1", "U2", "U3", "U4", "U5", "U6", "U7", "U1"]
     assert np.array_equal(mtg.features["diam"], [4, np.nan, np.nan, 2.5, 1, 1, 1, np.nan], equal_nan=True)
     assert mtg.edges.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 6], [6, 7]]
+
+
+def test_what_no_branch_has_is_named(tmp_path):
+    path = written(tmp_path, "TOPO\t\tdiam\tdate\n/P1/A1/U1\t\t4\t1\n*\t\t5\t2\n^<U2\t\t3\t1\n*\t\t4\t2\n")
+    clip = MotionClip(np.zeros((1, 2, 3)), np.zeros(1))
+    with pytest.warns(SourceWarning, match=r"not read: features diam, date; 2 rows of later dates \(\*\)$"):
+        assert mtg_branches(path, clip)[0].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("axes", ["X\tY\tZ", "xx\tyy\tzz"])
+def test_coordinates_have_other_names_too(tmp_path, axes):
+    clip, *_ = measured_clip()
+    wanted = mtg_branches(written(tmp_path, MEASURED), clip)
+    found = mtg_branches(written(tmp_path, MEASURED.replace("XX\tYY\tZZ", axes)), clip)
+    assert all(map(np.array_equal, found, wanted))
 
 
 MEASURED = (

@@ -118,7 +118,7 @@ def test_a_hyphen_before_a_number_is_no_sign_where_all_files_have_it(tmp_path):
 @pytest.mark.parametrize(
     "names",
     [
-        ["leaf_0.5.obj", "leaf_1.0.obj", "leaf_1.5.obj"],
+        ["leaf0.5.obj", "leaf1.0.obj", "leaf1.5.obj"],
         ["plant_03-20_AM.obj", "plant_03-20_PM.obj", "plant_03-21_AM.obj"],
         ["2024-03-31.obj", "2024-04-01.obj"],
         ["day12.5.obj", "day13.5.obj"],
@@ -253,6 +253,69 @@ def test_statements_and_elements_that_are_not_read_are_named(tmp_path):
         assert clip.not_read == {"element": ["camera"]}
 
 
+OBJ_SAYS = {
+    "v 0 0 0 1\nv 1 0 0 2\nv 0 1 0 1\nf 1 2 3\n": {"attribute": ["numbers behind the coordinates of v"]},
+    "v 0 0 0 1 1 1\nv 1 0 0\nv 0 1 0\nf 1 2 3\n": {"attribute": ["numbers behind the coordinates of v"]},
+    TRIANGLE.format(0) + "vt 0 1\n": {"statement": ["vt"]},
+    "vt 0 1 0.5\n" + TRIANGLE.format(0).replace("1 2 3", "1/1 2/1 3/1"): {"statement": ["w of vt"]},
+    TRIANGLE.format(0) + "vt 0 0\nl 1/1 2/1\n": {"statement": ["vt of l", "vt"]},
+    "o a\ng one\n" + TRIANGLE.format(0): {"statement": ["g"]},
+    "o a\n" + TRIANGLE.format(0) + "o b\nf 3 2 1\n": {"statement": ["o"]},
+    TRIANGLE.format(0) + "c_interp on\n@x\n#MRGB 00ff\n# a comment\n": {"statement": ["c_interp", "@x", "#MRGB"]},
+}
+
+
+@pytest.mark.parametrize("text", OBJ_SAYS)
+def test_whatever_an_obj_file_says_and_is_not_read_is_named(tmp_path, text):
+    (tmp_path / "a.obj").write_text(text)
+    with athcodec.read(tmp_path / "a.obj") as clip:
+        assert clip.not_read == OBJ_SAYS[text]
+
+
+@pytest.mark.parametrize("line, kind", [("curv2 1 2", "curve or surface"), ("call b.obj", "included file")])
+def test_shapes_of_an_obj_file_that_are_not_read_are_said(tmp_path, line, kind):
+    (tmp_path / "a.obj").write_text(TRIANGLE.format(0) + line + "\n")
+    with pytest.warns(SourceWarning, match=f"not read: {kind} {line.split()[0]}$"):
+        athcodec.read(tmp_path / "a.obj").close()
+
+
+def test_statements_of_later_files_are_named_too(tmp_path):
+    write_triangles(tmp_path, ["a_1.obj", "a_2.obj", "a_3.obj"])
+    with (tmp_path / "a_3.obj").open("a") as file:
+        file.write("surf 0 1 0 1 1\n")
+    with (
+        pytest.warns(SourceWarning, match="not read: curve or surface surf$"),
+        athcodec.read(tmp_path / "a_1.obj") as clip,
+    ):
+        assert clip.frame_count == 3
+
+
+PLY_SAYS = {
+    "element edge 1\nproperty int vertex1\nproperty int vertex2\nproperty float crease\n|0 1 0.5": {
+        "attribute": ["edge_crease"]
+    },
+    "element edge 1\nproperty int from\nproperty int to\n|0 1": {"attribute": ["edge_from", "edge_to"]},
+    "comment TextureFile leaf.png\n|": {"statement": ["TextureFile"]},
+}
+
+
+@pytest.mark.parametrize("more", PLY_SAYS)
+def test_whatever_a_ply_file_says_and_is_not_read_is_named(tmp_path, more):
+    header, rows = more.split("|")
+    (tmp_path / "a.ply").write_text(PLY.format("ascii", 2, header) + f"0 0 0\n1 0 0\n{rows}\n")
+    with athcodec.read(tmp_path / "a.ply") as clip:
+        assert clip.not_read == PLY_SAYS[more]
+
+
+def test_normals_and_faces_without_known_corners_of_a_ply_file_are_named(tmp_path):
+    normals = "".join(f"property float n{axis}\n" for axis in "xyz")
+    faces = "element face 1\nproperty list int int corners\nproperty int organ\n"
+    (tmp_path / "a.ply").write_text(PLY.format("ascii", 3, normals + faces) + 3 * "0 0 0 0 0 1\n" + "3 0 1 2 7\n")
+    with pytest.warns(SourceWarning, match="not read: faces whose corners have no known name corners, organ"):
+        with athcodec.read(tmp_path / "a.ply") as clip:
+            assert clip.not_read["attribute"] == ["normals"] and clip.polygons is None
+
+
 def test_objects_and_groups_are_parts_where_their_vertices_lie_together():
     squares = "v 0 0 0\nv 1 0 0\nv 0 1 0\n{}v 0 0 1\nv 1 0 1\nv 0 1 1\n{}"
     for word in ("o", "g"):
@@ -264,6 +327,8 @@ def test_objects_and_groups_are_parts_where_their_vertices_lie_together():
     shared = obj(squares.format("", "g a\nf 1 2 6\ng b\nf 3 4 5\n"))
     assert shared.metadata["part_names"] == ["leaf"] and shared.attributes["face_group"].tolist() == [0, 1]
     assert shared.metadata["group_names"] == ["a", "b"]
+    covered = obj(squares.format("", "g a\nf 1 2 3\ng b\nf 3 2 1\n"))  # All vertices are those of the first group.
+    assert covered.metadata["group_names"] == ["a", "b"] and covered.attributes["face_group"].tolist() == [0, 1]
 
 
 def test_digits_beyond_float32_are_kept():

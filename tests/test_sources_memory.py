@@ -32,6 +32,7 @@ from pathlib import Path
 import athcodec, h5py, numpy
 def peak(): return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]) * 1024
 import athcodec.sources.gltf, athcodec.sources.hdf5, athcodec.sources.npz, athcodec.sources.xdmf, athcodec.sources.vtk
+import athcodec.sources.vtkhdf, athcodec.sources.npy, athcodec.sources.mat
 before = peak()
 try:
     with athcodec.read(sys.argv[1], max_memory=int(sys.argv[2])) as clip:
@@ -119,6 +120,67 @@ def xdmf_data(folder: Path) -> Path:
     return folder / "a.xdmf"
 
 
+def xdmf_with(folder: Path, topology: str = "", points: str = "") -> Path:
+    (folder / "a.xdmf").write_text(
+        f'<Xdmf><Domain><Grid>{topology}<Geometry GeometryType="XYZ">{points}</Geometry></Grid></Domain></Xdmf>'
+    )
+    return folder / "a.xdmf"
+
+
+def xdmf_grid(folder: Path) -> Path:
+    """Cells between points that are not there."""
+    point = '<DataItem Dimensions="1 3">0 0 0</DataItem>'
+    return xdmf_with(folder, '<Topology TopologyType="3DSMesh" Dimensions="400 400 400"/>', point)
+
+
+def xdmf_packed(folder: Path) -> Path:
+    (folder / "a.bin").write_bytes(zlib.compress(bytes(256 << 20), 9))
+    said = 'Format="Binary" Compression="Zlib" Dimensions="22369621 3" Precision="4"'
+    return xdmf_with(folder, points=f"<DataItem {said}>a.bin</DataItem>")
+
+
+def xdmf_function(folder: Path) -> Path:
+    """A thousand numbers, again and again."""
+    inner = f'<DataItem Dimensions="1000">{"0 " * 1000}</DataItem>'
+    for _ in range(4):
+        joined = ",".join(["$0"] * 200)
+        inner = f'<DataItem ItemType="Function" Function="JOIN({joined})">{inner}</DataItem>'
+    return xdmf_with(folder, points=inner)
+
+
+def npz_turned(folder: Path) -> Path:
+    """Positions that have to be read whole."""
+    with zipfile.ZipFile(folder / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("positions.npy", "w") as member:
+            np.lib.format.write_array(member, np.asfortranarray(np.zeros((1 << 20, 4, 3))))
+    return folder / "a.npz"
+
+
+def npy_turned(folder: Path) -> Path:
+    header = str({"descr": "<f8", "fortran_order": True, "shape": (1 << 20, 16, 3)}).encode()
+    (folder / "a.npy").write_bytes(b"\x93NUMPY\x01\0v\0" + header.ljust(117) + b"\n")
+    os.truncate(folder / "a.npy", 128 + 8 * 48 * (1 << 20))
+    return folder / "a.npy"
+
+
+def vtkhdf(folder: Path) -> Path:
+    """Points that are only declared."""
+    with h5py.File(folder / "a.vtkhdf", "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        root.create_dataset("Points", (8 << 20, 3), "f8", chunks=(1 << 16, 3))
+        root["NumberOfPoints"], root["NumberOfCells"], root["NumberOfConnectivityIds"] = [8 << 20], [0], [0]
+        root["Offsets"], root["Types"], root["Connectivity"] = [0], np.zeros(0, np.uint8), np.zeros(0, np.int64)
+    return folder / "a.vtkhdf"
+
+
+def matlab(folder: Path) -> Path:
+    from scipy.io import savemat
+
+    savemat(folder / "a.mat", {"positions": np.zeros((1 << 20, 16, 3))}, do_compression=True)
+    return folder / "a.mat"
+
+
 def xdmf_laughs(folder: Path) -> Path:
     """Defaults of attributes, which the parser gives every element."""
     declared = f'<!DOCTYPE Xdmf [<!ATTLIST Grid Name CDATA "{"ha" * 50_000}">]>'
@@ -190,6 +252,7 @@ def usdc_array(folder: Path) -> Path:
 
 
 MAKERS = [pvd, npz, hdf5_declared, hdf5_chunk, hdf5_texts, xdmf_data, xdmf_laughs]
+MAKERS += [xdmf_grid, xdmf_packed, xdmf_function, npz_turned, npy_turned, vtkhdf, matlab]
 MAKERS += [gltf_nodes, gltf_attributes, gltf_copies, gltf_meshopt, usda_laughs, usdc_array]
 MAKERS = {maker.__name__: maker for maker in MAKERS} | {
     "vtu_zlib": partial(vtu, packer="vtkZLibDataCompressor", pack=zlib.compress),
@@ -207,7 +270,22 @@ def test_a_small_file_takes_no_more_memory_than_it_may(maker: Callable, tmp_path
 
 
 def test_what_is_no_plain_file_is_refused_at_once(tmp_path):
-    for suffix in (".h5", ".npz", ".usda", ".glb", ".abc", ".pc2", ".mdd", ".obj", ".ply", ".xdmf", ".vtu", ".pvd"):
+    for suffix in (
+        ".h5",
+        ".npz",
+        ".npy",
+        ".mat",
+        ".usda",
+        ".glb",
+        ".abc",
+        ".pc2",
+        ".mdd",
+        ".obj",
+        ".ply",
+        ".xdmf",
+        ".vtu",
+        ".pvd",
+    ):
         os.mkfifo(tmp_path / f"a{suffix}")
         with pytest.raises(ClipError, match="device, pipe or socket, expected a plain file"):
             athcodec.read(tmp_path / f"a{suffix}")

@@ -94,3 +94,48 @@ def test_what_vtk_writes_is_read(tmp_path, mode, compressor):
     with athcodec.read(tmp_path / "w_###.vtk", fps=24) as again:
         assert_same_motion(again, clip, 1e-6 if mode == "Binary" else 1e-5)  # legacy text has six digits
         assert_same_mesh(again, clip)
+
+
+WRITE_LISTS = """
+import sys, numpy as np, vtk, pyvista as pv
+folder, version = sys.argv[1:]
+expected = {"points": [], "lines": np.array([[0, 1], [1, 2], [3, 4]])}
+for frame, time in enumerate([0.0, 0.1, 0.25, 0.9]):
+    points = np.random.default_rng(frame).random((8, 3))
+    expected["points"].append(points)
+    poly = pv.PolyData(points, lines=[3, 0, 1, 2, 2, 3, 4], faces=[4, 0, 1, 2, 3, 3, 4, 5, 6], strips=[4, 4, 5, 6, 7])
+    poly.point_data["age"] = np.arange(8.0)
+    poly.field_data["TimeValue"] = [time]
+    for name, is_binary in (("a", False), ("b", True)):
+        writer = vtk.vtkPolyDataWriter()
+        writer.SetFileVersion(int(version))
+        writer.SetFileName("%s/%s_%d.vtk" % (folder, name, frame))
+        writer.SetInputData(poly)
+        writer.SetFileTypeToBinary() if is_binary else writer.SetFileTypeToASCII()
+        assert writer.Write()
+    poly.save("%s/x_%d.vtp" % (folder, frame))
+    blocks = pv.MultiBlock({"tree": poly, "fruit": pv.Sphere(center=(0, 0, time))})
+    blocks.field_data["TimeValue"] = [time]
+    blocks.save("%s/m_%d.vtm" % (folder, frame))
+    expected.setdefault("fruit", []).append(np.array(blocks["fruit"].points))
+np.savez(folder + "/out.npz", **expected)
+"""
+
+
+@pytest.mark.parametrize("version", [42, 51])
+def test_polydata_lists_and_times_of_vtk_are_read(tmp_path, version):
+    run_script(vtk_python(), WRITE_LISTS, tmp_path, version)
+    with np.load(tmp_path / "out.npz") as out:
+        for name in ("a_1.vtk", "b_1.vtk", "x_1.vtp", "m_1.vtm"):
+            with athcodec.read(tmp_path / name) as clip:
+                assert clip.time.tolist() == pytest.approx([0, 0.1, 0.25, 0.9], abs=1e-9), name
+                assert np.abs(clip.block(0, 4)[:, :8] - out["points"]).max() < 1e-6
+                assert np.array_equal(clip.edges, out["lines"])
+                counts, corners = clip.polygons
+                assert counts.tolist()[:4] == [4, 3, 3, 3]
+                assert corners.tolist()[:13] == [0, 1, 2, 3, 4, 5, 6, 4, 5, 6, 5, 7, 6]
+                if name == "m_1.vtm":
+                    assert np.abs(clip.block(0, 4)[:, 8:] - out["fruit"]).max() < 1e-6
+                    assert clip.metadata["part_names"] == ["tree", "fruit"]
+                else:
+                    assert clip.attributes["age"].tolist() == list(range(8))

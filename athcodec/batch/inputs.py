@@ -25,8 +25,8 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
-from athcodec.sources import NUMBER_PATTERN, formats, is_pattern
-from athcodec.sources.sequence import FRAME_SUFFIXES, each_once, sequence_files
+from athcodec.sources import FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, formats, is_pattern
+from athcodec.sources.numbering import each_once, numbered_files
 
 TAGS = (
     "ETag",
@@ -183,7 +183,7 @@ def _is_clip(name: str) -> bool:
 
 @cache
 def _clip_suffixes() -> tuple[str, ...]:
-    return tuple(suffix for form in formats() for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
+    return SERIES, *(suffix for form in formats() for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
 
 
 def _fixed_part(pattern: str, separator: str) -> str:
@@ -278,7 +278,7 @@ def is_telling(known: dict[str, Any]) -> bool:
 
 def _frames(path: str) -> list[str]:
     if path.lower().endswith(FRAME_SUFFIXES) or is_pattern(path):
-        return [str(file) for file in sequence_files(path).values()]
+        return [str(file) for file in numbered_files(path).paths]
     return [path]
 
 

@@ -25,6 +25,7 @@ from athcodec.encoding.shape import RestPrecision
 from athcodec.errors import ClipError
 from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
+from athcodec.motion.positions import parse_order, written
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
@@ -37,6 +38,8 @@ READING = (
     "fps",
     "mesh",
     "field",
+    "dataset",
+    "axes",
     "only",
     "takes",
     "allow_outside",
@@ -286,6 +289,8 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "fps": _rate,
     "mesh": _path,
     "field": _TEXT,
+    "dataset": _TEXT,
+    "axes": lambda value: written(parse_order(value)),
     "only": _patterns,
     "takes": _patterns,
     "allow_outside": _BOOL,

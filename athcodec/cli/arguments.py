@@ -411,6 +411,16 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
     source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
     source.add_argument(
+        "--dataset", metavar="/PATH", help="of HDF5, NumPy and MATLAB files, the array with the positions, or its group"
+    )
+    source.add_argument(
+        "--axes",
+        metavar="NAME,...",
+        type=_argument(_axes),
+        help="the order of that array's axes (default: frames,vertices,xyz), such as vertices,frames,xyz; "
+        "frames,vertices+xyz where x, y and z of all vertices lie in one axis; vertices,xyz for a single frame",
+    )
+    source.add_argument(
         "--only",
         metavar="PATTERN",
         action="append",
@@ -426,7 +436,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument(
         "--allow-outside",
         action="store_true",
-        help="let XDMF, PVD, HDF5 and USD files name files outside of their own folder",
+        help="let XDMF, VTK, .series, HDF5 and USD files name files outside of their own folder",
     )
     source.add_argument(
         "--max-memory",
@@ -689,6 +699,12 @@ def _numbers(text: str) -> list[float]:
 
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",")]
+
+
+def _axes(text: str) -> str:
+    from athcodec.motion.positions import parse_order, written  # The import takes longer than all of this module.
+
+    return written(parse_order(text))
 
 
 def _positive_length(text: str) -> Length:

@@ -38,7 +38,7 @@ from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
-from athcodec.sources.sequence import each_once
+from athcodec.sources.numbering import each_once
 
 if TYPE_CHECKING:
     from athcodec.exporters.gltf_into import Into
@@ -76,7 +76,7 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
 
     if len(paths) != 1 or args.output:
         raise ClipError(f"--into: got {len(paths)} inputs or an output besides, expected one GLB and no other output")
-    for name in ("source_format", "mesh", "field", "unit", "up_axis"):
+    for name in ("source_format", "mesh", "field", "dataset", "axes", "unit", "up_axis"):
         if getattr(args, name) is not None:
             raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
     if args.rest not in ("auto", HOST) or args.exact_rest:
@@ -171,6 +171,8 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
             fps=args.fps,
             mesh=args.mesh,
             field=args.field,
+            dataset=args.dataset,
+            axes=args.axes,
             only=args.only or (),
             takes=args.takes or (),
             allow_outside=args.allow_outside,

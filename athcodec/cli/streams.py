@@ -42,7 +42,7 @@ class Streams:
         if format is not None or self._input:
             return self._read(format_named(format, formats()).suffixes[0] if format else "")
         head = sys.stdin.buffer.peek(HEAD_BYTES)
-        kind = next((kind for kind in formats() if kind.magic and head.startswith(kind.magic)), None)
+        kind = next((kind for kind in formats() if kind.begins(head)), None)
         if kind is None:
             raise ClipError(f"{STREAM}: got a format that its first bytes do not tell, expected --source-format")
         return self._read(kind.suffixes[0])

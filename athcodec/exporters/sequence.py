@@ -24,7 +24,7 @@ from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
-from athcodec.sources.sequence import LARGEST_NUMBER, Numbering, numbering_of
+from athcodec.sources.numbering import LARGEST_NUMBER, Numbering, numbering_of
 
 DIGITS = 4
 

@@ -27,24 +27,35 @@ from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
+from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
-    "animation attribute element empty extension extras field hidden statement other".split(), NOT_KEPT.values()
-) | {
-    "animated property",
-    "class that nothing inherits",
-    "framesPerSecond",
-    "inactive",
-    "keys outside of the stage's range",
-    "layer",
-    "metadata",
-    "skin that no node of the scene has",
-    "variant",
-    "warning of USD",
-}
+    "animation attribute element empty extension extras field hidden statement other".split(),
+    (
+        "animated property",
+        "class that nothing inherits",
+        "framesPerSecond",
+        "inactive",
+        "keys outside of the stage's range",
+        "layer",
+        "metadata",
+        "skin that no node of the scene has",
+        "variant",
+        "warning of USD",
+    ),
+    (
+        "note of a dataset",
+        "empty dataset",
+        "dataset of references or lists",
+        "pickled object",
+        "member",
+        "sparse matrix",
+    ),
+    NOT_KEPT.values(),
+)
 LISTED = 8
 MEANINGS = {
     "animation": ' (--takes all, takes="all": a clip of each)',
@@ -54,8 +65,16 @@ MEANINGS = {
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
     ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
+    **dict.fromkeys(
+        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ),
     ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
 }
+_MESHES = (".obj", ".ply")
+_VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
+FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
+SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -73,6 +92,11 @@ class ReadOptions:
         The file that has the faces of a point cache, or of the vertices of a plant in MTG.
     field : str, optional
         Name of the displacement that is added to the points of a finite-element result.
+    dataset : str, optional
+        Path of the array with the positions in HDF5, NumPy and MATLAB files, or of its group.
+    axes : str or sequence of str, optional
+        The order of that array's axes, by default "frames,vertices,xyz"; "frames,vertices+xyz" where x, y and z of all
+        vertices lie in one axis, "vertices,xyz" for a single frame.
     only : sequence of str, optional
         Patterns (fnmatch) of the names of the prims, objects or meshes to read; all by default.
     takes : sequence of str or str, optional
@@ -83,7 +107,8 @@ class ReadOptions:
     root : int or sequence of int, optional
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
-        Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
+        Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
+        refused.
     max_memory : int, optional
         Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
         one file of it takes besides.
@@ -91,13 +116,15 @@ class ReadOptions:
     Raises
     ------
     ValueError
-        For values that rest and fps cannot have.
+        For values that rest, fps, axes and max_memory cannot have.
     """
 
     rest: str = "auto"
     fps: float | None = None
     mesh: str | PathLike[str] | None = None
     field: str | None = None
+    dataset: str | None = None
+    axes: str | Sequence[str] | None = None
     only: Sequence[str] = ()
     takes: Sequence[str] | str = ()
     skip: Collection[str] = ()
@@ -113,6 +140,13 @@ class ReadOptions:
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
+        if self.axes is not None:
+            parse_order(self.axes)
+
+    @property
+    def order(self) -> Order | None:
+        """The axes as motion/positions.py has them; None where they are not given."""
+        return None if self.axes is None else parse_order(self.axes)
 
 
 @dataclass(frozen=True)
@@ -135,6 +169,10 @@ class Format:
         Whether a file can be written with several clips of one plant.
     keeps : tuple of str, optional
         What its files can say of objects besides: "presence", "doubleSided", "subdivisionScheme".
+    magic_places : tuple of int, optional
+        Where in its files `magic` may stand.
+    has_series : bool, optional
+        Whether the times of its files may be in an index with the suffix .series behind theirs.
     module : str, optional
         The module with its `read_clip` or `write_clip`, if another package adds it.
     package : str
@@ -149,8 +187,18 @@ class Format:
     magic: tuple[bytes, ...] = ()
     holds_several: bool = False
     keeps: tuple[str, ...] = ()
+    has_series: bool = False
+    magic_places: tuple[int, ...] = (0,)
     module: str = ""
     package: str = ""
+
+    def begins(self, head: bytes) -> bool:
+        """Whether the first bytes of a file are those of this format."""
+        return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
+
+    def ends(self, name: str) -> bool:
+        """Whether the suffix of a file's name, in lower case, is one of this format's."""
+        return Path(name.removesuffix(SERIES) if self.has_series else name).suffix in self.suffixes
 
     @property
     def is_installed(self) -> bool:
@@ -189,8 +237,16 @@ class Format:
 
 
 FORMATS = (
-    Format("hdf5", "HDF5 of athcodec's schema", (".h5", ".hdf5", ".hdf"), magic=(b"\x89HDF\r\n\x1a\n",)),
-    Format("npz", "NumPy archive of the same schema", (".npz",)),
+    Format(
+        "hdf5",
+        "HDF5 of athcodec's schema or of other programs, VTKHDF, MATLAB 7.3",
+        (".h5", ".hdf5", ".hdf", ".vtkhdf"),
+        magic=(b"\x89HDF\r\n\x1a\n",),
+        magic_places=(0, 512, 1024, 2048),
+    ),
+    Format("npz", "NumPy archive, of the same schema or of other programs", (".npz",)),
+    Format("npy", "NumPy array of positions", (".npy",), magic=(b"\x93NUMPY",)),
+    Format("mat", "MATLAB up to 7.2", (".mat",), "matlab", ("scipy",), (b"MATLAB 5.0 MAT-file",)),
     Format(
         "usd",
         "USD: meshes, curves and points, UsdSkel",
@@ -203,13 +259,9 @@ FORMATS = (
     Format("alembic", "Alembic: meshes, curves and points", (".abc",), "alembic", ("alembic3d",), (b"Ogawa",)),
     Format("pc2", "PC2 point cache; its mesh by --mesh", (".pc2",), magic=(b"POINTCACHE2\0",)),
     Format("mdd", "MDD point cache; its mesh by --mesh", (".mdd",)),
-    Format("sequence", "numbered OBJ or PLY files, named by any one of them", (".obj", ".ply")),
+    Format("sequence", "OBJ or PLY: numbered files, or their .series", _MESHES, has_series=True),
     Format("xdmf", "XDMF time series", (".xdmf", ".xmf")),
-    Format(
-        "vtk",
-        "VTU, VTP, VTK (with athcodec[mesh]) or PVD series, named by any one of its files",
-        (".vtu", ".vtp", ".vtk", ".pvd"),
-    ),
+    Format("vtk", "VTK: numbered files, or their .pvd or .series", (*_VTK, ".pvd"), has_series=True),
 )
 
 
@@ -249,8 +301,8 @@ def read(
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
-        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, only, takes, skip, root, allow_outside,
-        max_memory.
+        Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
+        allow_outside, max_memory.
 
     Returns
     -------
@@ -278,9 +330,27 @@ def read(
         clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
+        if clip.frame_count == 1 and not kind.has_series:
+            _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         return _in_axes(_in_units(clip, unit), up_axis)
+
+
+def _warn_of_frames(path: str | PathLike[str]) -> None:
+    """Warn of a file whose format has all frames in one file, where others beside it are numbered like frames."""
+    from athcodec.sources.numbering import numbered_files, some  # They import this module.
+
+    others: list[str] = []
+    with suppress(ClipError, OSError):
+        others = [file.name for file in numbered_files(path).paths if file != Path(path)]
+    if others:
+        warnings.warn(
+            f"{os.fspath(path)}: read as one frame, without {some(others)}: numbered files of this format are not read "
+            "as one motion; write all frames into one file, or numbered OBJ, PLY or VTK files",
+            GuessWarning,
+            stacklevel=3,
+        )
 
 
 def listed(not_read: Mapping[str, Sequence[str]]) -> str:
@@ -314,22 +384,24 @@ def format_named(name: str, formats: Iterable[Format]) -> Format:
 
 def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    suffix, candidates = Path(path).suffix.lower(), iter(formats)
+    name, candidates = Path(path).name.lower(), iter(formats)
     known: list[str] = []
     for candidate in candidates:
-        if suffix in candidate.suffixes:
-            _warn_of_others(path, suffix, candidate, candidates)
+        if candidate.ends(name):
+            _warn_of_others(path, candidate, candidates)
             return candidate
         known += candidate.suffixes
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {' '.join(known)}")
+    hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {' '.join(known)}{hint}")
 
 
-def _warn_of_others(path: str | PathLike[str], suffix: str, chosen: Format, others: Iterable[Format]) -> None:
+def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
     """Warn if the suffix of a format of another package is that of further ones, too."""
-    if chosen.package and (same := [other for other in others if suffix in other.suffixes]):
+    name = Path(path).name.lower()
+    if chosen.package and (same := [other for other in others if other.ends(name)]):
         names = " and ".join(f"{other.name} of {other.package}" for other in same)
         warnings.warn(
-            f"{os.fspath(path)}: {suffix} is taken for {chosen.name} of {chosen.package}, not for {names}; "
+            f"{os.fspath(path)}: {Path(name).suffix} is taken for {chosen.name} of {chosen.package}, not for {names}; "
             "--source-format or --format (format=) names another",
             GuessWarning,
             stacklevel=4,
@@ -342,6 +414,11 @@ def find_format(path: str | PathLike[str]) -> Format:
         head = b"#"
     else:
         if os.path.isdir(path):
+            if any(os.path.exists(os.path.join(path, name)) for name in ("zarr.json", ".zarray", ".zgroup")):
+                raise ClipError(
+                    f"{os.fspath(path)}: is a zarr store, expected a file; in Python, athcodec.encode takes one of its "
+                    "arrays"
+                )
             raise ClipError(
                 f"{os.fspath(path)}: is a folder, expected a file: any one of numbered files stands for all, and "
                 "`athcodec batch` encodes many clips"
@@ -364,7 +441,7 @@ def find_format(path: str | PathLike[str]) -> Format:
 
 
 def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
-    return next((candidate for candidate in formats if head.startswith(candidate.magic or ())), None)
+    return next((candidate for candidate in formats if candidate.begins(head)), None)
 
 
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:

@@ -81,6 +81,14 @@ _SIDES = {
 }
 
 
+@dataclass(frozen=True)
+class Part:
+    """A run of the points of a mesh: an object, or "" for one without a name."""
+
+    name: str
+    point_count: int
+
+
 @dataclass
 class Block:
     """Cells of one type: nodes (n, k), and for polygons, polylines and strips counts (n,) with nodes (sum,) behind one
@@ -106,15 +114,22 @@ class Topology:
     cell_rows: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     faces_are_cells: bool = True
 
-    def add_cell_data(self, name: str, values: np.ndarray) -> None:
-        """Keep data per cell, under its name, where the cells are edges, faces or volumes only; else one by one."""
+    def add_cell_data(self, name: str, values: np.ndarray) -> bool:
+        """Keep data per cell, under its name, where the cells are edges, faces or volumes only; else one by one.
+
+        Returns whether all of it is kept: cells that are none of these have no place, nor has a name that is taken.
+        """
         kinds = [("edge", self.edge_rows), ("face", self.face_rows), ("cell", self.cell_rows)]
         kinds = [(domain, rows) for domain, rows in kinds if len(rows)]
+        is_kept = len(np.unique(np.concatenate([np.zeros(0, np.int64), *(rows for _, rows in kinds)]))) == len(values)
         for domain, rows in kinds:
             key = name if len(kinds) == 1 and name not in self.attributes else f"{domain}_{name}"
-            if key not in self.attributes:
+            if key in self.attributes:
+                is_kept = False
+            else:
                 self.attributes[key] = values[rows]
                 self.domains[key] = domain if domain != "face" or self.faces_are_cells else "constant"
+        return is_kept
 
 
 def base_kind(kind: str) -> str:
@@ -130,7 +145,8 @@ def blocks_of(
     for number in np.unique(types):
         name = names.get(int(number))
         if name is None:
-            raise ClipError(f"cells: got the type {number}, expected one of {', '.join(sorted(set(names.values())))}")
+            known = ", ".join(sorted(set(names.values())))
+            raise ClipError(f"cells: got the type {number}, expected one of {known}; save the mesh with these alone")
         rows = np.flatnonzero(types == number)
         counts = (stops - starts)[rows]
         if name in NODES:

@@ -15,10 +15,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
-from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.clip import RESERVED_NAMES, MotionClip, polygons
 from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
-from athcodec.sources.cells import Topology
+from athcodec.sources.cells import Part, Topology
 from athcodec.sources.mesh import kind_of
 from athcodec.sources.scene_objects import scene_said
 
@@ -63,9 +63,12 @@ def clip_of_steps(
     static: dict[str, np.ndarray],
     resource: Any = None,
     unchanged: Any = None,
+    parts: Sequence[Part] = (),
+    not_read: Mapping[str, list[str]] | None = None,
 ) -> MotionClip:
-    """The clip of a result at (T,) times. static: data per point that do not change. Raises ClipError where nothing
-    moves, or it is not clear what does."""
+    """The clip of a result at (T,) times. static: data per point that do not change. parts: the objects that the points
+    are, one after the other, "" for one without a name. Raises ClipError where nothing moves, or it is not clear what
+    does."""
     first = _padded(steps.points(0))
     fixed = steps.fixed_points()
     moved_by = _displacement(steps, fixed, len(time), options)
@@ -99,21 +102,24 @@ def clip_of_steps(
             return np.stack([frame(step).astype(dtype) for step in range(start, stop)])
 
     domains = dict(topology.domains)
-    attributes = topology.attributes | {
-        key: values for key, values in static.items() if key not in RESERVED_NAMES and key not in topology.attributes
-    }
+    names = {key: f"vertex_{key}" if key in topology.attributes else key for key in static}
+    names = {key: new for key, new in names.items() if new not in RESERVED_NAMES and new not in topology.attributes}
+    attributes = topology.attributes | {new: static[key] for key, new in names.items()}
     attributes = {key: values for key, values in attributes.items() if key not in options.skip}
     metadata, numbers = scene_said(metadata, count)
-    attributes |= {"part_vertex_counts": np.array([count], np.int32)} | numbers
+    parts = parts or (Part("", count),)
+    attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
     domains |= dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
-    polygons = topology.faces if topology.faces is not None else topology.attributes.get("face_vertex_counts")
     said = {
-        "part_names": [name],
-        "part_kinds": [kind_of(polygons, topology.edges)],
+        "part_names": [part.name or name for part in parts],
+        "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
         "domains": {key: domain for key, domain in domains.items() if key in attributes},
     }
-    kept = {*attributes, *options.skip, moved_by}
-    moving = list(dict.fromkeys(key for key in (*steps.fields(), *steps.left_out) if key not in kept))
+    kept = {*names, *options.skip, moved_by}
+    moving = [key for key in steps.fields() if key not in kept] + [
+        key for key in steps.left_out if key not in options.skip
+    ]
+    moving = list(dict.fromkeys(moving))
     rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
     return MotionClip(
         Frames(read, len(time), count, dtype),
@@ -126,8 +132,20 @@ def clip_of_steps(
         metadata=said | metadata,
         resource=resource,
         unchanged=unchanged,
-        not_read={"field": moving} if moving else {},
+        not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
     )
+
+
+def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None) -> list[str]:
+    """The kind of each part."""
+    if len(parts) == 1:
+        return [kind_of(faces, edges)]
+    stops = np.cumsum([part.point_count for part in parts])
+    owners = [
+        set() if corners is None else set(np.unique(np.searchsorted(stops, corners, side="right")).tolist())
+        for corners in (None if faces is None else faces[1], edges)
+    ]
+    return [kind_of(*(True if part in owner else None for owner in owners)) for part in range(len(parts))]
 
 
 def _padded(points: np.ndarray) -> np.ndarray:
@@ -157,7 +175,11 @@ def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptio
     if len(found) > 1:
         raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
     if not found and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
-        advice = "name one of them with --field" if names else "write the displacement with one value per point"
+        vectors = [name for name in names if _is_vector(steps.field(0, name))]
+        if vectors:
+            advice = f"name one of {'them' if len(vectors) == len(names) else _listed(vectors)} with --field"
+        else:
+            advice = f"write the displacement with {'two or three numbers' if names else 'one value'} per point"
         raise ClipError(f"field: got points that do not move and no displacement, only {listed}; {advice}")
     return found[0] if found else None
 

@@ -1,8 +1,8 @@
-"""Reads the HDF5 schema of athcodec into a MotionClip; the positions stay in the file and are read in blocks.
+"""Reads HDF5: athcodec's schema, arrays of other programs, MATLAB 7.3; VTKHDF is handed to vtkhdf.py.
 
 | dataset       | shape, dtype               | where it is missing                                   |
 |---------------|----------------------------|-------------------------------------------------------|
-| positions     | (T, N, 3) float32 or 64    | ClipError                                             |
+| positions     | (T, N, 3) float32 or 64    | another dataset, see schema.py, or ClipError          |
 | time          | (T,) seconds               | from the attribute fps, else 30 frames per second     |
 | rest          | (N, 3) float32 or 64       | the first frame or the mean pose                      |
 | vertex_branch | (N,) integers              | both derived from edges; none without edges           |
@@ -11,20 +11,26 @@
 | branch_order  | (B,) integers              | not needed; kept only where it is not the depth       |
 | edges, faces  | (E, 2), (F, k) integers    | none                                                  |
 
-Every other dataset, also one inside a group, is a named static array and survives unchanged (strings of
-variable length become UTF-8 of fixed length). Attributes of the file become metadata, but for clip_name and loop
-(true), which say the name of the clip and that it is a loop; attributes of datasets and groups are not read, links are
-not followed. Where a file could make the HDF5 library take more memory than options.max_memory, by filters that unpack
-to more than they should or by text that many elements share, it is read in a process of its own.
+The positions stay in the file and are read in blocks. Every other dataset, also one inside a group, is a named static
+array and survives unchanged (strings of variable length become UTF-8 of fixed length). Attributes of the file become
+metadata, but for clip_name and loop (true), which say the name of the clip and that it is a loop. Attributes of
+datasets are read where they state units, rates or dimensions; the clip's `not_read` names the others, datasets without
+numbers, and links that lead nowhere or to groups of other files. Where a file could make the HDF5 library take more
+memory than options.max_memory, by filters that unpack to more than they should or by text that many elements share, it
+is read in a process of its own.
+
+MATLAB 7.3 is HDF5 whose datasets have the attribute MATLAB_class and their dimensions reversed: shapes and --axes are
+those that MATLAB shows. Vertices are counted from 1 there.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from os import fspath
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -33,13 +39,14 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
-from athcodec.motion.clip import RESERVED_NAMES, MotionClip
+from athcodec.motion.clip import MotionClip
 from athcodec.motion.frames import KEPT_BYTES
+from athcodec.motion.positions import Order, ordered
 from athcodec.motion.presence import PRESENCE
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
-from athcodec.sources.schema import clip_of_arrays
+from athcodec.sources.schema import POSITIONS, Stored, clip_of_arrays
 
 CHUNK_CACHE_BYTES = 16 << 20
 CACHE_SLOTS = 8191  # Chunks that the cache of a small dataset has places for.
@@ -52,6 +59,12 @@ GROWTH = {
 """How many bytes a filter makes of one at most; DEFLATE unpacks all that there is, whatever size a chunk has."""
 MOST_GROWTH = 1 << 20  # Largest growth that is expected of an unknown filter.
 BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, UnicodeError, MemoryError)
+MATLAB_SPARSE, SPARSE = "MATLAB_sparse", "sparse matrix"
+VTKHDF = "VTKHDF"  # Name of VTK's group.
+MATLAB_CLASS, MATLAB_EMPTY, MATLAB_OWN = "MATLAB_class", "MATLAB_empty", ("#refs#", "#subsystem#")
+BOOKKEEPING = {"CLASS", "NAME", "DIMENSION_LIST", "DIMENSION_LABELS", "REFERENCE_LIST", "_FillValue", "H5PATH"}
+BOOKKEEPING_OF = ("MATLAB_", "_Netcdf4", "_NC")  # Beginnings of names of attributes by which libraries find their way.
+ONLY_A_DIMENSION = "This is a netCDF dimension"  # Name of a dataset of zeros that stands for the length of an axis.
 _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True) reads others"
 
 
@@ -69,7 +82,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
             for name in _names(file):
                 check_own(file, name, False)
         if not may_explode(file, options.max_memory):
-            return _read(file, options)
+            return _read(file, path, options)
     _Reading(file).close()
     return read_apart(path, options, "athcodec.sources.hdf5", "HDF5: it is damaged, or the HDF5 library")
 
@@ -89,7 +102,7 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
     """The clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
     file = _open(path)
     with closing_on_failure(_Reading(file)):
-        clip = _read(file, options)
+        clip = _read(file, path, options)
     clip.unchanged = FileWatch(path)
     return clip
 
@@ -104,30 +117,153 @@ def _open(path: FilePath) -> h5py.File:
         raise ClipError(f"{fspath(path)}: the HDF5 file cannot be opened: {error}") from error
 
 
-def _read(file: h5py.File, options: ReadOptions) -> MotionClip:
-    budget = Budget(options.max_memory)
+def _read(file: h5py.File, path: FilePath, options: ReadOptions) -> MotionClip:
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
-    positions = _unpacked_once(file, "positions", budget)
-    if positions is None and "ABC" in file:
+    watched = {"resource": _Reading(file), "unchanged": unchanged}
+    if VTKHDF in file and options.dataset is None:
+        from athcodec.sources.vtkhdf import clip_of_vtkhdf  # It is rare, and imports readers of cells.
+
+        return clip_of_vtkhdf(file, path, options, **watched)
+    if "ABC" in file and POSITIONS not in file:
         raise ClipError("archive: got Alembic in HDF5, expected Alembic in Ogawa; abcconvert -toOgawa makes it")
-    if positions is None:
-        raise ClipError("positions: got no such dataset, expected (frames, vertices, 3)")
-    frame = positions.nbytes // max(positions.shape[0], 1) if positions.shape else 0
-    budget.need(4 * frame + chunk_bytes(positions), "positions: a frame")  # read, converted, checked, and the rest pose
-    metadata = {name: _to_python(value) for name, value in file.attrs.items()}
-    for name in ("domains", THRESHOLDS, PRESENCE, "part_usd"):
-        if isinstance(metadata.get(name), str):
-            metadata[name] = _parsed(name, metadata[name])
-    attributes = _static_arrays(file, options.skip, budget)
-    return clip_of_arrays(
-        positions,
-        lambda name: _array(file, name, budget),
-        attributes,
-        metadata,
-        options,
-        resource=_Reading(file),
-        unchanged=unchanged,
-    )
+    arrays = _Datasets(file, Budget(options.max_memory))
+    try:
+        return clip_of_arrays(arrays, path, options, **watched)
+    except ClipError as error:
+        index = _index_of(Path(path)) if POSITIONS not in file and options.dataset is None else None
+        if index is None:
+            raise
+        raise ClipError(f"{error}; {index.name} beside it lists what is in it: encode that") from None
+
+
+def _index_of(path: Path) -> Path | None:
+    """Return the XDMF file of the same name, whose numbers an HDF5 file has."""
+    names = [path.with_suffix(suffix) for suffix in (".xdmf", ".xmf", "")]
+    return next((name for name in names if name.suffix in (".xdmf", ".xmf") and name.is_file()), None)
+
+
+class _Datasets:
+    """See schema.Arrays."""
+
+    def __init__(self, file: h5py.File, budget: Budget):
+        self._file, self._budget = file, budget
+        self.stored: dict[str, Stored] = {}
+        self.not_read: dict[str, list[str]] = {}
+        self.counts_from_1 = False
+        self.metadata = _notes(file)
+        for name in ("domains", THRESHOLDS, PRESENCE, "part_usd"):
+            if isinstance(self.metadata.get(name), str):
+                self.metadata[name] = _parsed(name, self.metadata[name])
+        seen: set[Any] = set()
+        for name in sorted((name.lstrip("/") for name in _names(file)), key=lambda name: name.split("/")):
+            self._add(name, seen)
+
+    def _add(self, name: str, seen: set[Any]) -> None:
+        """Take the dataset of a name into `stored`, or name what it is in place of one."""
+        link, item = self._file.get(name, getlink=True), self._file.get(name)
+        if item is None:
+            self._leave_out("link", name)
+            return
+        if isinstance(link, h5py.SoftLink) and name != POSITIONS:
+            return  # What a link within the file names is read where it is.
+        if not isinstance(item, h5py.Dataset):
+            if isinstance(link, h5py.ExternalLink):
+                self._leave_out("link", name)
+            return
+        info = h5py.h5o.get_info(item.id)
+        if self._is_sparse(name.rpartition("/")[0]):
+            return
+        is_known = (info.fileno, info.addr) in seen and name != POSITIONS
+        seen.add((info.fileno, info.addr))
+        if is_known or name.startswith(MATLAB_OWN) or _is_only_a_dimension(item):
+            return
+        if item.shape is None or MATLAB_EMPTY in item.attrs:
+            if name == POSITIONS:
+                raise ClipError(f"{name}: got an empty dataset, expected an array")
+            self._leave_out("empty dataset", name)
+        elif item.dtype.hasobject and h5py.check_string_dtype(item.dtype) is None:
+            self._leave_out("dataset of references or lists", name)
+        else:
+            self.stored[name] = _stored(name, item)
+            self.counts_from_1 = self.counts_from_1 or _is_matlab(item)
+
+    def _is_sparse(self, group: str) -> bool:
+        """Whether a group is a sparse matrix of MATLAB, which is named then."""
+        if not group or MATLAB_SPARSE not in self._file[group].attrs:
+            return False
+        if group not in self.not_read.get(SPARSE, ()):
+            self._leave_out(SPARSE, group)
+        return True
+
+    def _leave_out(self, kind: str, name: str) -> None:
+        self.not_read.setdefault(kind, []).append(name)
+
+    def read(self, name: str) -> np.ndarray:
+        dataset = self._file[name]
+        values = _load(name, dataset, self._budget)
+        if not _is_matlab(dataset):
+            return values
+        kind = _matlab_class(dataset)
+        if kind == "char":
+            rows = ["".join(map(chr, row)).encode("utf-8", "replace") for row in values.T.tolist()]
+            return np.array(rows).reshape(self.stored[name].shape)
+        return values.T.astype(bool) if kind == "logical" else values.T
+
+    def positions(self, name: str, order: Order) -> Any:
+        dataset = _unpacked_once(self._file, name, self._budget)
+        order = order[::-1] if _is_matlab(dataset) else order
+        positions = ordered(dataset, order)
+        frame = 3 * positions.shape[1] * dataset.dtype.itemsize
+        # A frame is read, converted, checked, and becomes the rest pose.
+        self._budget.need(4 * frame + chunk_bytes(dataset), f"{name}: a frame")
+        return positions
+
+    def notes(self, name: str) -> Mapping[str, Any]:
+        return _notes(self._file[name], False)
+
+    def labels(self, name: str) -> Sequence[str]:
+        return [
+            dimension.label or next((scale.name for scale in dimension.values() if scale.name), "")
+            for dimension in self._file[name].dims
+        ]
+
+
+def _notes(item: Any, of_file: bool = True) -> dict[str, Any]:
+    """Return the attributes of a file, group or dataset; of the latter two without those by which libraries find their
+    way."""
+    if of_file:
+        return {name: _to_python(item.attrs[name]) for name in item.attrs}
+    notes: dict[str, Any] = {}
+    for name in item.attrs:
+        if name not in BOOKKEEPING and not name.startswith(BOOKKEEPING_OF):
+            notes[name] = None
+            with suppress(*BROKEN):  # Some types have no equivalent in NumPy; the name is known all the same.
+                notes[name] = _to_python(item.attrs[name])
+    return notes
+
+
+def _is_matlab(dataset: h5py.Dataset) -> bool:
+    return MATLAB_CLASS in dataset.attrs
+
+
+def _matlab_class(dataset: h5py.Dataset) -> str:
+    """Return what MATLAB calls the type of a dataset: "char" for rows of text in uint16."""
+    kind = str(_to_python(dataset.attrs[MATLAB_CLASS]))
+    return kind if kind != "char" or (dataset.dtype.kind == "u" and dataset.ndim == 2) else ""
+
+
+def _stored(name: str, dataset: h5py.Dataset) -> Stored:
+    if not _is_matlab(dataset):
+        return Stored(name, dataset.shape, dataset.dtype)
+    shape = dataset.shape[::-1]
+    if _matlab_class(dataset) == "char":
+        return Stored(name, shape[:1] if shape[0] != 1 else (), np.dtype(f"S{max(shape[1], 1)}"))
+    return Stored(name, shape, dataset.dtype)
+
+
+def _is_only_a_dimension(dataset: h5py.Dataset) -> bool:
+    """Whether netCDF made a dataset only to state the length of an axis."""
+    return str(_to_python(dataset.attrs.get("NAME", ""))).startswith(ONLY_A_DIMENSION)
 
 
 def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
@@ -163,19 +299,10 @@ def _names(file: h5py.File) -> list[str]:
     return names
 
 
-def _dataset(file: h5py.File, name: str) -> h5py.Dataset | None:
-    if name not in file:
-        return None
-    dataset = file[name]
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
-        raise ClipError(f"{name}: got a group or an empty dataset, expected an array")
-    return dataset
-
-
-def _unpacked_once(file: h5py.File, name: str, budget: Budget) -> h5py.Dataset | None:
+def _unpacked_once(file: h5py.File, name: str, budget: Budget) -> h5py.Dataset:
     """Return a dataset that is read several times: with room for all its chunks if it is small."""
-    dataset, size = _dataset(file, name), 0
-    if dataset is not None and dataset.chunks:
+    dataset, size = file[name], 0
+    if dataset.chunks:
         size = dataset.id.get_num_chunks() * chunk_bytes(dataset)
     if not CHUNK_CACHE_BYTES < size <= min(KEPT_BYTES, budget.left):
         return dataset
@@ -194,16 +321,24 @@ def may_explode(file: h5py.File, limit: int) -> bool:
     """Whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit` bytes
     whatever shape they have."""
     size = os.fstat(file.id.get_vfd_handle()).st_size
-    texts = 0
-    for name in file.attrs:
-        attribute = file.attrs.get_id(name)
-        if attribute.dtype.hasobject:
-            texts += max(int(np.prod(attribute.shape, dtype=object)), 1) * size
-    if texts > max(limit, size):
-        return True
-    found: list[bool] = []
-    file.visititems(lambda _, item: found.append(isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)))
+    found: list[bool] = [_texts_are_more(file, size, limit)]
+
+    def visit(_: str, item: Any) -> None:
+        is_more = isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)
+        found.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
+
+    file.visititems(visit)
     return any(found)
+
+
+def _texts_are_more(item: Any, size: int, limit: int) -> bool:
+    """Whether attributes may hold more than `limit` bytes of text, each as long as the file of `size` bytes."""
+    texts = 0
+    for name in item.attrs:
+        attribute = item.attrs.get_id(name)
+        if attribute.dtype.hasobject:
+            texts += max(int(np.prod(attribute.shape or (), dtype=object)), 1) * size
+    return texts > max(limit, size)
 
 
 def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
@@ -228,15 +363,7 @@ def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
     return largest * growth > limit
 
 
-def _array(file: h5py.File, name: str, budget: Budget) -> np.ndarray | None:
-    dataset = _dataset(file, name)
-    return None if dataset is None else _load(name, dataset, budget)
-
-
 def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
-    is_text = h5py.check_string_dtype(dataset.dtype) is not None
-    if dataset.dtype.hasobject and not is_text:
-        raise ClipError(f"{name}: got {str(dataset.dtype)[:80]}, expected numbers or text; or skip it")
     budget.take(dataset.nbytes, name)
     budget.need(chunk_bytes(dataset), name)
     try:
@@ -248,19 +375,6 @@ def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
         return values.astype(np.bytes_)
     except (OSError, RuntimeError, UnicodeError, TypeError) as error:
         raise ClipError(f"{name}: the dataset cannot be read: {error}") from error
-
-
-def _static_arrays(file: h5py.File, skip: Collection[str], budget: Budget) -> dict[str, np.ndarray]:
-    arrays = {}
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and name not in RESERVED_NAMES and name not in skip:
-            if item.shape is None:
-                raise ClipError(f"{name}: got an empty dataset, expected an array; or skip it")
-            arrays[name] = _load(name, item, budget)
-
-    file.visititems(visit)
-    return arrays
 
 
 def _parsed(name: str, text: str) -> Any:

@@ -3,8 +3,8 @@
 OBJ: v (with colours where there are six or seven numbers), vt, f, l, o, g and usemtl; polygons of any size, relative
 indices, lines continued by a backslash. PLY: ascii and binary of both byte orders; vertices with any scalar properties,
 faces with texture coordinates per corner, edges, and what our writer says in a comment. Not read: normals (they belong
-to one pose), materials' contents, curves and surfaces of OBJ, triangle strips of PLY; the clip's `not_read` names such
-statements and elements. A file is read whole, and nothing in it is trusted.
+to one pose), materials' contents, curves and surfaces of OBJ, triangle strips of PLY; the clip's `not_read` names these
+and whatever else a file holds. A file is read whole, and nothing in it is trusted.
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
 STRUCTURE = {"part_vertex_counts", "part_copies", "face_vertex_counts", "face_vertex_indices"}
 NAMED = {FACE_MATERIAL: "material_names", "face_group": "group_names"}  # Arrays whose numbers stand for names.
-FREE_FORM = ("curv", "curv2", "surf")
+# Statements of OBJ that are shapes of a kind that is not read, the last of them of older versions.
+FREE_FORM = ("curv", "curv2", "surf", "bsp", "bzp", "cdc", "cdp")
+INCLUDED = "call"  # The statement of OBJ that has another file read in its place.
+COMMENT_BYTES = 4096  # Where comments are looked for that concern the whole file.
+POLYPAINT = b"#MRGB"  # Colours of vertices, which ZBrush writes as comments.
 HEADER_BYTES = 1 << 24  # names of objects and materials included
 PLY_TYPES = {
     "char": "i1",
@@ -186,7 +190,7 @@ class _Obj:
             return
         if words[0] in _OBJ_WORDS:
             getattr(self, f"_{words[0].decode('ascii')}")(words[1:])
-        elif words[0].isalpha():
+        elif not words[0].startswith(b"#") or words[0] == POLYPAINT:
             self.not_read[words[0][:STATEMENT_BYTES]] = None
 
     def _v(self, words: Sequence[bytes]) -> None:
@@ -206,6 +210,8 @@ class _Obj:
         self.face_labels.append((self.objects.now, self.groups.now, self.materials.now))
 
     def _l(self, words: Sequence[bytes]) -> None:
+        if any(b"/" in word for word in words):
+            self.not_read[b"vt of l"] = None
         vertices = self._p(words)
         self.edges += zip(vertices, vertices[1:])
 
@@ -260,11 +266,14 @@ def parse_obj(data: bytes) -> Mesh:
         mesh.edges = _checked("lines", np.array(file.edges, np.int64).reshape(-1), count).reshape(-1, 2)
     if colors is not None:
         mesh.attributes["colors"] = colors
-    for word in map(_text, ([word] for word in file.not_read)):
-        mesh.not_read.setdefault("curve or surface" if word in FREE_FORM else "statement", []).append(word)
     _add_face_rows(mesh)
     _add_obj_uv(mesh, file)
     _add_obj_names(mesh, file)
+    if colors is None and any(len(row) > 3 and (len(row) != 4 or float(row[3]) != 1) for row in file.points):
+        mesh.not_read["attribute"] = ["numbers behind the coordinates of v"]  # Weights, or colours that some lack.
+    for word in map(_text, ([word] for word in file.not_read)):
+        kind = "curve or surface" if word in FREE_FORM else "included file" if word == INCLUDED else "statement"
+        mesh.not_read.setdefault(kind, []).append(word)
     return mesh
 
 
@@ -305,9 +314,12 @@ def _add_face_rows(mesh: Mesh) -> None:
 def _add_obj_uv(mesh: Mesh, file: _Obj) -> None:
     which = np.array(file.corner_uvs, np.int64)
     if not file.uvs or not (which >= 0).any():
+        file.not_read |= {b"vt": None} if file.uvs else {}
         return
     _checked("texture coordinates", which[which >= 0], len(file.uvs))
     table = np.array([[float(word) for word in (*row[:2], b"0", b"0")[:2]] for row in file.uvs], np.float32)
+    if any(len(row) > 2 and float(row[2]) != 0 for row in file.uvs):
+        file.not_read[b"w of vt"] = None
     uv = table[which]
     uv[which < 0] = 0
     mesh.attributes["uv"] = uv
@@ -319,8 +331,13 @@ def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
     column, names = (0, file.objects) if file.objects.names else (1, file.groups)
     if names.names:
         _add_parts(mesh, _vertex_labels(mesh, file, labels[:, column], column), names.names)
-    if len(file.groups.names) > 1 and (column == 0 or "part_names" not in mesh.metadata):
+    are_parts = len(mesh.metadata.get("part_names", ())) == len(names.names)
+    if column == 0 and not are_parts:
+        file.not_read[b"o"] = None  # Objects whose vertices do not lie together, or that have none of their own.
+    if len(file.groups.names) > 1 and (column == 0 or not are_parts):
         _add_face_names(mesh, "face_group", labels[:, 1], "group_names", file.groups.names)
+    elif file.groups.names and not (column == 1 and are_parts):
+        file.not_read[b"g"] = None
     if file.materials.names:
         _add_face_names(mesh, "face_material", labels[:, 2], "material_names", file.materials.names)
 
@@ -364,6 +381,15 @@ def _add_face_names(mesh: Mesh, name: str, labels: np.ndarray, names_key: str, n
     mesh.attributes[name] = labels.astype(np.int32)
     mesh.metadata["domains"][name] = "face"
     mesh.metadata[names_key] = list(names)
+
+
+def comments(data: bytes) -> list[str]:
+    """The comments at the beginning of an OBJ or PLY file, but for that of our writer."""
+    head, is_ply = data[:COMMENT_BYTES], data.startswith((b"ply\n", b"ply\r"))
+    marks = (b"comment", b"obj_info") if is_ply else (b"#",)
+    lines = (line.strip() for line in (head.partition(b"end_header")[0] if is_ply else head).splitlines())
+    found = [line[len(mark) :].decode("latin-1").strip() for line in lines for mark in marks if line.startswith(mark)]
+    return [line for line in found if not line.startswith(OWN)]
 
 
 # ---- PLY ----
@@ -569,8 +595,11 @@ def parse_ply(data: bytes) -> Mesh:
     _add_ply_materials(mesh, header.said.get(FACE_MATERIAL))
     edges = values.get("edge", {})
     if {"vertex1", "vertex2"} <= edges.keys():
-        ends = np.stack([edges["vertex1"], edges["vertex2"]], axis=1).astype(np.int64)
+        ends = np.stack([edges.pop("vertex1"), edges.pop("vertex2")], axis=1).astype(np.int64)
         mesh.edges = _checked("edges", ends.reshape(-1), len(mesh.points)).reshape(-1, 2)
+    _leave_out(mesh, *(f"edge_{name}" for name in edges))
+    if any(comment.startswith(_TEXTURE) for comment in comments(data)):
+        mesh.not_read.setdefault("statement", []).append(_TEXTURE)
     others = [element.name for element in header.elements if element.name not in PLY_ELEMENTS and element.count]
     for name in others:
         mesh.not_read.setdefault(STRIPS if name == STRIPS else "element", []).append(name)
@@ -592,11 +621,14 @@ def ply_points(vertices: Any) -> np.ndarray:
 
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 POSITION_COLUMNS = ("x", "y", "z", "nx", "ny", "nz")  # Position and normal, which belong to one pose.
+_TEXTURE = "TextureFile"  # The comment in which MeshLab and others name the picture of a mesh.
 _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
     taken = set(POSITION_COLUMNS)
+    if not {"nx", "ny", "nz"}.isdisjoint(vertices):
+        _leave_out(mesh, "normals")
     colors = [name for name in _PLY_COLORS if name in vertices]
     if set(_PLY_COLORS[:3]) <= set(colors):
         mesh.attributes["colors"] = _native(np.stack([vertices[name] for name in colors], axis=1))
@@ -612,7 +644,7 @@ def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
 
 def _add_attribute(mesh: Mesh, name: str, values: Any, prefix: str = "vertex_") -> None:
     if isinstance(values, tuple):
-        mesh.not_read.setdefault("attribute", []).append(f"{prefix}{name} (lists)")
+        _leave_out(mesh, f"{prefix}{name} (lists)")
         return
     if name in RESERVED_NAMES or name in mesh.attributes:
         name = "branch_id" if name == "vertex_branch" else prefix + name
@@ -620,6 +652,13 @@ def _add_attribute(mesh: Mesh, name: str, values: Any, prefix: str = "vertex_") 
         mesh.attributes[name] = _native(values)
         if prefix == "face_":
             mesh.metadata["domains"][name] = "face"
+    else:
+        _leave_out(mesh, name)
+
+
+def _leave_out(mesh: Mesh, *names: str) -> None:
+    if names:
+        mesh.not_read.setdefault("attribute", []).extend(names)
 
 
 def _native(values: np.ndarray) -> np.ndarray:
@@ -642,6 +681,8 @@ def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
 def _add_ply_faces(mesh: Mesh, face_values: dict[str, np.ndarray]) -> None:
     name = next((name for name in ("vertex_indices", "vertex_index") if name in face_values), None)
     if name is None or not isinstance(face_values[name], tuple):
+        if face_values:
+            mesh.not_read["faces whose corners have no known name"] = list(face_values)
         return
     counts, corners = face_values.pop(name)
     mesh.faces, attributes = with_polygons(counts, _checked("faces", corners.astype(np.int64), len(mesh.points)))

@@ -3,17 +3,19 @@
 A branch is a longest chain of `<`; `+` begins one. Where entities are decomposed (`/`) their finest parts count: those
 that have no parts themselves. Parts that the file does not connect follow one another in its order. Codes may be
 absolute, shifted to the right, begin with ^ or an alias, and use <<, ++, <.< and +.+; entities without a number are new
-ones, as OpenAlea reads them; repeated dates (`*`) are ignored. Features are kept as numbers where they are numbers. Not
-read: FORM-B, and what the header says of constraints.
+ones, as OpenAlea reads them. Features are kept as numbers where they are numbers. Not read: FORM-B, what the header
+says of constraints, and rows of later dates (`*`).
 
-A clip gets these branches by the coordinates XX, YY, ZZ, in the clip's own units and axes, or vertex by vertex where
-there are as many.
+A clip gets these branches by the coordinates XX, YY, ZZ (or X, Y, Z), in the clip's own units and axes, or vertex by
+vertex where there are as many. A SourceWarning names the features that have no place in a clip, and rows of later
+dates.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from os import fspath
@@ -21,14 +23,15 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, SourceWarning
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.motion.clip import MotionClip
 
 MAX_FILE_BYTES = 1 << 28
 MAX_ENTITIES = 1 << 22
 FARTHEST = 0.1  # Largest median distance of the clip's vertices from the plant of the MTG, over the clip's diagonal.
-COORDINATES = ("XX", "YY", "ZZ")
+COORDINATES = (("XX", "YY", "ZZ"), ("X", "Y", "Z"))  # Names, in upper case, of the features that are a position.
+ALIAS = "Alias"
 BLOCK_PAIRS = 1 << 20
 _SECTION = re.compile(r"\s*(CODE|CLASSES|DESCRIPTION|FEATURES|MTG)\s*:?\s*(\S*)")
 _BEGINNINGS = ("/", "<", "+", "^", "(")
@@ -46,6 +49,7 @@ class Mtg:
     base           (V, 3) where the part begins: the position of the part below, or what the file says of the entity
                    that it is the first part of; NaN where neither is known
     features       name: (V,) float64, NaN where there is no number
+    later_rows     how many rows there are of later dates, which are not read
     """
 
     labels: Sequence[str]
@@ -55,6 +59,7 @@ class Mtg:
     positions: np.ndarray
     base: np.ndarray
     features: dict[str, np.ndarray]
+    later_rows: int = 0
 
     @property
     def edges(self) -> np.ndarray:
@@ -83,6 +88,7 @@ def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarr
     ClipError where neither is so, or where the plant of the MTG lies elsewhere.
     """
     mtg = read_mtg(path)
+    _name_others(path, mtg)
     located = np.isfinite(mtg.positions).all(axis=1)
     if 2 * located.sum() >= len(located) or (located.any() and len(located) != clip.vertex_count):
         branch, along = _nearest(path, mtg, located, np.asarray(clip.rest, np.float64))
@@ -91,7 +97,8 @@ def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarr
     else:
         raise ClipError(
             f"{fspath(path)}: got {len(mtg.labels)} parts without coordinates, expected "
-            f"{clip.vertex_count} as vertices of the clip, or the features XX, YY and ZZ"
+            f"{clip.vertex_count} as vertices of the clip, or the features XX, YY and ZZ; it has "
+            f"{', '.join(mtg.features) or 'none'}"
         )
     branch, branch_parent = _without_empty(branch, mtg.branch_parent)
     order = np.lexsort((np.arange(len(branch)), along, branch))
@@ -99,6 +106,17 @@ def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarr
     stem_index = np.empty(len(branch), np.int32)
     stem_index[order] = np.arange(len(order)) - np.searchsorted(labels, labels)
     return branch, branch_parent, stem_index
+
+
+def _name_others(path: FilePath, mtg: Mtg) -> None:
+    """Warn of what the file says and no branch has."""
+    features = [name for name in mtg.features if name not in (*_coordinates(list(mtg.features)), ALIAS)]
+    others = [f"features {', '.join(features)}"] if features else []
+    others += [f"{mtg.later_rows} row{'s' * (mtg.later_rows != 1)} of later dates (*)"] if mtg.later_rows else []
+    if others:
+        warnings.warn(
+            f"{fspath(path)}: read for its branches alone; not read: {'; '.join(others)}", SourceWarning, stacklevel=3
+        )
 
 
 # ---- the text ----
@@ -127,6 +145,7 @@ class _Plants:
         self._latest: list[int] = []  # by column
         self._topology_columns = 0
         self._line = 0
+        self.later_rows = 0
         text = re.sub(r"\(#.*?#\)", _only_breaks, text, flags=re.DOTALL)
         lines = [line.partition("#")[0] for line in text.splitlines()]
         rows = self._header(lines)
@@ -183,6 +202,7 @@ class _Plants:
         cells = [cell.strip() for cell in cells]
         column = next((place for place, cell in enumerate(cells[: self._topology_columns]) if cell), None)
         if column is None or cells[column] == "*":
+            self.later_rows += column is not None
             return
         features = {
             self.names[place]: cells[place]
@@ -196,8 +216,8 @@ class _Plants:
         made = self._code(code, column)
         for entity in made:
             self.entities[entity].features |= features
-        if "Alias" in features:
-            self._aliases[features["Alias"]] = self._latest[column]
+        if ALIAS in features:
+            self._aliases[features[ALIAS]] = self._latest[column]
 
     def _code(self, code: str, column: int) -> list[int]:
         """The entities that the features of the row are about."""
@@ -324,16 +344,18 @@ def _parts(plants: _Plants) -> Mtg:
         for name in plants.names[1:]
         if name
     }
-    positions = np.array([_position(entities[leaf]) for leaf in leaves])
+    coordinates = _coordinates(plants.names)
+    positions = np.array([_position(entities[leaf], coordinates) for leaf in leaves])
     base = positions[parent]
     base[parent < 0] = np.nan
     for row in order:
         if parent[row] >= 0 and not np.isfinite(base[row]).all():
             base[row] = base[parent[row]]
-        stated = _stated_base(entities, leaves[row])
+        stated = _stated_base(entities, leaves[row], coordinates)
         if stated is not None:
             base[row] = stated
-    return Mtg([entities[leaf].label for leaf in leaves], parent, branch, branch_parent, positions, base, features)
+    labels = [entities[leaf].label for leaf in leaves]
+    return Mtg(labels, parent, branch, branch_parent, positions, base, features, plants.later_rows)
 
 
 def _below(entities: Sequence[_Entity], leaf: int) -> tuple[int, str]:
@@ -403,16 +425,22 @@ def _number(text: Any) -> float:
         return np.nan
 
 
-def _position(entity: _Entity) -> list[float]:
-    return [_number(entity.features.get(name)) for name in COORDINATES]
+def _coordinates(names: Sequence[str]) -> tuple[str, ...]:
+    """The names of the features that are a position; none where a file has no such features."""
+    by_upper = {name.upper(): name for name in names}
+    return next((tuple(by_upper[name] for name in axes) for axes in COORDINATES if by_upper.keys() >= set(axes)), ())
 
 
-def _stated_base(entities: Sequence[_Entity], leaf: int) -> list[float] | None:
+def _position(entity: _Entity, coordinates: Sequence[str]) -> list[float]:
+    return [_number(entity.features.get(name)) for name in coordinates] or [np.nan] * 3
+
+
+def _stated_base(entities: Sequence[_Entity], leaf: int, coordinates: Sequence[str]) -> list[float] | None:
     """The position that the file gives to an entity whose first part this is."""
     entity = leaf
     while entities[entity].whole >= 0 and entities[entities[entity].whole].parts[0] == entity:
         entity = entities[entity].whole
-        position = _position(entities[entity])
+        position = _position(entities[entity], coordinates)
         if np.isfinite(position).all():
             return position
     return None

@@ -1,19 +1,20 @@
-"""Reads a NumPy archive (.npz) with the names of athcodec's HDF5 schema (see hdf5.py) into a MotionClip.
+"""Reads a NumPy archive (.npz), with the names of athcodec's HDF5 schema (hdf5.py) or of other programs (schema.py).
 
 Positions as numpy.savez writes them are read from the archive in blocks. Those of numpy.savez_compressed are unpacked
 as they are asked for: going forward once, going backward from the start again. Every other array is static and
-survives by its name, strings as UTF-8 of fixed length. Metadata are an array `metadata` with JSON
-text, and the scalars fps, start_frame, unit and up_axis where there are such. Nothing is unpickled.
+survives by its name, strings as UTF-8 of fixed length. Metadata are an array `metadata` with JSON text, and the scalars
+fps, start_frame, unit and up_axis where there are such. Nothing is unpickled: the clip's `not_read` names objects, and
+files in the archive that are no arrays.
 """
 
 from __future__ import annotations
 
 import json
 import struct
-import tokenize
+import sys
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, BinaryIO
 
@@ -22,33 +23,20 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
-from athcodec.motion.clip import RESERVED_NAMES, MotionClip, check_float_dtype
-from athcodec.motion.frames import Frames
+from athcodec.motion.clip import MotionClip
+from athcodec.motion.positions import Order
 from athcodec.sources import ReadOptions
-from athcodec.sources.raw import raw_frames, read_exactly
-from athcodec.sources.schema import clip_of_arrays
+from athcodec.sources.npy import BROKEN, Header, check_size, positions_of_rows, read_header, rows_shape
+from athcodec.sources.raw import RawRows, read_exactly
+from athcodec.sources.schema import Stored, clip_of_arrays
 
-SCALARS = ("fps", "start_frame", "unit", "up_axis")
+SUFFIX = ".npy"
 METADATA = "metadata"
 SKIP_BYTES = 1 << 20
+ENCRYPTED = 1  # Bit of a member's flags.
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _LOCAL_HEADER = struct.Struct("<4s22xHH")
-_BROKEN = (
-    zipfile.BadZipFile,
-    OSError,
-    zlib.error,
-    EOFError,
-    ValueError,
-    KeyError,
-    RuntimeError,
-    NotImplementedError,
-    struct.error,
-    MemoryError,
-    OverflowError,
-    TypeError,
-    SyntaxError,
-    tokenize.TokenError,  # NumPy's, of headers in old styles
-)
+_BROKEN = (*BROKEN, zipfile.BadZipFile, zlib.error, NotImplementedError, struct.error)
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
@@ -56,7 +44,8 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     OSError where it cannot be opened."""
     file = open_plain(path)
     with naming(path, *_BROKEN), closing_on_failure(file):
-        return _read(file, options)
+        arrays = _Members(file, Budget(options.max_memory))
+        return clip_of_arrays(arrays, path, options, resource=file, unchanged=FileWatch(file.fileno()))
 
 
 @contextmanager
@@ -71,126 +60,129 @@ def _naming_array(name: str) -> Iterator[None]:
         raise ClipError(f"{name}: the array cannot be read: {text}") from None
 
 
-def _read(file: BinaryIO, options: ReadOptions) -> MotionClip:
-    archive, budget = zipfile.ZipFile(file), Budget(options.max_memory)
-    members = {
-        info.filename.removesuffix(".npy"): info for info in archive.infolist() if info.filename.endswith(".npy")
-    }
-    if "positions" not in members:
-        raise ClipError("positions: got no such array, expected (frames, vertices, 3)")
-    with _naming_array("positions"):
-        positions = _Positions(file, archive, members.pop("positions"), budget).frames()
-    arrays = {
-        name: _array(archive, name, info, budget)
-        for name, info in members.items()
-        if name in RESERVED_NAMES or name not in options.skip
-    }
-    metadata = _metadata(arrays)
-    attributes = {name: values for name, values in arrays.items() if name not in RESERVED_NAMES}
-    return clip_of_arrays(
-        positions, arrays.get, attributes, metadata, options, resource=file, unchanged=FileWatch(file.fileno())
-    )
+class _Members:
+    """The arrays of an archive: see schema.Arrays."""
+
+    counts_from_1 = False
+
+    def __init__(self, file: BinaryIO, budget: Budget):
+        self._file, self._archive, self._budget = file, zipfile.ZipFile(file), budget
+        self._members: dict[str, zipfile.ZipInfo] = {}
+        self._headers: dict[str, Header] = {}
+        self.metadata: dict[str, Any] = {}
+        self.not_read: dict[str, list[str]] = {}
+        for info in self._archive.infolist():
+            self._add(info.filename.removesuffix(SUFFIX), info)
+        self.stored = {name: Stored(name, header.shape, header.dtype) for name, header in self._headers.items()}
+        if METADATA in self.stored:
+            self.metadata = _parsed(self.read(METADATA))
+            del self.stored[METADATA]
+
+    def _add(self, name: str, info: zipfile.ZipInfo) -> None:
+        if not info.filename.endswith(SUFFIX):
+            if info.filename and not info.is_dir():
+                self.not_read.setdefault("member", []).append(info.filename)
+            return
+        if info.flag_bits & ENCRYPTED:
+            raise ClipError(f"{name}: got an encrypted array, expected a plain one")
+        if info.compress_type not in PACKINGS:
+            raise ClipError(
+                f"{name}: got an array that is packed otherwise than NumPy does, expected plain or deflated bytes"
+            )
+        with _naming_array(name), self._archive.open(info) as member:
+            header = read_header(name, member)
+        if header.dtype.hasobject:
+            self.not_read.setdefault("pickled object", []).append(name)
+            return
+        self._members[name], self._headers[name] = info, header
+
+    def read(self, name: str) -> np.ndarray:
+        info = self._members[name]
+        self._budget.take(2 * info.file_size, name)  # Once as it is, and once as the clip has it.
+        with _naming_array(name), self._archive.open(info) as member:
+            values = np.lib.format.read_array(member, allow_pickle=False)
+            if member.read(1):
+                raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
+        if values.dtype.kind == "U":
+            values = values.astype(values.dtype.newbyteorder("="))
+            if values.size and (np.ascontiguousarray(values).reshape(-1).view(np.uint32) > sys.maxunicode).any():
+                raise ClipError(f"{name}: got text with numbers beyond those of letters, expected Unicode")
+        return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
+
+    def positions(self, name: str, order: Order) -> Any:
+        info, header = self._members[name], self._headers[name]
+        check_size(name, header, info.file_size - header.size)
+        if info.compress_type == zipfile.ZIP_STORED:
+            rows: Any = RawRows(self._file, self._offset(name) + header.size, rows_shape(header), header.dtype)
+        else:
+            rows = _UnpackedRows(self._file, self._archive, info, header)
+        return positions_of_rows(name, rows, header, order, self._budget)
+
+    def notes(self, name: str) -> Mapping[str, Any]:
+        return {}
+
+    def labels(self, name: str) -> Sequence[str]:
+        return ()
+
+    def _offset(self, name: str) -> int:
+        """Where an array begins in the file: each member has a header of its own length before it."""
+        info = self._members[name]
+        self._file.seek(info.header_offset)
+        magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, name))
+        if magic != b"PK\3\4":
+            raise ClipError(f"{name}: got no header of a member, expected one")
+        start = info.header_offset + _LOCAL_HEADER.size + name_bytes + extra_bytes
+        self._file.seek(0, 2)
+        if start + info.file_size > self._file.tell():
+            raise ClipError(f"{name}: got the end of the file, expected the array")
+        return int(start)
 
 
-def _array(archive: zipfile.ZipFile, name: str, info: zipfile.ZipInfo, budget: Budget) -> np.ndarray:
-    _check_packing(name, info)
-    budget.take(2 * info.file_size, name)  # once as it is, and once as the clip has it
-    with _naming_array(name), archive.open(info) as member:
-        values = np.lib.format.read_array(member, allow_pickle=False)
-        if member.read(1):
-            raise ClipError(f"{name}: got more bytes than its shape {values.shape} has")
-    return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
+def _parsed(values: np.ndarray) -> dict[str, Any]:
+    """The metadata in an array of JSON text."""
+    try:
+        text = values.reshape(()).item()
+        found = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
+    except (ValueError, TypeError) as error:
+        raise ClipError(f"{METADATA}: got no JSON text, expected one: {error}") from None
+    if not isinstance(found, dict):
+        raise ClipError(f"{METADATA}: got a {type(found).__name__}, expected a JSON object")
+    return found
 
 
-def _check_packing(name: str, info: zipfile.ZipInfo) -> None:
-    if info.compress_type not in PACKINGS:
-        raise ClipError(
-            f"{name}: got an array that is packed otherwise than NumPy does, expected plain or deflated bytes"
-        )
+class _UnpackedRows:
+    """An array whose rows are unpacked when they are sliced: going forward once, going backward from the start."""
 
-
-def _metadata(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """The metadata, which are removed from the arrays."""
-    metadata = {}
-    for name in SCALARS:
-        if name in arrays and arrays[name].ndim == 0 and arrays[name].dtype.kind in "biufUS":
-            metadata[name] = _text(arrays.pop(name).item())
-    if METADATA in arrays:
-        try:
-            found = json.loads(_text(arrays.pop(METADATA).reshape(()).item()))
-        except (ValueError, TypeError) as error:
-            raise ClipError(f"{METADATA}: got no JSON text, expected one: {error}") from None
-        if not isinstance(found, dict):
-            raise ClipError(f"{METADATA}: got a {type(found).__name__}, expected a JSON object")
-        metadata |= found
-    return metadata
-
-
-def _text(value: Any) -> Any:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
-
-
-class _Positions:
-    """The member with the positions: where it lies, or how it is unpacked."""
-
-    def __init__(self, file: BinaryIO, archive: zipfile.ZipFile, info: zipfile.ZipInfo, budget: Budget):
-        _check_packing("positions", info)
-        self._file, self._archive, self._info = file, archive, info
-        with archive.open(info) as member:
-            shape, self._fortran, self.dtype = _header(member)
-            self._header_bytes = member.tell()
-        if len(shape) != 3 or shape[2] != 3 or min(shape) < 1:
-            raise ClipError(f"positions: got shape {shape}, expected (frames, vertices, 3)")
-        check_float_dtype("positions", self.dtype)
-        self.shape = tuple(int(size) for size in shape)
-        size = self.shape[0] * self.shape[1] * 3 * self.dtype.itemsize
-        budget.need(4 * size // self.shape[0], "positions: a frame")  # read, converted, checked, and the rest pose
-        if self._header_bytes + size != info.file_size:
-            raise ClipError(f"positions: got {info.file_size - self._header_bytes} bytes, expected {size} for {shape}")
+    def __init__(self, file: BinaryIO, archive: zipfile.ZipFile, info: zipfile.ZipInfo, header: Header):
+        self._file, self._archive, self._info, self._header = file, archive, info, header
+        self.shape, self.dtype = rows_shape(header), header.dtype.newbyteorder("=")
+        self._row_bytes = header.bytes // max(self.shape[0], 1)
         self._member: Any = None
         self._next = 0
 
-    def frames(self) -> Any:
-        if self._info.compress_type != zipfile.ZIP_STORED:
-            if self._fortran:
-                raise ClipError("positions: got a compressed array in Fortran order, expected C order: frame by frame")
-            return Frames(self._unpack, *self.shape[:2], self.dtype.newbyteorder("="))
-        if self._info.flag_bits & 1:
-            raise ClipError("positions: got an encrypted array, expected a plain one")
-        offset = self._offset()
-        if self._fortran:
-            return np.memmap(self._file.name, self.dtype, "r", offset, self.shape, "F")
-        return raw_frames(self._file, offset, *self.shape[:2], self.dtype)
+    def __len__(self) -> int:
+        return self.shape[0]
 
-    def _offset(self) -> int:
-        """Where the numbers begin in the file: each member has a header of its own length before it."""
-        at = self._info.header_offset
-        self._file.seek(at)
-        magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, "positions"))
-        if magic != b"PK\3\4":
-            raise ClipError("positions: got no header of a member, expected one")
-        start = at + _LOCAL_HEADER.size + name_bytes + extra_bytes
-        self._file.seek(0, 2)
-        if start + self._info.file_size > self._file.tell():
-            raise ClipError("positions: got the end of the file, expected the array")
-        return start + self._header_bytes
-
-    def _unpack(self, start: int, stop: int) -> np.ndarray:
+    def __getitem__(self, index: slice | tuple[slice, ...]) -> np.ndarray:
+        rows, *others = index if isinstance(index, tuple) else (index,)
+        start, stop, step = rows.indices(self.shape[0])
+        if step != 1:
+            raise ValueError(f"rows: got a step of {step}, expected 1")
         if self._file.closed:
             raise ClipError("got a closed file, expected an open one")
-        frame_bytes = self.shape[1] * 3 * self.dtype.itemsize
-        with _naming_array("positions"):
+        size = max(stop - start, 0) * self._row_bytes
+        with _naming_array(self._info.filename.removesuffix(SUFFIX)):
             if self._member is None or start < self._next:
                 self._member, self._next = self._archive.open(self._info), 0
-                self._skip(self._header_bytes)
-            self._skip((start - self._next) * frame_bytes)
-            self._next = self.shape[0] + 1  # unknown until all of the frames have been read
+                self._skip(self._header.size)
+            self._skip((start - self._next) * self._row_bytes)
+            self._next = self.shape[0] + 1  # unknown until all of the rows have been read
             data = bytearray()
-            while len(data) < (stop - start) * frame_bytes:
-                data += self._some((stop - start) * frame_bytes - len(data))
+            while len(data) < size:
+                data += self._some(size - len(data))
             self._next = stop
-        block = np.frombuffer(data, self.dtype).reshape(stop - start, *self.shape[1:])
-        return block.astype(self.dtype.newbyteorder("="), copy=False)
+        block = np.frombuffer(data, self._header.dtype).reshape(-1, *self.shape[1:])
+        return block.astype(self.dtype, copy=False)[(slice(None), *others)]
 
     def _skip(self, size: int) -> None:
         while size:
@@ -201,12 +193,3 @@ class _Positions:
         if not got:
             raise ClipError("positions: got the end of the array, expected frames")
         return got
-
-
-def _header(member: Any) -> tuple[tuple[int, ...], bool, np.dtype]:
-    version = np.lib.format.read_magic(member)
-    if version == (1, 0):
-        return np.lib.format.read_array_header_1_0(member)
-    if version == (2, 0):
-        return np.lib.format.read_array_header_2_0(member)
-    raise ClipError(f"positions: got version {version} of NumPy's format, expected (1, 0) or (2, 0)")

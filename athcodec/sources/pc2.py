@@ -11,24 +11,26 @@ from __future__ import annotations
 import math
 import os
 import struct
+import warnings
+from glob import escape
 from os import fspath
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip
-from athcodec.sources import ReadOptions, read
+from athcodec.sources import FORMATS, ReadOptions, read
 from athcodec.sources.mesh import Mesh, read_mesh
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
 
 MAGIC = b"POINTCACHE2\0"
 HEADER = struct.Struct("<12siiffi")
-MESH_SUFFIXES = (".obj", ".ply")
+MESH_SUFFIXES, CACHE_SUFFIXES = (".obj", ".ply"), (".pc2", ".mdd")
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
@@ -71,6 +73,8 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
     with naming(path), closing_on_failure(file):
         fields = read_header(file, options)
         mesh_path = options.mesh or _mesh_beside(Path(path))
+        if mesh_path is None:
+            _say_other_meshes(Path(path))
         mesh = cached_mesh(mesh_path, path, options, fields["positions"].shape[1])
         metadata = mesh.metadata | fields.pop("metadata")
         return MotionClip(
@@ -104,7 +108,8 @@ def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, ve
     else:
         with read(found, only=options.only, max_memory=options.max_memory) as clip:
             metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
-            mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata)
+            not_read = {kind: list(names) for kind, names in clip.not_read.items()}
+            mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata, not_read)
     if len(mesh.points) != vertex_count:
         raise ClipError(
             f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
@@ -113,6 +118,22 @@ def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, ve
         name: values for name, values in mesh.attributes.items() if name not in options.skip and name != "normals"
     }
     return mesh
+
+
+def _say_other_meshes(path: Path) -> None:
+    """A GuessWarning where files of the cache's name beside it may be its mesh, and are not looked at."""
+    known = {suffix for kind in FORMATS for suffix in kind.suffixes} - set(CACHE_SUFFIXES)
+    beside = sorted(
+        file.name
+        for file in path.parent.glob(f"{escape(path.stem)}.*")
+        if file.stem == path.stem and file.suffix.lower() in known and file.is_file()
+    )
+    if beside:
+        warnings.warn(
+            f"{path}: points alone were read; {', '.join(beside)} beside it may have the mesh: --mesh (mesh=) names it",
+            GuessWarning,
+            stacklevel=2,
+        )
 
 
 def _mesh_beside(path: Path) -> Path | None:

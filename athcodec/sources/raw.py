@@ -1,5 +1,5 @@
-"""Positions that lie in a file as plain numbers: sought and read frame by frame, never mapped into memory, so that a
-file which becomes shorter gives an error and not a crash. It knows no file format.
+"""Numbers that lie in a file one after the other: sought and read row by row, never mapped into memory, so that a file
+which becomes shorter gives an error and not a crash. It knows no file format.
 """
 
 from __future__ import annotations
@@ -12,25 +12,50 @@ from athcodec.errors import ClipError
 from athcodec.motion.frames import Frames
 
 
+class RawRows:
+    """An array of any shape, in C order, whose rows are read when they are sliced.
+
+    Parameters
+    ----------
+    file : binary file object
+        It is long enough, as the caller has checked.
+    offset : int
+        Where in the file the numbers begin.
+    shape : tuple of int
+        (rows, ...).
+    dtype : dtype
+        In any byte order; rows come in that of the machine.
+    """
+
+    def __init__(self, file: BinaryIO, offset: int, shape: tuple[int, ...], dtype: object):
+        self._file, self._offset, self._stored = file, offset, np.dtype(dtype)
+        self.shape, self.dtype = shape, self._stored.newbyteorder("=")
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: slice | tuple[slice, ...]) -> np.ndarray:
+        rows, *others = index if isinstance(index, tuple) else (index,)
+        start, stop, step = rows.indices(self.shape[0])
+        if step != 1:
+            raise ValueError(f"rows: got a step of {step}, expected 1")
+        block = np.empty((max(stop - start, 0), *self.shape[1:]), self._stored)
+        view, done = memoryview(block).cast("B") if block.size else memoryview(b""), 0
+        row_bytes = len(view) // max(stop - start, 1)
+        self._file.seek(self._offset + start * row_bytes)
+        while done < len(view):
+            got = self._file.readinto(view[done:])
+            if not got:
+                raise ClipError(f"frame {start + done // row_bytes}: got the end of the file, expected positions")
+            done += got
+        return block.astype(self.dtype, copy=False)[(slice(None), *others)]
+
+
 def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:
     """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has checked
     that the file is long enough."""
-    stored = np.dtype(dtype)
-    frame_bytes = vertex_count * 3 * stored.itemsize
-
-    def read(start: int, stop: int) -> np.ndarray:
-        block = np.empty((stop - start, vertex_count, 3), stored)
-        view = memoryview(block).cast("B")
-        file.seek(offset + start * frame_bytes)
-        done = 0
-        while done < len(view):
-            got = file.readinto(view[done:])
-            if not got:
-                raise ClipError(f"frame {start + done // frame_bytes}: got the end of the file, expected positions")
-            done += got
-        return block.astype(stored.newbyteorder("="), copy=False)
-
-    return Frames(read, frame_count, vertex_count, stored.newbyteorder("="))
+    rows = RawRows(file, offset, (frame_count, vertex_count, 3), dtype)
+    return Frames(lambda start, stop: rows[start:stop], frame_count, vertex_count, rows.dtype)
 
 
 def read_exactly(file: BinaryIO, size: int, what: str) -> bytes:

@@ -5,12 +5,16 @@ Where a file has no rate and none is given, frames come DEFAULT_FPS a second, an
 
 from __future__ import annotations
 
+import os
+import re
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import GuessWarning
+from athcodec.files.plain import FilePath
 from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
@@ -55,7 +59,7 @@ def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, 
     if missed.any():
         rate = _closer_rate(keys - (keys[0] if start is None else start), fps)
         advice = (
-            f"--fps {rate:.4g} has frames closer to them"
+            f"--fps {plain_number(rate)} has frames closer to them"
             if rate
             else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
         )
@@ -78,6 +82,28 @@ def _closer_rate(places: np.ndarray, fps: float) -> float | None:
         if hits:
             return rate if rate <= MOST_FPS and rate * float(places[-1]) <= MOST_FRAMES else None
     return None
+
+
+def say_single_frame(path: FilePath) -> None:
+    """A GuessWarning for a file of one frame, of a format that holds many, beside which others have its name but for
+    the number at its end."""
+    name = re.fullmatch(r"(.*?)(\d+)", Path(path).stem, re.DOTALL)
+    if name is None:
+        return
+    form = re.compile(re.escape(name[1]) + r"\d+" + re.escape(Path(path).suffix))
+    beside = [other for other in os.listdir(Path(path).parent) if form.fullmatch(other) and other != Path(path).name]
+    if beside:
+        warnings.warn(
+            f"{os.fspath(path)}: holds one frame, and {len(beside)} other{'s' * (len(beside) > 1)} of its name "
+            f"({min(beside)} ...) are not read; write all frames into one file if they are one motion",
+            GuessWarning,
+            stacklevel=2,
+        )
+
+
+def plain_number(number: float) -> str:
+    """The number as an option takes it and a person writes it: without an exponent."""
+    return np.format_float_positional(round(float(number), 6), trim="-")
 
 
 def whole(number: float) -> int | float:

@@ -1,36 +1,48 @@
-"""Reads XDMF time series: a temporal collection of grids, data in HDF5, raw binary or text.
+"""Reads XDMF: meshes and their data in time, of one temporal collection or several, in HDF5, raw binary or text.
 
-The mesh may be in every step, in the first one, or in a grid of its own that the steps include (as meshio and FEniCS
-write it). See fields.py for what becomes the motion and cells.py for the cells. Not read: structured grids, spatial
-collections (parallel pieces), polyhedra, functions of data. Files that the XML names must lie where it says; data of
-HDF5 are read when a frame is asked for.
+Grids become tracks: a mesh and what the file says of it, step by step. The mesh of a step is its own, or that of the
+first step. Collections of one mesh at the same times, as DOLFINx writes one for each function, are one track; spatial
+collections, trees, and collections of different meshes at the same times are several parts of one clip. Of tracks at
+different times the one that moves is read, and the others are named, as are sets, information of other programs, and
+meshes that no step refers to. See fields.py for what becomes the motion, parts.py for several meshes, cells.py for the
+cells, xdmf_document.py for includes and references and xdmf_items.py for numbers. Grids without points of their own
+(rectilinear ones) are refused, as are subsets and polyhedra. Data are read when a frame is asked for.
 """
 
 from __future__ import annotations
 
 import json
-import re
+import math
+import warnings
+from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from os import fspath
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import h5py
 import numpy as np
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.plain import FilePath
-from athcodec.files.reading import Budget, FileWatch, closing_on_failure, file_beside, naming, no_room, read_plain
+from athcodec.files.reading import Budget, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip, frame_rate
 from athcodec.sources import ReadOptions
-from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of, topology_of
-from athcodec.sources.fields import clip_of_steps
-from athcodec.sources.hdf5 import check_own, chunk_bytes, unpacks_to_more
+from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of
+from athcodec.sources.fields import DISPLACEMENTS, clip_of_steps
 from athcodec.sources.mesh import same_values
+from athcodec.sources.parts import CELL, NODE, JoinedSteps
 from athcodec.sources.scene_objects import MATERIAL_NAMES
-from athcodec.sources.timing import times_in_seconds, whole
+from athcodec.sources.timing import say_single_frame, times_in_seconds, whole
+from athcodec.sources.xdmf_document import Element
+from athcodec.sources.xdmf_items import Items
+from athcodec.sources.xml_tree import TEXT_BYTES, parse_xml
+from athcodec.sources.xpointer import local_name
 
-XML_BYTES, TEXT_BYTES = 224, 40  # Bytes that an element or attribute takes, and a byte of text that becomes numbers.
+__all__ = ["MIXED", "TEXT_BYTES", "parse_xml", "read_clip"]
+
 MIXED = {
     1: "poly_vertex",
     2: "poly_line",
@@ -82,321 +94,507 @@ TOPOLOGIES = {
     "line": "line",
 }
 PLAIN = {"polyvertex": "poly_vertex", "polyline": "poly_line", "polygon": "polygon"}
-_NAMED_DOCTYPE = re.compile(rb"""<!DOCTYPE\s+[\w.:-]+(\s+SYSTEM\s+("[^"<>]*"|'[^'<>]*'))?\s*(\[\s*\])?\s*>""")
-_KINDS = {"float": "f", "int": "i", "uint": "u", "char": "i", "uchar": "u", "short": "i", "ushort": "u"}
-_SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2}
+RECTILINEAR = ("2drectmesh", "3drectmesh", "2dcorectmesh", "3dcorectmesh")
+WITHOUT_POINTS = "save grids without points of their own as unstructured ones"
+STRUCTURED = {"2dsmesh": "quad", "3dsmesh": "hexahedron"}
+KNOWN = ("Grid", "Topology", "Geometry", "Attribute", "Time", "DataItem")  # Elements of a grid that are read.
+COLLECTIONS, UNIFORM = ("collection", "tree"), "uniform"
+MOST_NESTED = 16  # Grids inside grids.
+MOST_VISITS, VISITS_PER_ELEMENT = 1000, 16  # Grids that are looked at, more than once if they are included.
+FUNCTION_SPACE = "degrees of freedom of write_checkpoint; XDMFFile.write writes values per point"
+LISTED = 12  # Names in a message.
+TIME_NAMES = ("time", "timevalue", "time_value", "t")
 _XML_ERRORS = (ElementTree.ParseError, ValueError, KeyError, OverflowError, IndexError, TypeError, MemoryError)
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the XDMF file `path`. Raises ClipError where it or what it names is no usable series, OSError
     where the file cannot be opened."""
-    data = Data(Path(path), options.allow_outside, Budget(options.max_memory))
-    with naming(path, *_XML_ERRORS), closing_on_failure(data):
-        steps = _Steps(data, parse_xml(read_plain(path, data.budget), "Xdmf", data.budget), options)
-        time, metadata = steps.times(options)
-        return clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), data, data.unchanged)
+    budget = Budget(options.max_memory)
+    with naming(path, *_XML_ERRORS):
+        items = Items(Path(path), options.allow_outside, budget)
+        with closing_on_failure(items):
+            return _clip(items, path, options)
 
 
-def parse_xml(data: bytes, tag: str, budget: Budget) -> ElementTree.Element:
-    """The root element, of this tag. A DOCTYPE with declarations is refused: entities, and the defaults of attributes,
-    can grow without end."""
-    if b"<!DOCTYPE" in _NAMED_DOCTYPE.sub(b"", data, count=1) or b"\0" in data:
-        raise ClipError("got XML with declarations in its DOCTYPE or in UTF-16, expected plain UTF-8 without any")
-    budget.need_for(data, b"<=", XML_BYTES, "XML")
-    try:
-        root = ElementTree.fromstring(data)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # LookupError: an unknown encoding
-        raise ClipError(f"got no XML: {error}") from None
-    if root.tag != tag:
-        raise ClipError(f"got the XML of {root.tag[:40]!r}, expected {tag}")
-    return root
+def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
+    scene = _Scene(items, fspath(path), options)
+    tracks = scene.chosen()
+    parts = [_Part(items, track, scene.mesh_for(track)) for track in tracks]
+    time, metadata = scene.times(tracks[0])
+    if len(time) == 1:
+        say_single_frame(path)
+    steps = JoinedSteps(parts, items.budget, fspath(path))
+    metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
+    steps.left_out += scene.other_fields
+    clip = clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), items, items.unchanged)
+    clip.not_read = {**clip.not_read, **{kind: names for kind, names in scene.not_read.items() if names}}
+    return clip
 
 
-class Data:
-    """DataItems of one XDMF file, and the HDF5 files that they lie in, open until close()."""
+@dataclass
+class Track:
+    """A mesh in time: for each step the grids that say something of it, and its time if that is stated.
 
-    def __init__(self, path: Path, allow_outside: bool, budget: Budget):
-        self._folder, self._allow_outside, self.budget = path.resolve().parent, allow_outside, budget
-        self._files: dict[Path, h5py.File] = {}
-        self.unchanged = FileWatch(path.resolve())
+    is_series: whether it comes from a temporal collection, even if of a single step. families: numbers of the grids
+    that it is in; what is in one grid belongs together.
+    """
 
-    def close(self) -> None:
-        for file in self._files.values():
-            file.close()
+    name: str
+    steps: list[list[Element]]
+    times: np.ndarray | None = None
+    is_series: bool = False
+    families: frozenset[int] = frozenset()
 
-    def read(self, item: ElementTree.Element | None) -> np.ndarray:
-        """The array of a DataItem. Raises ClipError."""
-        if item is None:
-            raise ClipError("got no DataItem, expected one")
-        if item.get("Reference"):
-            raise ClipError("DataItem: got a reference to another, expected data")
-        kind = item.get("ItemType", "Uniform")
-        if kind == "HyperSlab":
-            return self._slab(item)
-        if kind != "Uniform":
-            raise ClipError(f"DataItem: got the type {kind[:40]!r}, expected Uniform or HyperSlab")
-        form = item.get("Format", "XML").upper()
-        if form == "HDF":
-            return self._hdf(item)
-        shape = tuple(int(size) for size in item.get("Dimensions", "").split())
-        values = self._text(item) if form == "XML" else self._binary(item, shape) if form == "BINARY" else None
-        if values is None:
-            raise ClipError(f"DataItem: got the format {form[:40]!r}, expected HDF, Binary or XML")
-        if min(shape, default=0) < 0 or values.size != int(np.prod(shape, dtype=object)):
-            raise ClipError(f"DataItem: got {values.size} numbers, expected {shape}")
-        return values.reshape(shape)
 
-    def _text(self, item: ElementTree.Element) -> np.ndarray:
-        text = item.text or ""
-        self.budget.need(TEXT_BYTES * len(text), "DataItem")
-        with np.errstate(over="ignore", invalid="ignore"):  # Values that do not fit are refused where they are used.
-            return np.array(text.split(), np.float64).astype(_dtype(item))
+class _Scene:
+    """The tracks of a file, and which of them are read."""
 
-    def _binary(self, item: ElementTree.Element, shape: tuple[int, ...]) -> np.ndarray:
-        path = self._file_named((item.text or "").strip())
-        order = {"big": ">", "little": "<"}.get(item.get("Endian", "").lower(), "=")
-        dtype, count = _dtype(item).newbyteorder(order), int(np.prod(shape, dtype=object))
-        seek = int(item.get("Seek", 0))
-        if not 0 <= seek <= path.stat().st_size - count * dtype.itemsize or min(shape, default=0) < 0:
-            raise ClipError(f"{path.name}: got {path.stat().st_size} bytes, expected {shape} of {dtype} at {seek}")
-        self.budget.need(2 * count * dtype.itemsize, path.name)
-        return np.fromfile(path, dtype, count, offset=seek).astype(dtype.newbyteorder("="))
+    def __init__(self, items: Items, shown_path: str, options: ReadOptions):
+        self._items, self._documents, self._path, self._options = items, items.documents, shown_path, options
+        self._grid_count, self._said_once = 0, set[str]()
+        self.not_read: dict[str, list[str]] = {"series": [], "mesh": [], "element": []}
+        self.other_fields: list[str] = []
+        root = self._documents.root
+        self._domains = self._documents.children(root, "Domain")
+        self._said = self._information()
+        grids = [grid for domain in self._domains for grid in self._documents.children(domain, "Grid")]
+        if not grids:
+            raise ClipError("got no Grid, expected some in a Domain")
+        self._tracks = [
+            replace(track, families=frozenset([number]))
+            for number, grid in enumerate(grids)
+            for track in self._tracks_of(grid, 0)
+        ]
 
-    def _hdf(self, item: ElementTree.Element, selection: Any = ()) -> np.ndarray:
-        name, _, inside = (item.text or "").strip().rpartition(":")
-        path = self._file_named(name)
-        if path not in self._files:
-            self._files[path] = _open_hdf(path)
-        try:
-            check_own(self._files[path], inside, self._allow_outside)
-            dataset = self._files[path][inside]
-            if not isinstance(dataset, h5py.Dataset) or dataset.shape is None or dataset.dtype.kind not in "fiu":
-                raise ClipError(f"{path.name}: {inside[:80]!r}: got no array of numbers")
-            size = (
-                dataset.nbytes
-                if selection == ()
-                else dataset.dtype.itemsize
-                * int(np.prod([len(range(*part.indices(length))) for part, length in zip(selection, dataset.shape)]))
-            )
-            self.budget.need(2 * size + chunk_bytes(dataset), f"{path.name}: {inside[:80]!r}")
-            if unpacks_to_more(dataset, self.budget.left):
-                raise ClipError(
-                    f"{path.name}: {inside[:80]!r}: got chunks that may unpack to any size, but "
-                    + no_room(self.budget.limit)
-                )
-            return np.asarray(dataset[selection]).astype(dataset.dtype.newbyteorder("="), copy=False)
-        except (KeyError, OSError, RuntimeError, TypeError, ValueError) as error:
-            if isinstance(error, ClipError):
-                raise
-            raise ClipError(f"{path.name}: {inside[:80]!r}: cannot be read: {error}") from None
+    # ---- from grids to tracks ----
 
-    def _slab(self, item: ElementTree.Element) -> np.ndarray:
-        children = item.findall("DataItem")
-        if len(children) != 2:
-            raise ClipError(f"HyperSlab: got {len(children)} DataItems, expected two")
-        start, stride, count = self.read(children[0]).reshape(3, -1).astype(np.int64)
-        if (start < 0).any() or (stride < 1).any() or (count < 0).any():
-            raise ClipError("HyperSlab: got a negative start or count, expected some of the data")
-        selection = tuple(
-            slice(a, a + (n - 1) * step + 1 if n else a, step)
-            for a, step, n in zip(start.tolist(), stride.tolist(), count.tolist())
+    def _tracks_of(self, grid: Element, depth: int) -> list[Track]:
+        """The tracks of a grid. Raises ClipError."""
+        self._grid_count += 1
+        most = MOST_VISITS + VISITS_PER_ELEMENT * self._documents.size
+        if depth > MOST_NESTED or self._grid_count > most:
+            raise ClipError(f"Grid: got more than {MOST_NESTED} inside each other or {most} in all, expected fewer")
+        kind, name = grid.get("GridType", UNIFORM).lower(), grid.get("Name", "")
+        self._name_unknown(grid, KNOWN)
+        if kind == UNIFORM:
+            time = self._time_of(grid)
+            inside = self._documents.children(grid, "Grid")  # Some steps include the grid of their mesh as it is.
+            return [Track(name, [[grid, *inside]], None if time is None else np.array([time]))]
+        if kind not in COLLECTIONS:
+            raise ClipError(f"Grid {name[:40]!r}: got the type {kind[:40]!r}, expected Uniform, Collection or Tree")
+        grids = self._documents.children(grid, "Grid")
+        if kind == "collection" and grid.get("CollectionType", "Spatial").lower() == "temporal":
+            return self._series(grid, name, grids, depth)
+        tracks = [track for each in grids for track in self._tracks_of(each, depth + 1)]
+        time = self._time_of(grid)
+        return [replace(track, times=np.array([time])) if self._is_timeless(track, time) else track for track in tracks]
+
+    @staticmethod
+    def _is_timeless(track: Track, time: float | None) -> bool:
+        return time is not None and track.times is None and len(track.steps) == 1
+
+    def _series(self, collection: Element, name: str, grids: Sequence[Element], depth: int) -> list[Track]:
+        """The tracks of a temporal collection: each of its grids is a step of all of them."""
+        steps = [self._tracks_of(grid, depth + 1) for grid in grids]
+        if not steps:
+            return []
+        if any(track.is_series for step in steps for track in step):
+            raise ClipError(f"Grid {name[:40]!r}: got a temporal collection inside of another, expected one")
+        first = [track.name for track in steps[0]]
+        for number, step in enumerate(steps):
+            if len(step) != len(first):
+                raise ClipError(f"step {number}: got {len(step)} grids, expected {len(first)} as in the first step")
+        by_name = len(set(first)) == len(first) > 1 and all(
+            {track.name for track in step} == set(first) for step in steps
         )
-        source = children[1]
-        whole_file = source.get("Format", "").upper() == "HDF"
-        values = self._hdf(source, selection) if whole_file else self.read(source)[selection]
-        shape = tuple(int(size) for size in item.get("Dimensions", "").split()) or tuple(count)
-        return values.reshape(shape)
+        tracks = []
+        for place, own in enumerate(first):
+            row = [next(t for t in step if t.name == own) if by_name else step[place] for step in steps]
+            times = self._series_times(collection, [track.times for track in row], grids)
+            joined = Track(own if len(first) > 1 else name or own, [t.steps[0] for t in row], times, True)
+            tracks.append(_in_order(joined))
+        return tracks
 
-    def _file_named(self, name: str) -> Path:
-        path = file_beside(self._folder, name, self._allow_outside)
-        if not path.is_file():
-            raise ClipError(f"DataItem: got the file {name[:80]!r}, which does not exist")
-        self.unchanged.add(path)
-        return path
+    # ---- times ----
 
+    def _time_of(self, grid: Element) -> float | None:
+        """The time that a grid states for itself alone."""
+        element = self._documents.child(grid, "Time")
+        numbers = self._time_elsewhere(grid) if element is None else self._numbers(element)
+        if len(numbers) > 1 and grid.get("GridType", UNIFORM).lower() != "collection":
+            raise ClipError(f"Time: got {len(numbers)} for the grid {grid.get('Name', '')[:40]!r}, expected one")
+        return float(numbers[0]) if len(numbers) == 1 else None
 
-def _open_hdf(path: Path) -> h5py.File:
-    try:
-        return h5py.File(path, "r")
-    except OSError as error:
-        raise ClipError(f"{path.name}: the HDF5 file cannot be opened: {error}") from None
+    def _time_elsewhere(self, grid: Element) -> np.ndarray:
+        """The time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
+        for element in self._documents.children(grid, "Information", "Attribute"):
+            is_whole = local_name(element) == "Information" or element.get("Center", "").lower() == "grid"
+            if is_whole and element.get("Name", "").lower() in TIME_NAMES:
+                with suppress(ClipError, ValueError):  # Words, or what is no single number, are no time.
+                    numbers = self._numbers(element)
+                    if len(numbers) == 1:
+                        self._say_once(
+                            f"Time: {local_name(element)} {element.get('Name')} was taken for that of the steps"
+                        )
+                        return numbers
+        return np.zeros(0)
 
+    def _numbers(self, element: Element) -> np.ndarray:
+        text = element.get("Value", "").split()
+        item = self._documents.child(element, "DataItem")
+        if text:
+            return np.array(text, np.float64)
+        return np.zeros(0) if item is None else self._items.read(item).reshape(-1).astype(np.float64)
 
-def _dtype(item: ElementTree.Element) -> np.dtype:
-    kind = (item.get("NumberType") or item.get("DataType") or "Float").lower()
-    size = int(item.get("Precision") or _SIZES.get(kind, 4))
-    if kind not in _KINDS or size not in (1, 2, 4, 8) or (_KINDS[kind] == "f" and size < 4):
-        raise ClipError(f"DataItem: got numbers of {kind[:40]!r} with {size} bytes")
-    return np.dtype(f"{_KINDS[kind]}{size}")
-
-
-class _Steps:
-    """See fields.Steps."""
-
-    def __init__(self, data: Data, root: ElementTree.Element, options: ReadOptions):
-        self._data, self._root = data, root
-        self._series, self._grids = _find_steps(root, options.field)
-        own = next(
-            (
-                grid
-                for grid in [*root.iter("Grid")]
-                if grid.get("GridType", "Uniform") == "Uniform" and grid.find("Geometry") is not None
-            ),
-            None,
-        )
-        if own is None:
-            raise ClipError("got no grid with a Geometry, expected points")
-        self._mesh = self._grids[0] if self._grids[0].find("Geometry") is not None else own
-        self._first_blocks = self._blocks(self._topology_element(0))
-        self.topology = topology_of(self._first_blocks, len(self.points(0)))
-        self.elsewhere = {name: center for name, center, _ in self._attributes(0) if center != "node"}
-        self.left_out = self._add_cell_data()
-
-    def times(self, options: ReadOptions) -> tuple[np.ndarray, dict[str, Any]]:
-        """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
-        said = _information(self._root)
-        fps = said.get("fps") if options.fps is None else options.fps
-        stored = self._stored_times(fps)
-        time, metadata = times_in_seconds(stored, fps)
-        if "start_frame" in said:
-            start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
-            metadata["start_frame"] = whole(round(start, 6))
-        return time, said | metadata
-
-    def _stored_times(self, fps: float | None) -> np.ndarray:
-        values = [grid.find("Time") for grid in self._grids]
-        if all(value is not None and value.get("Value") for value in values):
-            return np.array([float(value.get("Value")) for value in values])
-        common = self._series.find("Time") if self._series is not None else None
+    def _series_times(
+        self, collection: Element, stated: Sequence[np.ndarray | None], grids: Sequence[Element]
+    ) -> np.ndarray | None:
+        """The times of a collection's steps: their own, or those of the collection. None where it has none."""
+        count = len(stated)
+        missing = [number for number, time in enumerate(stated) if time is None]
+        if not missing:
+            return np.array([float(time[0]) for time in stated if time is not None])
+        common = self._documents.child(collection, "Time")
         if common is None:
-            return np.arange(len(self._grids)) / frame_rate({} if fps is None else {"fps": fps})
-        numbers = self._data.read(common.find("DataItem")).reshape(-1).astype(np.float64)
-        if common.get("TimeType", "Single") == "HyperSlab" and len(numbers) == 3:
-            numbers = numbers[0] + numbers[1] * np.arange(len(self._grids))
-        if len(numbers) != len(self._grids):
-            raise ClipError(f"Time: got {len(numbers)} times, expected {len(self._grids)}, one per grid")
+            if len(missing) < count and self._options.fps is None:
+                raise ClipError(
+                    f"Time: got none in step {missing[0]} ({grids[missing[0]].get('Name', '')[:40]!r}) and one in "
+                    "others, expected it in all; --fps (fps=) numbers them in place of all times"
+                )
+            return None
+        kind, numbers = common.get("TimeType", "Single").lower(), self._numbers(common)
+        if kind == "function":
+            raise ClipError("Time: got the type Function, expected Single, List, Range or HyperSlab")
+        if kind == "hyperslab" and len(numbers) == 3:
+            if numbers[2] != count:
+                raise ClipError(f"Time: got {numbers[2]:g} times, expected {count}, one per grid")
+            return numbers[0] + numbers[1] * np.arange(count)
+        if kind == "range" and len(numbers) == 2 and count > 1:
+            return np.linspace(*numbers, count)
+        if len(numbers) != count:
+            raise ClipError(f"Time: got {len(numbers)} times, expected {count}, one per grid")
         return numbers
 
-    def _element(self, step: int, tag: str) -> ElementTree.Element | None:
-        found = self._grids[step].find(tag)
-        return self._mesh.find(tag) if found is None else found
+    def times(self, track: Track) -> tuple[np.ndarray, dict[str, Any]]:
+        """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
+        said, stored, count = self._said, track.times, len(track.steps)
+        fps = said.get("fps") if self._options.fps is None else self._options.fps
+        if stored is None or not track.is_series:
+            stored = np.arange(count) / frame_rate({} if fps is None else {"fps": fps})
+            if count > 1 and fps is None:
+                self._warn(
+                    f"Time: the steps have none, and come {frame_rate({}):g} a second; --fps (fps=) states a rate"
+                )
+        with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
+            time, metadata = times_in_seconds(stored, fps)
+            if "start_frame" in said:
+                start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
+                metadata["start_frame"] = whole(round(start, 6))
+        return time, said | metadata
 
-    def _topology_element(self, step: int) -> ElementTree.Element | None:
-        return self._element(step, "Topology")
+    # ---- which tracks ----
+
+    def chosen(self) -> list[Track]:
+        """The tracks that are the clip; the others are named. Raises ClipError where it is not clear which they are."""
+        tracks = self._tracks
+        if self._options.only:
+            tracks = [t for t in tracks if any(fnmatchcase(t.name, pattern) for pattern in self._options.only)]
+            if not tracks:
+                names = ", ".join(dict.fromkeys(repr(track.name) for track in self._tracks))
+                raise ClipError(f"only: got no grid of these names, expected some of {names}")
+        series = [track for track in tracks if track.is_series]
+        if not series:
+            return self._still(tracks)
+        groups = self._groups(series)
+        found = groups if len(groups) == 1 else self._moving(groups)
+        self._name_others(found, [track for track in groups if track not in found])
+        return found
+
+    def _still(self, tracks: Sequence[Track]) -> list[Track]:
+        """The meshes of a file without a series: they are one frame."""
+        with_points = [track for track in tracks if self._element(track, "Geometry") is not None]
+        if not with_points:
+            raise ClipError("got no grid with a Geometry, expected points")
+        times = {float(track.times[0]) for track in with_points if track.times is not None}
+        if len(times) > 1:
+            raise ClipError(
+                f"got {len(with_points)} grids at different times and no temporal collection, expected a time series "
+                "or one grid"
+            )
+        self._name_others(with_points, [track for track in tracks if track not in with_points])
+        return with_points
+
+    def _groups(self, series: Sequence[Track]) -> list[Track]:
+        """The series, those of one mesh at the same times in one: that has all their data."""
+        found: list[Track] = []
+        for track in series:
+            group = next((each for each in found if self._belong_together(each, track)), None)
+            if group is None:
+                found.append(replace(track, steps=[list(step) for step in track.steps]))
+            else:
+                for step, more in zip(group.steps, track.steps):
+                    step += more
+                group.families |= track.families
+        return found
+
+    def _belong_together(self, one: Track, other: Track) -> bool:
+        """Whether two series are of one mesh, of different grids at the top, at the same times."""
+        if one.families & other.families or len(one.steps) != len(other.steps):
+            return False
+        if (one.times is None) != (other.times is None) or not np.array_equal(one.times, other.times):
+            return False
+        return self._same_mesh(one, other)
+
+    def _same_mesh(self, one: Track, other: Track) -> bool:
+        """Whether two tracks have the same points and cells in their first step, in one place or in several."""
+        geometry = self._element(one, "Geometry"), self._element(other, "Geometry")
+        topology = self._element(one, "Topology"), self._element(other, "Topology")
+        if None in geometry:
+            return False
+        if all(self._documents.source(a) == self._documents.source(b) for a, b in (geometry, topology)):
+            return True
+        with suppress(ClipError):  # Of a mesh that cannot be read nothing is known; it may be one that nobody wants.
+            parts = [_Part(self._items, track, None) for track in (one, other)]
+            points = [part.points(0) for part in parts]
+            blocks = [part.blocks for part in parts]
+            return np.array_equal(*points) and len(blocks[0]) == len(blocks[1]) and all(map(_same_block, *blocks))
+        return False
+
+    def _moving(self, groups: Sequence[Track]) -> list[Track]:
+        """Of several series those that are read: with the field, or that move, at the same times."""
+        wanted = self._options.field
+        if wanted is not None:
+            moving = [track for track in groups if wanted in self._fields(track)]
+            if not moving:
+                raise ClipError(f"field: got {wanted!r}, expected one of {self._listed(groups)}")
+        else:
+            moving = [track for track in groups if self._moves(track)] or list(groups)
+        families = frozenset[int]().union(*(track.families for track in moving))
+        found = [track for track in groups if track.families & families]
+        times = {None if track.times is None else track.times.tobytes() for track in found}
+        if len(times) > 1:
+            raise ClipError(
+                f"got {len(found)} series at different times, {self._listed(found)}; expected one: --only (only=) "
+                "names it"
+            )
+        return found
+
+    def _moves(self, track: Track) -> bool:
+        names = [name.lower() for name in self._fields(track)]
+        part = _Part(self._items, track, None, with_mesh=False)
+        return any(name in DISPLACEMENTS for name in names) or not part.fixed_points()
+
+    def _fields(self, track: Track) -> list[str]:
+        return _Part(self._items, track, None, with_mesh=False).names(NODE)
+
+    def _listed(self, groups: Sequence[Track]) -> str:
+        return "; ".join(
+            f"{track.name!r} with {', '.join(self._fields(track)[:LISTED]) or 'no fields per point'}"
+            for track in groups[:LISTED]
+        )
+
+    def _name_others(self, chosen: Sequence[Track], others: Sequence[Track]) -> None:
+        """Name what is not read: fields of other series of a mesh that is, other series, and meshes of no step."""
+        points = {self._documents.source(self._element(track, "Geometry")) for track in chosen}
+        for track in others:
+            if any(self._same_mesh(track, each) for each in chosen):
+                self.other_fields += [f"{track.name}/{name}" for name in self._fields(track)]
+            elif track.is_series:
+                self._add_not_read("series", track.name or "unnamed")
+        for track in self._tracks:
+            if track.is_series or track in chosen or track in others:
+                continue
+            geometry = self._element(track, "Geometry")
+            part = _Part(self._items, track, None, with_mesh=False)
+            if geometry is not None and self._documents.source(geometry) not in points:
+                self._add_not_read("mesh", track.name or "unnamed")
+            else:  # Tags of the mesh that is read, as DOLFINx writes them.
+                self.other_fields += [f"{track.name}/{name}" for center in (NODE, CELL) for name in part.names(center)]
+
+    def mesh_for(self, track: Track) -> Element | None:
+        """The grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
+        if self._element(track, "Geometry") is not None:
+            return None
+        meshes = [each for each in self._tracks if not each.is_series and self._element(each, "Geometry") is not None]
+        if len(meshes) != 1:
+            names = ", ".join(repr(mesh.name) for mesh in meshes[:LISTED]) or "none"
+            raise ClipError(
+                f"Grid {track.name[:40]!r}: got no grid with a Geometry in its steps; expected one, by xi:include or "
+                f"in place, of the meshes in the file: {names}"
+            )
+        self._warn(f"the steps of {track.name!r} have no mesh, and that of {meshes[0].name!r} was taken for it")
+        self.not_read["mesh"] = [name for name in self.not_read["mesh"] if name != (meshes[0].name or "unnamed")]
+        return meshes[0].steps[0][0]
+
+    def _element(self, track: Track, tag: str) -> Element | None:
+        found = (self._documents.child(grid, tag) for grid in track.steps[0])
+        return next((element for element in found if element is not None), None)
+
+    def _information(self) -> dict[str, Any]:
+        """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
+        materials that our writer adds as JSON."""
+        said: dict[str, Any] = {}
+        self._name_unknown(self._documents.root, ("Domain", "Information"))
+        for domain in (self._documents.root, *self._domains):
+            if domain is not self._documents.root:
+                self._name_unknown(domain, ("Grid", "Information", "DataItem", *KNOWN))
+            for element in self._documents.children(domain, "Information"):
+                name, value = element.get("Name", ""), element.get("Value", "")
+                if name in ("unit", "up_axis"):
+                    said[name] = value
+                elif name in ("fps", "start_frame"):
+                    said[name] = whole(float(value)) if name == "start_frame" else float(value)
+                elif name in ("objects", MATERIAL_NAMES):
+                    with suppress(ValueError, RecursionError):  # Another program may have written something else here.
+                        said[name] = json.loads(value)
+                else:
+                    self._add_not_read("element", f"Information {name}")
+        frame_rate(said)
+        return said
+
+    def _name_unknown(self, parent: Element, known: Sequence[str]) -> None:
+        """Name the children of an element that are not looked at."""
+        for child in self._documents.children(parent):
+            if local_name(child) not in known and child.get("Name", "").lower() not in TIME_NAMES:
+                self._add_not_read("element", f"{local_name(child)} {child.get('Name', '')}".strip())
+
+    def _add_not_read(self, kind: str, name: str) -> None:
+        if name not in self.not_read[kind]:
+            self.not_read[kind].append(name)
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said_once:
+            self._said_once.add(text)
+            self._warn(text)
+
+    def _warn(self, text: str) -> None:
+        warnings.warn(f"{self._path}: {text}", GuessWarning, stacklevel=2)
+
+
+def _in_order(track: Track) -> Track:
+    """The track with its steps in the order of time, in which not all programs write them."""
+    if track.times is None or not np.isfinite(track.times).all() or (np.diff(track.times) > 0).all():
+        return track
+    order = np.argsort(track.times, kind="stable")
+    return replace(track, steps=[track.steps[number] for number in order], times=track.times[order])
+
+
+class _Part:
+    """See parts.Part: a track."""
+
+    def __init__(self, items: Items, track: Track, mesh: Element | None, with_mesh: bool = True):
+        self.name, self._items, self._documents = track.name, items, items.documents
+        self._steps, self._mesh = track.steps, mesh
+        self._attributes = [self._attributes_of(step) for step in self._steps]
+        self.elsewhere = {
+            name: center for step in self._attributes for name, center in step if center not in (NODE, CELL)
+        }
+        self.blocks = self._blocks(self._element(0, "Topology"), self._element(0, "Geometry")) if with_mesh else []
+        self.cell_count = sum(len(block.rows) for block in self.blocks)
 
     def points(self, step: int) -> np.ndarray:
         geometry = self._element(step, "Geometry")
-        kind = geometry.get("GeometryType") or geometry.get("Type") or "XYZ"
-        items = geometry.findall("DataItem")
-        if kind == "X_Y_Z" and len(items) == 3:
-            return np.stack([self._data.read(item).reshape(-1) for item in items], axis=1)
+        if geometry is None:
+            raise ClipError("got no grid with a Geometry, expected points")
+        kind = (geometry.get("GeometryType") or geometry.get("Type") or "XYZ").upper()
+        items = self._documents.children(geometry, "DataItem")
+        if kind in ("X_Y_Z", "X_Y") and len(items) == len(kind.split("_")):
+            return np.stack([self._items.read(item).reshape(-1) for item in items], axis=1)
         if kind not in ("XYZ", "XY") or len(items) != 1:
-            raise ClipError(f"Geometry: got the type {kind[:40]!r}, expected XYZ, XY or X_Y_Z")
-        return self._data.read(items[0]).reshape(-1, len(kind))
+            raise ClipError(
+                f"Geometry: got the type {kind[:40]!r} with {len(items)} DataItems, expected XYZ, XY, X_Y_Z or X_Y; "
+                f"{WITHOUT_POINTS}"
+            )
+        return self._items.read(items[0]).reshape(-1, len(kind))
 
     def fixed_points(self) -> bool:
-        if self._same_items("Geometry"):
-            return True
-        first = self.points(0)
-        return all(np.array_equal(first, self.points(step)) for step in range(1, len(self._grids)))
-
-    def _same_items(self, tag: str) -> bool:
-        first = _signature(self._element(0, tag))
-        return all(_signature(self._element(step, tag)) == first for step in range(1, len(self._grids)))
-
-    def check(self, step: int) -> None:
-        element, first = self._topology_element(step), self._topology_element(0)
-        if element is first or _signature(element) == _signature(first):
-            return
-        blocks = self._blocks(element)
-        same = len(blocks) == len(self._first_blocks) and all(
-            a.kind == b.kind and np.array_equal(a.nodes, b.nodes) and np.array_equal(a.rows, b.rows)
-            for a, b in zip(blocks, self._first_blocks)
-        )
-        if not same:
-            raise ClipError(f"frame {step}: got other cells than in the first; topology that changes cannot be coded")
-
-    def fields(self) -> list[str]:
-        return [name for name, center, _ in self._attributes(0) if center == "node"]
-
-    def field(self, step: int, name: str) -> np.ndarray:
-        for found, center, element in self._attributes(step):
-            if found == name and center == "node":
-                values = self._data.read(element.find("DataItem"))
-                return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
-        raise ClipError(f"frame {step}: got no field {name!r} per point, expected one as in the first")
-
-    def _attributes(self, step: int) -> list[tuple[str, str, ElementTree.Element]]:
-        elements = [*self._grids[step].findall("Attribute")]
-        if self._mesh is not self._grids[0]:
-            elements += self._mesh.findall("Attribute")
-        return [(element.get("Name", ""), element.get("Center", "Node").lower(), element) for element in elements]
-
-    def static(self) -> dict[str, np.ndarray]:
-        """Data per point that are the same in all steps."""
-        count, found = len(self.points(0)), {}
-        for name in self.fields():
-            if self._is_static(name, "node"):
-                values = self.field(0, name)
-                if len(values) == count and name:
-                    self._data.budget.take(values.nbytes, name)
-                    found[name] = values
-        return found
-
-    def _add_cell_data(self) -> list[str]:
-        """Keep the data per cell that are the same in all steps; return the names of all data that are in no clip."""
-        count = sum(len(block.rows) for block in self._first_blocks)
-        steps = range(len(self._grids))
-        left_out = dict.fromkeys((name, center) for step in steps for name, center, _ in self._attributes(step) if name)
-        for name, center, element in self._attributes(0):
-            if center == "cell" and name and self._is_static(name, "cell"):
-                values = self._data.read(element.find("DataItem"))
-                if len(values) == count:
-                    self._data.budget.take(2 * values.nbytes, name)
-                    self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
-                    del left_out[name, center]
-            elif center == "node":
-                left_out.pop((name, center), None)  # See fields().
-        return [name for name, _ in left_out]
-
-    def _is_static(self, name: str, center: str) -> bool:
-        """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
-
-        def item(step: int) -> ElementTree.Element | None:
-            return next(
-                (
-                    element.find("DataItem")
-                    for found, where, element in self._attributes(step)
-                    if (found, where) == (name, center)
-                ),
-                None,
-            )
-
-        first = item(0)
-        others = [item(step) for step in range(len(self._grids) - 1, 0, -1)]
-        if any(other is None for other in others):
-            return False
-        others = [other for other in others if _signature(other) != _signature(first)]
+        first = self._element(0, "Geometry")
+        others = [step for step in range(1, len(self._steps)) if not self._same(self._element(step, "Geometry"), first)]
         if not others:
             return True
-        values = self._data.read(first)
-        return all(same_values(values, self._data.read(other)) for other in others)
+        points = self.points(0)
+        return all(np.array_equal(points, self.points(step)) for step in others)
 
-    def _blocks(self, element: ElementTree.Element | None) -> list[Block]:
+    def check(self, step: int) -> None:
+        element, first = self._element(step, "Topology"), self._element(0, "Topology")
+        if self._same(element, first):
+            return
+        blocks = self._blocks(element, self._element(step, "Geometry"))
+        if len(blocks) != len(self.blocks) or not all(map(_same_block, blocks, self.blocks)):
+            raise ClipError(f"frame {step}: got other cells than in the first; topology that changes cannot be coded")
+
+    def names(self, center: str) -> list[str]:
+        return list(dict.fromkeys(name for step in self._attributes for name, place in step if place == center))
+
+    def values(self, step: int, name: str, center: str) -> np.ndarray:
+        element = self._attributes[step].get((name, center))
+        if element is None:
+            raise ClipError(f"frame {step}: got no field {name!r} per {center}, expected one as in other steps")
+        values = self._items.first(element)
+        return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
+
+    def is_static(self, name: str, center: str) -> bool:
+        """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
+        elements = [step.get((name, center)) for step in self._attributes]
+        if any(element is None for element in elements):
+            return False
+        items = [self._documents.child(element, "DataItem") for element in elements if element is not None]
+        others = [item for item in reversed(items[1:]) if not self._same(item, items[0])]
+        if not others:
+            return True
+        values = self._items.read(items[0])
+        return all(same_values(values, self._items.read(item)) for item in others)
+
+    def _element(self, step: int, tag: str) -> Element | None:
+        """The Topology or Geometry of a step: its own, that of the first step, or of the mesh that was taken."""
+        for grids in (self._steps[step], self._steps[0], [] if self._mesh is None else [self._mesh]):
+            for grid in grids:
+                element = self._documents.child(grid, tag)
+                if element is not None:
+                    return element
+        return None
+
+    def _same(self, one: Element | None, other: Element | None) -> bool:
+        """Whether two elements say the same."""
+        return one is other or self._documents.source(one) == self._documents.source(other)
+
+    def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
+        """The attributes of a step by name and center. Those of a name that several grids have, as collections that
+        were joined may, are called by their grid as well."""
+        found: dict[tuple[str, str], Element] = {}
+        for number, grid in enumerate(grids):
+            for element in self._documents.children(grid, "Attribute"):
+                name, center = element.get("Name") or "unnamed", element.get("Center", "Node").lower()
+                if element.get("ItemType", "").lower() == "finiteelementfunction":
+                    center = FUNCTION_SPACE
+                key = (
+                    (name, center) if (name, center) not in found else (f"{grid.get('Name') or number}/{name}", center)
+                )
+                found[key] = element
+        return found
+
+    # ---- cells ----
+
+    def _blocks(self, element: Element | None, geometry: Element | None) -> list[Block]:
         if element is None:
             return []
         kind = (element.get("TopologyType") or element.get("Type") or "").lower()
-        item = element.find("DataItem")
         if kind == "polyvertex":
             return []
-        nodes = self._data.read(item)
+        if kind in STRUCTURED:
+            return _structured(STRUCTURED[kind], element, self._items.budget)
+        if kind in RECTILINEAR:
+            raise ClipError(f"Topology: got the type {kind!r}, expected cells between points; {WITHOUT_POINTS}")
+        nodes = self._items.first(element)
         if nodes.dtype.kind not in "iu":
             nodes = _whole_numbers(nodes)
-        self._data.budget.need(NODE_BYTES * nodes.size, "Topology")
+        self._items.budget.need(NODE_BYTES * nodes.size, "Topology")
+        first = int(element.get("BaseOffset", 0))
         nodes = nodes.astype(np.int64)
         if kind == "mixed":
-            return _mixed_blocks(nodes.reshape(-1))
+            return [replace(block, nodes=block.nodes - first) for block in _mixed_blocks(nodes.reshape(-1))]
+        nodes = nodes - first
         if kind in PLAIN:
             size = int(element.get("NodesPerElement") or nodes.shape[-1])
             rows = np.arange(nodes.size // max(size, 1))
@@ -408,60 +606,36 @@ class _Steps:
         if kind not in TOPOLOGIES or nodes.size % NODES[TOPOLOGIES[kind]]:
             raise ClipError(f"Topology: got {nodes.size} nodes of the type {kind[:40]!r}, expected a known one")
         cells = nodes.reshape(-1, NODES[TOPOLOGIES[kind]])
+        order = element.get("Order", "").split()
+        if order:
+            if sorted(order, key=int) != [str(number) for number in range(cells.shape[1])]:
+                raise ClipError(f"Topology: got the order {' '.join(order)[:40]!r}, expected 0 to {cells.shape[1] - 1}")
+            cells = cells[:, [order.index(str(number)) for number in range(cells.shape[1])]]
         return [Block(TOPOLOGIES[kind], cells, np.arange(len(cells)))]
+
+
+def _same_block(one: Block, other: Block) -> bool:
+    return one.kind == other.kind and np.array_equal(one.nodes, other.nodes) and np.array_equal(one.rows, other.rows)
+
+
+def _structured(kind: str, element: Element, budget: Budget) -> list[Block]:
+    """The cells between the points of a curvilinear grid, whose last dimension is the fastest."""
+    shape = [int(size) for size in (element.get("Dimensions") or element.get("NumberOfElements") or "").split()]
+    if len(shape) != (2 if kind == "quad" else 3) or min(shape) < 1:
+        raise ClipError(f"Topology: got the dimensions {shape}, expected {2 if kind == 'quad' else 3} of points")
+    budget.need(NODE_BYTES * len(shape) ** 2 * math.prod(shape), f"Topology: a grid of {shape} points")
+    numbers = np.arange(int(np.prod(shape))).reshape(shape)
+    sides = [(slice(None, -1), slice(1, None))] * len(shape)
+    around = [(0, 0), (0, 1), (1, 1), (1, 0)]  # Of the last two dimensions, counter-clockwise.
+    places = around if kind == "quad" else [(layer, *each) for layer in (0, 1) for each in around]
+    cells = [numbers[tuple(side[place] for side, place in zip(sides, each))].reshape(-1) for each in places]
+    return [Block(kind, np.stack(cells, axis=1), np.arange(len(cells[0])))]
 
 
 def _whole_numbers(values: np.ndarray) -> np.ndarray:
     if not np.array_equal(values, np.floor(values)):
         raise ClipError("Topology: got numbers with fractions, expected vertices")
     return values
-
-
-def _signature(element: ElementTree.Element | None) -> bytes:
-    return b"" if element is None else ElementTree.tostring(element).strip()
-
-
-def _find_steps(root: ElementTree.Element, field: str | None) -> tuple[ElementTree.Element | None, list]:
-    """The temporal collection (one with the wanted field, else the first) and its grids; a single grid without one."""
-    series = [
-        grid
-        for grid in root.iter("Grid")
-        if grid.get("GridType") == "Collection" and grid.get("CollectionType", "Spatial") == "Temporal"
-    ]
-    series = [collection for collection in series if collection.findall("Grid")]
-    if not series:
-        single = [grid for grid in root.iter("Grid") if grid.get("GridType", "Uniform") == "Uniform"]
-        if len(single) != 1:
-            raise ClipError(f"got {len(single)} grids and no temporal collection, expected a time series or one grid")
-        return None, single
-    wanted = f"Grid/Attribute[@Name='{(field or '').replace(chr(39), '')}']"
-    named = [collection for collection in series if field and collection.find(wanted) is not None]
-    chosen = (named or series)[0]
-    grids = chosen.findall("Grid")
-    pieces = [grid for grid in grids if grid.get("GridType", "Uniform") != "Uniform"]
-    if pieces:
-        raise ClipError(
-            f"got a step with a grid of the type {pieces[0].get('GridType')[:40]!r}, expected Uniform: "
-            "pieces of parallel runs have to be merged first"
-        )
-    return chosen, grids
-
-
-def _information(root: ElementTree.Element) -> dict[str, Any]:
-    """fps, start_frame, unit and up_axis, where the domain has Information of these names; and those of objects and
-    materials that our writer adds as JSON."""
-    said: dict[str, Any] = {}
-    for element in root.findall("Domain/Information"):
-        name, value = element.get("Name"), element.get("Value", "")
-        if name in ("unit", "up_axis"):
-            said[name] = value
-        elif name in ("fps", "start_frame"):
-            said[name] = whole(float(value)) if name == "start_frame" else float(value)
-        elif name in ("objects", MATERIAL_NAMES):
-            with suppress(ValueError, RecursionError):  # Another program may have written something else here.
-                said[name] = json.loads(value)
-    frame_rate(said)
-    return said
 
 
 def _mixed_blocks(stream: np.ndarray) -> list[Block]:

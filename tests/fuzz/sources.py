@@ -27,7 +27,7 @@ from pathlib import Path
 import glb
 import numpy as np
 
-KINDS = ("glb", "pc2", "mdd", "obj", "ply", "xdmf", "npz", "vtu")
+KINDS = ("glb", "pc2", "mdd", "obj", "ply", "xdmf", "npz", "vtu", "vtk")
 BUDGET = 64 << 20  # bytes, max_memory
 MEMORY = 256 << 20  # bytes by which a process may grow: the budget, Python's own objects and what NumPy keeps
 SECONDS = 20
@@ -90,6 +90,8 @@ def peak() -> int:
 @cache
 def seeds(kind: str) -> tuple[bytes, ...]:
     """Small valid files of a format, and those that once went wrong."""
+    if kind == "vtk":
+        return tuple(text.encode() for text in LEGACY)
     from moving_meshes import quad_clip
     from plants import plant
 
@@ -109,6 +111,54 @@ def seeds(kind: str) -> tuple[bytes, ...]:
         found.append(XDMF.encode())
     found += [path.read_bytes() for path in sorted(CORPUS.glob(f"*.{kind}"))]
     return tuple(found)
+
+
+_LEGACY = "# vtk DataFile Version {}\ntime 0.5\n{}\nDATASET {}\n"
+_POINTS = "POINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0\n"
+_DATA = """POINT_DATA 4
+SCALARS a double 1
+LOOKUP_TABLE default
+0 1 2 3
+LOOKUP_TABLE default 2
+0 0 0 1 1 1 1 1
+VECTORS displacement float
+0 0 0 1 0 0 0 1 0 1 1 0
+FIELD FieldData 2
+names 1 4 string
+a
+
+c
+d
+age 1 4 short
+0 1 2 3
+METADATA
+COMPONENT_NAMES
+a
+
+CELL_DATA 2
+NORMALS n float
+0 0 1 0 0 1
+"""
+LEGACY = (
+    _LEGACY.format("3.0", "ASCII", "POLYDATA")
+    + "FIELD FieldData 1\nTIME 1 1 double\n0.5\n"
+    + _POINTS
+    + "LINES 1 3\n2 0 1\nPOLYGONS 1 4\n3 0 1 2\n"
+    + _DATA,
+    _LEGACY.format("5.1", "ASCII", "UNSTRUCTURED_GRID")
+    + _POINTS
+    + "CELLS 3 7\nOFFSETS vtktypeint64\n0 3 7\nCONNECTIVITY vtktypeint64\n0 1 2 0 1 3 2\nCELL_TYPES 2\n5 9\n"
+    + _DATA,
+    _LEGACY.format("3.0", "ASCII", "STRUCTURED_GRID") + "DIMENSIONS 2 2 1\n" + _POINTS,
+    _LEGACY.format("3.0", "ASCII", "STRUCTURED_POINTS") + "DIMENSIONS 2 3 4\nORIGIN 0 0 0\nSPACING 1 1 1\n",
+    _LEGACY.format("3.0", "ASCII", "RECTILINEAR_GRID")
+    + "DIMENSIONS 2 1 1\nX_COORDINATES 2 float\n0 1\nY_COORDINATES 1 float\n0\nZ_COORDINATES 1 float\n0\n",
+    _LEGACY.format("3.0", "BINARY", "POLYDATA")
+    + "POINTS 2 float\n"
+    + 24 * "\0"
+    + "\nLINES 1 3\n"
+    + "\0\0\0\2\0\0\0\0\0\0\0\1\nPOINT_DATA 2\nFIELD FieldData 2\nb 1 2 bit\nA\ns 1 2 string\n\0\0\0\0\0\0\0\1aA\n",
+)
 
 
 XDMF = """<Xdmf Version="3.0"><Domain><Grid GridType="Collection" CollectionType="Temporal">
@@ -240,6 +290,7 @@ WAYS: dict[str, tuple[Callable[[bytes, random.Random], bytes], ...]] = {
     "xdmf": (_text, _text, _bytes),
     "npz": (_archive, _archive, _bytes, _fields),
     "vtu": (_text, _text, _bytes),
+    "vtk": (_text, _text, _bytes, _fields),
 }
 
 

@@ -1,0 +1,293 @@
+"""Positions as arrays of other programs have them: in another order of axes, or of another type than a clip takes.
+
+An order is the names of the axes of an array, one after the other: "vertices,frames,xyz". Two names joined by + share
+an axis, the first of them slowest: "frames,vertices+xyz" is x, y, z of the first vertex, then of the next. "1" is an
+axis of length 1. Without "frames" the array is a single frame. Names of dimensions that other programs use, such as
+"time" and "point", are known too.
+
+No order is guessed: what belongs to the vertices or frames tells whether an order fits (`order_of`), and whether frames
+look like paths of vertices is asked (`looks_turned`). Both take facts: by the name of an array, what it counts (FRAMES,
+VERTICES, or INDICES of vertices) and its number of rows or, of indices, the highest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from athcodec.errors import ClipError
+from athcodec.motion.frames import Frames
+
+FRAMES, VERTICES, XYZ, INDICES = "frames", "vertices", "xyz", "indices"
+Order = tuple[tuple[str, ...], ...]
+Facts = Mapping[str, tuple[str, int]]
+USUAL: Order = ((FRAMES,), (VERTICES,), (XYZ,))
+LABELS = {
+    FRAMES: "frames frame time times t step steps timestep timesteps time_step time_steps".split(),
+    VERTICES: "vertices vertex points point nodes node particles particle markers marker".split(),
+    XYZ: "xyz axis axes coordinate coordinates coord coords component components dim space direction".split(),
+}
+_NAMES = {label: name for name, labels in LABELS.items() for label in labels}
+FRAMES_LOOKED_AT, VERTICES_LOOKED_AT = 8, 4096  # Each with the next one, they tell whether an array looks turned.
+SMALL_SPREAD = 0.5  # Extent of a frame over that of a vertex' path, below which a frame looks like a path itself.
+_COUNTED = {"time": FRAMES, "rest": VERTICES, "vertex_branch": VERTICES, "stem_index": VERTICES}
+_COUNTED |= {"faces": INDICES, "edges": INDICES}
+
+
+def parse_order(axes: str | Sequence[str]) -> Order:
+    """Return the order that is written as names with commas between them, or as a sequence of names.
+
+    Raises
+    ------
+    ValueError
+        Unless vertices and xyz are there once, frames at most once, and vertices do not share an axis with frames.
+    """
+    words = axes.split(",") if isinstance(axes, str) else [str(word) for word in axes]
+    order = tuple(_axis(word.strip().lower()) for word in words)
+    names = sorted(name for axis in order for name in axis)
+    if names not in ([FRAMES, VERTICES, XYZ], [VERTICES, XYZ]) or {FRAMES, VERTICES} in map(set, order):
+        raise ValueError(
+            f"axes: got {axes!r}, expected the order of the array's axes in the words frames, vertices and xyz, such "
+            "as vertices,frames,xyz or, where vertices and xyz share an axis, frames,vertices+xyz"
+        )
+    if any(len(axis) > 2 for axis in order):
+        raise ValueError(f"axes: got {axes!r}, expected at most two of frames, vertices and xyz in one axis")
+    return order
+
+
+def order_of_labels(labels: Sequence[Any]) -> Order | None:
+    """Return the order that the names of an array's dimensions state; None where they state none."""
+    names = [_NAMES.get(str(label).strip().lower().rpartition("/")[2]) for label in labels]
+    return tuple((name,) for name in names if name) if sorted(map(str, names)) == sorted(_text(USUAL)) else None
+
+
+def written(order: Order) -> str:
+    """Return an order as `parse_order` reads it."""
+    return ",".join(_text(order))
+
+
+def advice(orders: Sequence[Order]) -> str:
+    """Return what to pass for one of these orders, on the command line and in Python."""
+    words = [written(order) for order in orders]
+    in_python = f'axes="{words[0]}"' if len(words) == 1 else "axes="
+    return f"--axes {' or '.join(words)} ({in_python})"
+
+
+def facts_of(arrays: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
+    """Return the facts that arrays with the names of a clip's state; None for one that is missing."""
+    facts = {}
+    for name, what in _COUNTED.items():
+        values = np.asarray(arrays[name]) if arrays.get(name) is not None else np.zeros(0)
+        if values.size and what != INDICES:
+            facts[name] = what, len(values.reshape(-1) if what == FRAMES else values)
+        elif values.size and values.dtype.kind in "iu":
+            facts[name] = what, int(values.max())
+    return facts
+
+
+def order_of(shape: Sequence[int], facts: Facts, order: Order | None = None) -> Order:
+    """Return the order of the axes of an array of positions, by default frames, vertices, xyz.
+
+    Parameters
+    ----------
+    shape : sequence of int
+        Of the array.
+    facts : Facts
+        What is known of its frames and vertices.
+    order : Order, optional
+        The order that is stated, which is then only compared with the shape.
+
+    Raises
+    ------
+    ClipError
+        Where the shape has another order, or the facts fit another one; the message says what to pass.
+    """
+    if order is not None:
+        _lengths(shape, order)
+        return order
+    possible = list(_possible(tuple(shape)))
+    fitting = [each for each in possible if not conflicts(shape, facts, each)]
+    if USUAL in fitting or (USUAL in possible and not fitting):
+        return USUAL
+    if USUAL in possible:
+        raise ClipError(
+            f"positions: got shape {tuple(shape)}, which is {shape[0]} frames of {shape[1]} vertices, but "
+            f"{', '.join(conflicts(shape, facts))}; pass {advice(fitting)}"
+        )
+    said = f"positions: got shape {tuple(shape)}, expected (frames, vertices, 3)"
+    raise ClipError(f"{said}; say the order of its axes: {advice(fitting or possible)}" if possible else said)
+
+
+def is_possible(shape: Sequence[int], order: Order | None = None) -> bool:
+    """Whether an array of this shape can have this order, or any."""
+    if order is None:
+        return any(_possible(tuple(shape)))
+    try:
+        return bool(_lengths(shape, order))
+    except ClipError:
+        return False
+
+
+def ordered(array: Any, order: Order) -> Any:
+    """Return an array of positions as (frames, vertices, 3), which reads frames of `array` when they are sliced.
+
+    Parameters
+    ----------
+    array : array-like
+        Anything with a shape and a dtype that is sliced along each of its axes.
+    order : Order
+        Of its axes.
+
+    Raises
+    ------
+    ClipError
+        Where the shape does not have this order.
+    """
+    lengths = _lengths(array.shape, order)
+    if order == USUAL:
+        return array
+    names = [name for axis in order for name in axis]
+    places = [names.index(name) for name in (FRAMES, VERTICES, XYZ) if name in names]
+    axis = next((number for number, each in enumerate(order) if FRAMES in each), None)
+    frame_count, dtype = lengths.get(FRAMES, 1), np.dtype(array.dtype)
+
+    def read(start: int, stop: int) -> np.ndarray:
+        if axis is None:
+            block = np.asarray(array[(slice(None),) * len(order)])
+        else:
+            parts = [np.asarray(array[rows]) for rows in _rows(order, axis, lengths, start, stop)]
+            block = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=axis)
+        sizes = [stop - start if name == FRAMES else lengths[name] for name in names]
+        block = block.reshape(sizes).transpose(places)
+        return np.ascontiguousarray(block if FRAMES in names else block[None], dtype.newbyteorder("="))
+
+    return Frames(read, frame_count, lengths[VERTICES], dtype.newbyteorder("="), keeps=axis != 0)
+
+
+def in_floats(positions: Any) -> tuple[Any, str]:
+    """Return positions (frames, vertices, 3) in float32 or float64, whichever holds them, and a sentence if that is
+    another type."""
+    before = np.dtype(positions.dtype)
+    if before.kind not in "iuf" or len(positions.shape) != 3 or (before.kind == "f" and before.itemsize in (4, 8)):
+        return positions, ""
+    after: DTypeLike = np.float32 if np.result_type(before, np.float32) == np.float32 else np.float64
+
+    def read(start: int, stop: int) -> np.ndarray:
+        return np.asarray(positions[start:stop]).astype(after)
+
+    frame_count, vertex_count, _ = positions.shape
+    return Frames(read, frame_count, vertex_count, after), f"positions: {before} became {np.dtype(after)}"
+
+
+def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
+    """Return dates, or times between them, as (T,) float64 seconds from the first; other numbers unchanged."""
+    return (dates - dates[:1]).astype("timedelta64[ns]").astype(np.float64) / 1e9 if dates.dtype.kind in "mM" else dates
+
+
+def looks_turned(positions: Any, facts: Facts) -> bool:
+    """Whether frames look like paths of vertices, so that the array probably has vertices first.
+
+    A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If each frame is much
+    smaller than the paths, and its points follow each other more closely than those of a path, frames and vertices have
+    changed places. False where the facts say otherwise. A few frames are read.
+    """
+    frame_count, vertex_count = positions.shape[:2]
+    if min(frame_count, vertex_count) < 2 or positions.dtype.kind != "f" or _confirm(positions.shape, facts):
+        return False
+    starts = np.unique(np.linspace(0, frame_count - 2, FRAMES_LOOKED_AT).astype(int)).tolist()
+    places = np.unique(np.linspace(0, vertex_count - 2, VERTICES_LOOKED_AT).astype(int))
+    pairs = [np.asarray(positions[start : start + 2]) for start in starts]
+    points = np.stack([pair[:, places] for pair in pairs]).astype(np.float64)  # Of each frame and the next one.
+    beside = np.stack([pair[:, places + 1] for pair in pairs]).astype(np.float64)
+    with np.errstate(all="ignore"):  # What is no number, or too large, is refused where it is read.
+        in_frame, in_path = (np.linalg.norm(np.ptp(points[:, 0], axis=axis), axis=-1).mean() for axis in (1, 0))
+        step_in_frame = np.linalg.norm(beside - points, axis=-1).mean()
+        step_in_path = np.linalg.norm(points[:, 1] - points[:, 0], axis=-1).mean()
+        return bool(in_frame < SMALL_SPREAD * in_path and step_in_frame < step_in_path)
+
+
+def turned_advice(shape: Sequence[int]) -> str:
+    """Return the question about an array that `looks_turned`."""
+    swapped = (USUAL[1], USUAL[0], USUAL[2])
+    return (
+        f"positions: shape {tuple(shape)} was taken as {shape[0]} frames of {shape[1]} vertices, but each frame looks "
+        f"like the path of one vertex; pass {advice([swapped])} if it is {shape[0]} vertices in {shape[1]} frames, and "
+        f"{advice([USUAL])} if it is right"
+    )
+
+
+def _axis(word: str) -> tuple[str, ...]:
+    return () if word == "1" else tuple(_NAMES.get(part.strip(), part) for part in word.split("+"))
+
+
+def _text(order: Order) -> list[str]:
+    return ["+".join(axis) or "1" for axis in order]
+
+
+def _lengths(shape: Sequence[int], order: Order) -> dict[str, int]:
+    """Return the number of frames and vertices, and 3 for xyz. Raises ClipError."""
+    lengths = {XYZ: 3}
+    fits = len(shape) == len(order)
+    for length, axis in zip(shape, order):
+        others = [name for name in axis if name != XYZ]
+        width = 3 if XYZ in axis else 1
+        fits = fits and length % width == 0 and (bool(others) or length == width)
+        lengths |= dict.fromkeys(others, length // width)
+    if not fits:
+        raise ClipError(f"positions: got shape {tuple(shape)}, expected one of axes {written(order)}, xyz being 3")
+    return lengths
+
+
+def _possible(shape: tuple[int, ...]) -> Iterator[Order]:
+    """Yield the orders that a shape can have, the usual one first."""
+    extra = max(len(shape) - 3, 0)
+    ones = [axis for axis, length in enumerate(shape) if length == 1][:extra]
+    if len(ones) < extra:
+        return
+    for order in _possible_of_few(tuple(length for axis, length in enumerate(shape) if axis not in ones)):
+        axes = iter(order)
+        yield tuple(() if axis in ones else next(axes) for axis in range(len(shape)))
+
+
+def _possible_of_few(shape: tuple[int, ...]) -> Iterator[Order]:
+    """Yield the orders that a shape of two or three axes can have."""
+    if len(shape) == 3:
+        yield from (order for order in permutations(USUAL) if shape[order.index((XYZ,))] == 3)
+    elif len(shape) == 2:
+        yield from (order for order in permutations(USUAL[1:]) if shape[order.index((XYZ,))] == 3)
+        for joined in ((VERTICES, XYZ), (XYZ, VERTICES)):
+            shared = permutations(((FRAMES,), joined))
+            yield from (order for order in shared if shape[order.index(joined)] % 3 == 0 < shape[order.index(joined)])
+
+
+def conflicts(shape: Sequence[int], facts: Facts, order: Order = USUAL) -> list[str]:
+    """Return what contradicts that an array of this shape has an order, in words. Raises ClipError where it cannot."""
+    lengths = {FRAMES: 1} | _lengths(shape, order)
+    found = []
+    for name, (what, number) in facts.items():
+        if what == INDICES and number >= lengths[VERTICES]:
+            found.append(f"{name} name vertex {number}")
+        elif what != INDICES and number != lengths[what]:
+            found.append(f"{name} has {number} rows")
+    return found
+
+
+def _confirm(shape: Sequence[int], facts: Facts) -> bool:
+    """Whether the facts fit frames and vertices of this shape, and not the other way round."""
+    swapped: Order = (USUAL[1], USUAL[0], USUAL[2])
+    return not conflicts(shape, facts) and bool(conflicts(shape, facts, swapped))
+
+
+def _rows(order: Order, axis: int, lengths: Mapping[str, int], start: int, stop: int) -> Iterator[tuple[slice, ...]]:
+    """Yield the index of each run of an array's rows that has frames `start` to `stop` - 1, which lie on this axis."""
+    place = order[axis].index(FRAMES)
+    runs, width = (
+        math.prod(lengths[name] for name in names) for names in (order[axis][:place], order[axis][place + 1 :])
+    )
+    for first in range(0, runs * lengths[FRAMES], lengths[FRAMES]):
+        yield (*(slice(None),) * axis, slice((first + start) * width, (first + stop) * width))
