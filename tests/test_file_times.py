@@ -150,7 +150,6 @@ def test_numbers_that_do_not_follow_one_another_are_said_and_the_advice_works(tm
 @pytest.mark.parametrize(
     "keys, fps, advice",
     [
-        (np.array([0, 2e-4, 1.0, 2.0]), 30, 60),  # No rate of a useful number of frames has all of them.
         (np.array([0, 0.0125, 1 / 24]), 24, 240),
         (np.array([0, 1.234, 1.238, 3]), 30, 500),
         (np.array([1, 1.25, 1.5, 7.125]), 2, 8),

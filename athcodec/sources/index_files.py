@@ -24,7 +24,7 @@ from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.reading import Budget, check_inside, naming, read_plain
 from athcodec.sources import SERIES
 from athcodec.sources.numbering import some
-from athcodec.sources.xdmf import parse_xml
+from athcodec.sources.xml_tree import parse_xml
 
 PVD = ".pvd"
 LISTS = (".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")  # Files that list the pieces of one frame.

@@ -121,8 +121,9 @@ class JoinedSteps:
     def _add_cell_data(self) -> list[str]:
         """Keep the data per cell that are the same in all steps; return the names of all data that are in no clip."""
         kept = self._static_data(CELL, [part.cell_count for part in self._parts])
-        for name, values in kept.items():
-            self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values)
+        for name, values in list(kept.items()):
+            if not self.topology.add_cell_data(name, values[:, 0] if values.shape[1:] == (1,) else values):
+                del kept[name]
         names = [name for part in self._parts for name in (*part.names(CELL), *part.elsewhere)]
         return [name for name in dict.fromkeys(names) if name and name not in kept]
 

@@ -36,7 +36,6 @@ from athcodec.motion.positions import (
 )
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources import ReadOptions
-from athcodec.sources.timing import say_single_frame
 
 POSITIONS = "positions"
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
@@ -172,8 +171,6 @@ class _Clip:
         if depths is not None and np.array_equal(clip.attributes.get("branch_order", ()), depths):
             del clip.attributes["branch_order"]
         read_clip_metadata(clip)
-        if clip.frame_count == 1:
-            say_single_frame(self.path)
         return clip
 
     # ---- the positions ----

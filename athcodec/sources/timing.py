@@ -5,21 +5,18 @@ Where a file has no rate and none is given, frames come DEFAULT_FPS a second, an
 
 from __future__ import annotations
 
-import os
-import re
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import GuessWarning
-from athcodec.files.plain import FilePath
 from athcodec.motion.clip import DEFAULT_FPS
 
 DROP_FRAME = 1000 / 1001
-RATES = (24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 100.0, 120.0, 240.0, 480.0, 500.0, 1000.0)
-MOST_FPS, MOST_FRAMES = 1000.0, 100_000  # Of a rate that is advised.
+SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
+MOST_FPS = 1000.0  # Highest rate that is advised.
+MOST_FRAMES = 100_000  # Most frames of a rate that is advised.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
@@ -54,51 +51,36 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
 
 
 def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
-    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, which begin at `start`
-    seconds (default: with the first key)."""
-    if missed.any():
-        rate = _closer_rate(keys - (keys[0] if start is None else start), fps)
-        advice = (
-            f"--fps {plain_number(rate)} has frames closer to them"
-            if rate
-            else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
-        )
-        warnings.warn(
-            f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
-            f"there alone is missed; {advice}",
-            GuessWarning,
-            stacklevel=2,
-        )
-
-
-def _closer_rate(places: np.ndarray, fps: float) -> float | None:
-    """The lowest sensible rate whose frames hit keys at these seconds after the first frame, else the rate of their
-    shortest step; None where that has more frames than anybody wants."""
-    shortest = np.diff(places).min(initial=0.25 / fps)
-    steps = (fps * factor for factor in range(2, 9))
-    for rate in sorted(rate for rate in (*steps, *RATES, 1 / shortest if shortest > 0 else 0.0) if rate > fps):
-        off = np.abs(places * rate - np.round(places * rate))
-        hits = off.max(initial=0.0) <= 0.01 or rate * shortest >= 1 - 1e-6
-        if hits:
-            return rate if rate <= MOST_FPS and rate * float(places[-1]) <= MOST_FRAMES else None
-    return None
-
-
-def say_single_frame(path: FilePath) -> None:
-    """A GuessWarning for a file of one frame, of a format that holds many, beside which others have its name but for
-    the number at its end."""
-    name = re.fullmatch(r"(.*?)(\d+)", Path(path).stem, re.DOTALL)
-    if name is None:
+    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which is at
+    `start` seconds (default: at the first key that is not missed, else at 0)."""
+    if not missed.any():
         return
-    form = re.compile(re.escape(name[1]) + r"\d+" + re.escape(Path(path).suffix))
-    beside = [other for other in os.listdir(Path(path).parent) if form.fullmatch(other) and other != Path(path).name]
-    if beside:
-        warnings.warn(
-            f"{os.fspath(path)}: holds one frame, and {len(beside)} other{'s' * (len(beside) > 1)} of its name "
-            f"({min(beside)} ...) are not read; write all frames into one file if they are one motion",
-            GuessWarning,
-            stacklevel=2,
-        )
+    met = keys[~missed]
+    if start is None:
+        start = float(met[0]) if len(met) else 0.0
+    rate = _rate_of_all(keys - start, fps)
+    advice = (
+        f"--fps {plain_number(rate)} has a frame at each of them"
+        if rate
+        else f"they lie on no rate up to {MOST_FPS:g} per second, so resample them in the program that wrote them"
+    )
+    warnings.warn(
+        f"{name}: {missed.sum()} of {len(keys)} key times lie between frames at {fps:g} per second, and what moves "
+        f"there alone is missed; {advice}",
+        GuessWarning,
+        stacklevel=2,
+    )
+
+
+def _rate_of_all(places: np.ndarray, fps: float) -> float | None:
+    """The lowest rate, a whole number or a multiple of fps, with frames at all of these seconds, one of them at 0; None
+    where that takes more frames than anybody wants."""
+    highest = min(MOST_FPS, MOST_FRAMES / max(float(np.ptp(places)), SAME_TIME))
+    multiples = fps * np.arange(2, int(highest / fps) + 1)
+    for rate in sorted({*multiples.tolist(), *map(float, range(int(fps) + 1, int(highest) + 1))}):
+        if (np.abs(places * rate - np.round(places * rate)) <= min(SAME_TIME * rate, 0.01)).all():
+            return rate
+    return None
 
 
 def plain_number(number: float) -> str:

@@ -32,7 +32,7 @@ from athcodec.sources.vtk_grid import (
     poly_cells,
     starts_of,
 )
-from athcodec.sources.xdmf import TEXT_BYTES, parse_xml
+from athcodec.sources.xml_tree import TEXT_BYTES, parse_xml
 
 _TYPES = {
     "Float32": "f4",

@@ -27,7 +27,7 @@ from athcodec.sources.cells import NODE_BYTES, VTK_NAMES, Block, blocks_of
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.mesh import same_values
 from athcodec.sources.parts import CELL, NODE, JoinedSteps
-from athcodec.sources.timing import say_single_frame, times_in_seconds
+from athcodec.sources.timing import times_in_seconds
 
 ROOT, ASSEMBLY = "VTKHDF", "Assembly"
 GRID, SURFACE = "UnstructuredGrid", "PolyData"
@@ -55,8 +55,6 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
             )
     with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
         time, metadata = times_in_seconds(stored, options.fps)
-    if len(time) == 1:
-        say_single_frame(path)
     steps = JoinedSteps(parts, budget, fspath(path))
     steps.left_out += [name for part in parts for name in part.left_out]
     said = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}

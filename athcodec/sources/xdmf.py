@@ -35,13 +35,10 @@ from athcodec.sources.fields import DISPLACEMENTS, clip_of_steps
 from athcodec.sources.mesh import same_values
 from athcodec.sources.parts import CELL, NODE, JoinedSteps
 from athcodec.sources.scene_objects import MATERIAL_NAMES
-from athcodec.sources.timing import say_single_frame, times_in_seconds, whole
+from athcodec.sources.timing import times_in_seconds, whole
 from athcodec.sources.xdmf_document import Element
 from athcodec.sources.xdmf_items import Items
-from athcodec.sources.xml_tree import TEXT_BYTES, parse_xml
 from athcodec.sources.xpointer import local_name
-
-__all__ = ["MIXED", "TEXT_BYTES", "parse_xml", "read_clip"]
 
 MIXED = {
     1: "poly_vertex",
@@ -122,8 +119,6 @@ def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
     tracks = scene.chosen()
     parts = [_Part(items, track, scene.mesh_for(track)) for track in tracks]
     time, metadata = scene.times(tracks[0])
-    if len(time) == 1:
-        say_single_frame(path)
     steps = JoinedSteps(parts, items.budget, fspath(path))
     metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
     steps.left_out += scene.other_fields
