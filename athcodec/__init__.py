@@ -18,7 +18,6 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.motion.clip import MotionClip
     from athcodec.motion.joining import in_wind, join, looped, split
     from athcodec.motion.thresholds import Thresholds
-    from athcodec.motion.transitions import endless
     from athcodec.opening import open
     from athcodec.sources import read, read_hdf5, sample_path
     from athcodec.truncation import truncate
@@ -37,7 +36,6 @@ __all__ = [
     "build_ath",
     "compare",
     "encode",
-    "endless",
     "errors",
     "find_branches",
     "in_wind",
@@ -70,7 +68,6 @@ _LAZY = {
     "exporters": ("write", "write_hdf5"),
     "motion.joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
-    "motion.transitions": ("endless",),
     "truncation": ("truncate",),
 }
 _MODULES = ("errors", "metrics")

@@ -29,7 +29,7 @@ from athcodec.motion.positions import parse_order, written
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
-from athcodec.sources import FORMATS, format_named
+from athcodec.sources import format_named, formats
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
@@ -48,7 +48,7 @@ READING = (
     "up_axis",
 )
 # These settings change a clip before it is encoded.
-SHAPING = ("hierarchy", "loop", "loop_blend", "endless", "strength", "heading")
+SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
 
 Settings = dict[str, Any]
 
@@ -94,7 +94,7 @@ def check_settings(settings: Mapping[str, Any], where: str = "settings", folder:
     ----------
     settings : dict
         Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
-        loop_blend, endless, strength and heading.
+        loop_blend, strength and heading.
         Lengths and sizes may be text with a unit, "1mm".
     where : str, optional
         What error messages begin with.
@@ -234,7 +234,7 @@ def _rate(value: Any) -> float:
 
 
 def _format(value: Any) -> str:
-    return format_named(value, FORMATS).name
+    return format_named(value, formats()).name
 
 
 def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:
@@ -299,7 +299,6 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "up_axis": _one_of("x", "y", "z"),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
-    "endless": _BOOL,
     "strength": _finite,
     "heading": _finite,
 }

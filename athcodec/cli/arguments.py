@@ -10,7 +10,6 @@ from typing import Any
 
 import athcodec
 from athcodec.files.shown import shown
-from athcodec.motion.positions import parse_order, written
 from athcodec.motion.units import METRES, Length, parse_length, parse_size
 from athcodec.options import (
     DEFAULT_LADDER,
@@ -213,13 +212,6 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "them into those at their beginning",
     )
     verb.add_argument(
-        "--endless",
-        metavar="NAME,...",
-        type=_argument(_names),
-        help="clips to find transitions in, between like frames, over which players play them without an end; all: "
-        "every one",
-    )
-    verb.add_argument(
         "--strength",
         metavar="S,...",
         type=_argument(_numbers),
@@ -294,11 +286,6 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
     verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
-    verb.add_argument(
-        "--endless",
-        action="store_true",
-        help="find transitions between like frames, over which players play clips without an end",
-    )
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",
@@ -517,7 +504,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--nanite",
         action="store_true",
         help="with --rig and USD: laid out as Nanite Assemblies of Unreal Engine 5.7, copies as instances on the "
-        "joints, and the JSON of Dynamic Wind beside it",
+        "joints, and the JSON of Dynamic Wind beside it; not run in Unreal",
     )
     verb.add_argument(
         "--instances",
@@ -715,6 +702,8 @@ def _names(text: str) -> list[str]:
 
 
 def _axes(text: str) -> str:
+    from athcodec.motion.positions import parse_order, written  # The import takes longer than all of this module.
+
     return written(parse_order(text))
 
 

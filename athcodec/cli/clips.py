@@ -57,15 +57,14 @@ def clip_to_encode(
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
             parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
-        loops, endless = _checked_names(names, len(parts), args)
+        loops = _checked_names(names, len(parts), args)
         winds = _checked_winds(len(parts), args)
         clips: dict[str, MotionClip] = {}
         for name, wind, (_, _, clip) in zip(names, winds, parts):
             if args.rest not in ("auto", HOST) and clips:  # one that was made: the first clip's is as good for all
                 clip = clip.replace(rest=next(iter(clips.values())).source_rest, rest_given=False)
             clip = in_wind(clip, *wind) if wind else clip
-            clip = athcodec.looped(clip, args.loop_blend) if name in loops else clip
-            clips[name] = _endless(name, clip) if name in endless else clip
+            clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
     return joined
@@ -85,25 +84,17 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
     return Into(paths[0], _gltf_options(args), args.keep_animation, args.gltf_motion)
 
 
-def _endless(name: str, clip: MotionClip) -> MotionClip:
-    """The clip with transitions. ClipError where there are none."""
-    with naming(name or "clip"):
-        return athcodec.endless(clip)
-
-
-def _checked_names(
-    names: Sequence[str], clip_count: int, args: argparse.Namespace
-) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the names of the loops and of the clips without an end. ClipError where they do not fit the clips."""
+def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
+    """Return the names of the loops. ClipError where they do not fit the clips."""
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
-    loops, endless = (names if given == ["all"] else given or [] for given in (args.loop, args.endless))
-    for name in (*loops, *endless, *names):
+    loops = names if args.loop == ["all"] else args.loop or []
+    for name in (*loops, *names):
         if names.count(name) != 1:
             raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
     if args.loop_blend and not loops:
         raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
-    return loops, endless
+    return loops
 
 
 def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:

@@ -142,7 +142,6 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
 
 def batch(args: argparse.Namespace) -> int:
     from athcodec import batch
-    from athcodec.batch.show import show_of_terminal
 
     inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
     items = batch.find(
@@ -158,7 +157,7 @@ def batch(args: argparse.Namespace) -> int:
     if args.dry_run:
         print_preview(batch.preview(items, args.out, **where), args.json)
         return 0
-    outcome = batch.run(items, args.out, **where, **how, show=show_of_terminal())
+    outcome = batch.run(items, args.out, **where, **how, report=partial(echo, file=sys.stderr))
     print_outcome(outcome, args)
     return 1 if outcome.failed else 0
 
@@ -175,7 +174,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    given |= {name: True for name in ("exact_rest", "lossless", "loop", "endless") if getattr(args, name)}
+    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
     given |= {
         name: getattr(args, name)
         for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
@@ -287,7 +286,7 @@ def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written
 
         write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
-    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
+    name = args.format or sources.format_by_suffix(args.output, exporters.formats()).name
     how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
@@ -378,7 +377,7 @@ def truncate(args: argparse.Namespace) -> int:
 def formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
-    read, written = ({kind.name: kind for kind in module.FORMATS} for module in (sources, exporters))
+    read, written = ({kind.name: kind for kind in module.formats()} for module in (sources, exporters))
     rows = [
         {
             "format": name,
@@ -386,6 +385,7 @@ def formats(args: argparse.Namespace) -> int:
             "writes": _suffixes(written.get(name)),
             "title": kind.title,
             "extra": kind.extra,
+            "package": kind.package or "athcodec",
             "installed": kind.is_installed,
         }
         for name, kind in (written | read).items()
@@ -406,8 +406,8 @@ def _suffixes(kind: Any) -> list[str]:
 
 def _needs(row: dict[str, Any]) -> str:
     if not row["extra"]:
-        return ""
-    return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
+        return "" if row["package"] == "athcodec" else row["package"]
+    return f"{row['package']}[{row['extra']}]" + (", installed" if row["installed"] else "")
 
 
 def view(args: argparse.Namespace) -> int:

@@ -24,7 +24,6 @@ from athcodec.errors import BadChunk, ClipError, Truncated
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.transitions import transitions_of
 
 
 class AthFile(StaticData, SegmentDecoder):
@@ -179,7 +178,6 @@ class AthFile(StaticData, SegmentDecoder):
             "loop": clip.loop,
             "wind": None if math.isnan(strength) else {STRENGTH: strength, HEADING: heading},
             "presence": stated_presence(metadata),
-            "transitions": len(transitions_of(metadata, clip.frame_count)),
             "seam_errors": list(clip.seam_errors),
             "max_errors": [level.max_error for level in self.levels_in(clip.segments)],
         }

@@ -21,13 +21,11 @@ from athcodec.decoding import core_file
 from athcodec.decoding.affines import Affines, affines_of, residual_of
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
-from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.decoding.facts import facts_of, print_facts
 from athcodec.decoding.file_tables import Clip, Level, median_rate
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
-from athcodec.motion.transitions import transitions_of
 from athcodec.options import real
 
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
@@ -409,29 +407,6 @@ class Decoder:
                 for name, weight in used.items()
             ]
         )
-
-    def endless(self, seed: int = 1) -> EndlessPlay:
-        """Play the clip without an end, over transitions that `athcodec.endless` stored between its like frames.
-
-        Parameters
-        ----------
-        seed : int, optional
-            Another seed gives another order of transitions.
-
-        Returns
-        -------
-        EndlessPlay
-            An object whose `positions(seconds)` returns the plant at any time.
-
-        Raises
-        ------
-        ValueError
-            If the clip names no transitions.
-        """
-        stored = transitions_of(self.metadata, self.frame_count)
-        if not stored:
-            raise ValueError(f"clip {self.clip.name!r}: got no transitions, expected some, of encode --endless")
-        return EndlessPlay(self.time, stored, self.blended_places, seed)
 
     def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
         """Return the clip at several times at once, blended along the branches as `blended` blends clips.

@@ -74,11 +74,7 @@ def print_facts(facts: dict[str, Any]) -> None:
         echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
         echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if (
-        len(facts["clips"]) > 1
-        or facts["clips"][0]["name"]
-        or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
-    ):
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or any(facts["clips"][0][key] for key in ("loop", "wind")):
         _print_clips(facts)
     for clip in facts["clips"]:
         _print_presence(clip)
@@ -114,7 +110,6 @@ def _print_clips(facts: dict[str, Any]) -> None:
             f"{clip['seconds']:.4g}",
             f"{clip['segments']:,}",
             f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
-            f"{clip['transitions']:,}" if clip["transitions"] else "",
             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
             *(f"{error:.3g}" for error in clip["max_errors"]),
         ]
@@ -122,7 +117,7 @@ def _print_clips(facts: dict[str, Any]) -> None:
     ]
     levels = [f"max at {level}" for level in range(len(facts["levels"]))]
     seam = head("loop's seam", facts["unit"])
-    print_table(["clip", "frames", "seconds", "segments", "wind", "transitions", seam, *levels], rows)
+    print_table(["clip", "frames", "seconds", "segments", "wind", seam, *levels], rows)
 
 
 def _print_levels(facts: dict[str, Any]) -> None:

@@ -2,13 +2,12 @@
 
 `write` imports the module of the wanted format and no other. A module has one function,
 `write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file. It returns
-None, or what there is to know of the files: see Written.
+None, or what there is to know of the files: see Written. Other packages add formats by entry points, as in sources/.
 """
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -22,8 +21,10 @@ from athcodec.errors import ClipError
 from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
+from athcodec.files.kinds import add_kind
 from athcodec.options import set_numbers
 from athcodec.sources import Format, format_by_suffix, format_named
+from athcodec.sources.registry import registered
 
 Report = Callable[[str, float], None]
 Progress = Callable[[float], None]
@@ -55,7 +56,7 @@ class WriteOptions:
         is as close as that many allow; `Written` says how close.
     nanite : bool, optional
         For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
-        the joints, and the JSON of Dynamic Wind beside it.
+        the joints, and the JSON of Dynamic Wind beside it. This was not run in Unreal.
 
     Raises
     ------
@@ -114,6 +115,13 @@ class Written:
     facts: dict[str, Any] = field(default_factory=dict)
 
 
+def formats() -> Iterator[Format]:
+    """Yield the formats that can be written: athcodec's own, and then those of other packages, which are searched for
+    only if somebody asks for more."""
+    yield from FORMATS
+    yield from registered(__name__)[len(FORMATS) :]
+
+
 def write(
     motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None, **options: Any
 ) -> Written:
@@ -127,7 +135,7 @@ def write(
         The file to write; formats of one file per frame number their files by it. An older file of the same kind, or
         an empty one, is replaced, unless `motion` reads it.
     format : str, optional
-        Name of one of `athcodec.exporters.FORMATS`; known by the suffix by default.
+        Name of one of `athcodec.exporters.formats()`; known by the suffix by default.
     progress : callable, optional
         Called with "export" and the fraction that is done.
     **options
@@ -153,7 +161,7 @@ def write(
     """
     wanted = WriteOptions(**options)
     motion = ClipView(motion) if isinstance(motion, Decoder) else motion
-    kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
+    kind = format_by_suffix(path, formats()) if format is None else format_named(format, formats())
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
         raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
@@ -163,11 +171,13 @@ def write(
         _check_clips(motion, kind)
     report = progress or (lambda stage, fraction: None)
     with keeping(getattr(motion, "inputs", ())):
+        if kind.package:
+            add_kind(kind.title, kind.suffixes, kind.magic)
         check_target(path, kind.suffixes[0])
-        module = importlib.import_module(f"{__name__}.{kind.name}")
+        write_clip = kind.function("write_clip", __name__)
         is_rounded = kind.name in SINGLES and motion.dtype == np.float64
         shown = in_singles(motion, kind.name in HAVE_TRANSFORMS) if is_rounded else motion
-        facts = dict(module.write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
+        facts = dict(write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
         facts |= {"rounding": shown.rounding} if is_rounded else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
@@ -179,7 +189,7 @@ def _check_clips(motion: Any, kind: Format) -> None:
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
-        suffixes = " ".join(suffix for other in FORMATS if other.holds_several for suffix in other.suffixes)
+        suffixes = " ".join(suffix for other in formats() if other.holds_several for suffix in other.suffixes)
         raise ClipError(
             f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
             f"athcodec.open or athcodec.split), or {suffixes}, which holds all"

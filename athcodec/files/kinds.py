@@ -35,6 +35,13 @@ _PATTERNS = {kind: re.compile(pattern, re.DOTALL) for kind, (_, pattern) in _KIN
 _MDD_HEADER = struct.Struct(">ii")
 
 
+def add_kind(kind: str, suffixes: tuple[str, ...], magic: tuple[bytes, ...]) -> None:
+    """Let files of a further kind, which begin with one of `magic`, replace each other."""
+    if magic and kind not in _KINDS:
+        pattern = b"|".join(map(re.escape, magic))
+        _KINDS[kind], _PATTERNS[kind] = (suffixes, pattern), re.compile(pattern, re.DOTALL)
+
+
 def kind_by_suffix(suffix: str) -> str | None:
     """Return the kind of file that a suffix promises; None if it promises none."""
     suffix = suffix.lower()

@@ -2,7 +2,7 @@
 
 `read` finds the format by what a file begins with, then by its suffix, and imports the module of that format and no
 other. A module has one function, `read_clip(path, options) -> MotionClip`. Most formats name no branches: the clip has
-none then (see motion/branches).
+none then (see motion/branches). Other packages add formats by entry points (registry.py), which are asked last.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import importlib
 import os
 import re
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -173,6 +173,10 @@ class Format:
         Where in its files `magic` may stand.
     has_series : bool, optional
         Whether the times of its files may be in an index with the suffix .series behind theirs.
+    module : str, optional
+        The module with its `read_clip` or `write_clip`, if another package adds it.
+    package : str
+        The package that adds it; empty for athcodec's own. Its entry point sets it.
     """
 
     name: str
@@ -185,10 +189,16 @@ class Format:
     keeps: tuple[str, ...] = ()
     has_series: bool = False
     magic_places: tuple[int, ...] = (0,)
+    module: str = ""
+    package: str = ""
 
     def begins(self, head: bytes) -> bool:
         """Whether the first bytes of a file are those of this format."""
         return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
+
+    def ends(self, name: str) -> bool:
+        """Whether the suffix of a file's name, in lower case, is one of this format's."""
+        return Path(name.removesuffix(SERIES) if self.has_series else name).suffix in self.suffixes
 
     @property
     def is_installed(self) -> bool:
@@ -208,7 +218,22 @@ class Format:
         """
         missing = self._missing()
         if missing:
-            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "athcodec[{self.extra}]"')
+            package = (self.package or "athcodec") + (f"[{self.extra}]" if self.extra else "")
+            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "{package}"')
+
+    def function(self, name: str, home: str) -> Callable[..., Any]:
+        """Return a function of the format's module, which is in the package `home` if it is one of athcodec's own.
+
+        Raises ClipError if the module of another package cannot be imported or has no such function.
+        """
+        if not self.package:
+            return getattr(importlib.import_module(f"{home}.{self.name}"), name)
+        try:
+            return getattr(importlib.import_module(self.module), name)
+        except (ImportError, AttributeError) as error:
+            raise ClipError(
+                f"{self.title}: {name} of {self.module} cannot be imported: {error}; update or uninstall {self.package}"
+            ) from error
 
 
 FORMATS = (
@@ -240,6 +265,19 @@ FORMATS = (
 )
 
 
+def formats() -> Iterator[Format]:
+    """Yield the formats that can be read: athcodec's own, and then those of other packages, which are searched for only
+    if somebody asks for more."""
+    yield from FORMATS
+    yield from _others()
+
+
+def _others() -> tuple[Format, ...]:
+    from athcodec.sources.registry import registered  # It imports this module.
+
+    return registered(__name__)[len(FORMATS) :]
+
+
 def read(
     path: str | PathLike[str],
     format: str | None = None,
@@ -255,7 +293,7 @@ def read(
     path : str or path
         The file; of numbered files any one of them, or a name with # or %04d in place of the number.
     format : str, optional
-        Name of one of `athcodec.sources.FORMATS`. By default the format is found by what the file begins with, then
+        Name of one of `athcodec.sources.formats()`. By default the format is found by what the file begins with, then
         by its suffix.
     unit : str, optional
         A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
@@ -287,9 +325,9 @@ def read(
     """
     wanted = ReadOptions(**options)
     with naming_file(path):
-        kind = find_format(path) if format is None else format_named(format, FORMATS)
+        kind = find_format(path) if format is None else format_named(format, formats())
         kind.check()
-        clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
+        clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
         if clip.frame_count == 1 and not kind.has_series:
@@ -334,23 +372,40 @@ def is_pattern(path: str | PathLike[str]) -> bool:
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
-def format_named(name: str, formats: Sequence[Format]) -> Format:
+def format_named(name: str, formats: Iterable[Format]) -> Format:
     """The one of `formats` with this name. Raises ValueError."""
+    known = []
     for candidate in formats:
         if candidate.name == name:
             return candidate
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
+        known.append(candidate.name)
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(known)}")
 
 
-def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
+def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format]) -> Format:
     """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    name = Path(path).name.lower()
-    for candidate in formats:
-        if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
+    name, candidates = Path(path).name.lower(), iter(formats)
+    known: list[str] = []
+    for candidate in candidates:
+        if candidate.ends(name):
+            _warn_of_others(path, candidate, candidates)
             return candidate
-    known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
+        known += candidate.suffixes
     hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}{hint}")
+    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {' '.join(known)}{hint}")
+
+
+def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
+    """Warn if the suffix of a format of another package is that of further ones, too."""
+    name = Path(path).name.lower()
+    if chosen.package and (same := [other for other in others if other.ends(name)]):
+        names = " and ".join(f"{other.name} of {other.package}" for other in same)
+        warnings.warn(
+            f"{os.fspath(path)}: {Path(name).suffix} is taken for {chosen.name} of {chosen.package}, not for {names}; "
+            "--source-format or --format (format=) names another",
+            GuessWarning,
+            stacklevel=4,
+        )
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -372,12 +427,21 @@ def find_format(path: str | PathLike[str]) -> Format:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
-    for candidate in FORMATS:
-        if candidate.begins(head):
-            return candidate
-    if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
+    if head.startswith(ATH_MAGIC):
+        raise ClipError(f"{os.fspath(path)}: {NO_SOURCES[ATH]}")
+    for candidates in (lambda: FORMATS, _others):  # Others are searched for only if it is none of athcodec's own.
+        known = candidates()
+        if kind := _by_first_bytes(head, known):
+            return kind
+        with suppress(ClipError):
+            return format_by_suffix(path, known)
+    if hint := NO_SOURCES.get(Path(path).suffix.lower()):
         raise ClipError(f"{os.fspath(path)}: {hint}")
-    return format_by_suffix(path, FORMATS)
+    return format_by_suffix(path, formats())
+
+
+def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
+    return next((candidate for candidate in formats if candidate.begins(head)), None)
 
 
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
