@@ -147,7 +147,6 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "memory": "--help",
     "decode": "CLIP --rounds 1 --seeks 1",
     "picture": "CLIP --out OUT",
-    "smoothness": "CLIP",
     "wrappings": "--help",
 }
 
