@@ -16,7 +16,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import keeping
 from athcodec.motion.clip import DEFAULT_FPS, MotionClip, frame_rate
 from athcodec.motion.frames import Frames
-from athcodec.motion.units import unit_symbol
+from athcodec.motion.units import checked_axis, checked_unit
 
 Source: TypeAlias = Any
 """An array (frames, vertices, 3), a MotionClip, a Decoder or ClipView, or a path."""
@@ -58,8 +58,9 @@ def _clip_of_array(source: Source, given: dict[str, Any]) -> tuple[MotionClip, s
     positions, converted = _in_floats(source if is_sliced else np.asarray(source))
     rate = frame_rate({"fps": given.pop("fps", DEFAULT_FPS)})
     metadata: dict[str, Any] = {name: given.pop(name) for name in OF_FILES if name in given}
-    if "unit" in metadata:
-        metadata["unit"] = unit_symbol(metadata["unit"])
+    for name, checked in (("unit", checked_unit), ("up_axis", checked_axis)):
+        if name in metadata:
+            metadata[name] = checked(metadata[name])
     frame_count = positions.shape[0] if positions.shape else 0
     return MotionClip(positions, np.arange(frame_count) / rate, metadata=metadata, **given), converted
 

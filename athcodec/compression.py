@@ -16,7 +16,7 @@ from athcodec.arrays import OF_ARRAYS, OF_FILES, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
 from athcodec.encoding.progress import Progress
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import Length
+from athcodec.motion.units import LengthLike
 
 
 class EncodeOptions(TypedDict, total=False):
@@ -28,14 +28,14 @@ class EncodeOptions(TypedDict, total=False):
     fps: float | None
     unit: str | None
     up_axis: str | None
-    max_error: float | None
+    max_error: LengthLike | None
     rel_error: float | None
-    target_size: int | None
+    target_size: int | str | None
     ladder: str | Sequence[float]
     lossless: bool
     exact_rest: bool
     host_rest: bool
-    rest_error: float | str | Length | None
+    rest_error: LengthLike | None
     weights: str | np.ndarray | None
     attributes: str
     effort: str
@@ -68,11 +68,13 @@ def encode(
     Other Parameters
     ----------------
     faces, vertex_branch, branch_parent, fps, unit, up_axis : optional
-        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. With a
-        path, fps, unit and up_axis are those of `read`.
+        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. The unit
+        is "m", "cm", "mm", "km", "in" or "ft", the up axis "x", "y" or "z". With a path, fps, unit and up_axis are
+        those of `read`.
     max_error, rel_error, target_size : optional
-        At most one: the largest distance of any vertex in any frame from the source in scene units, the same over the
-        diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7), or the bytes that the file may take.
+        At most one: the largest distance of any vertex in any frame from the source, in scene units or as "1mm"; the
+        same over the diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7); or the bytes that the
+        file may take, a number or text such as "50kB".
     ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which decoding can stop, each held by a layer; "none", a single layer, is a
         few percent smaller, and is taken for "decades" too where it seems to be a fifth smaller. Errors below 4 bounds,
@@ -92,7 +94,8 @@ def encode(
     segment_frames, jobs : int, optional
         Longest run of frames that is decoded at once, 16 to 256; threads, which do not change the file.
     tam : Thresholds, optional
-        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows.
+        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows;
+        their lengths may have units, too.
     progress : callable, optional
         Called with the stage and the elapsed fraction of the whole time, which never falls and ends with 1.0.
 

@@ -607,7 +607,7 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it(encoded, t
     assert capsys.readouterr().err.endswith('needs pxr: pip install "athcodec[usd]"\n')
 
 
-def test_no_control_characters_of_a_file_reach_the_terminal(tmp_path, capsys):
+def test_no_control_characters_of_a_file_reach_the_terminal(tmp_path, capsys, any_unit):
     unit = "m\x1b[2J\x9b1A\u202e\x7f\a\r"
     with read_hdf5(SAMPLE) as clip:
         athcodec.encode(clip.replace(metadata=clip.metadata | {"unit": unit}), tmp_path / "a.ath")

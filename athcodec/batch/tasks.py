@@ -82,7 +82,7 @@ def begin(
         return {"kept": True, "source": source}
     with _opened(item, folder, source) as clip, keeping(clip.inputs):
         check_target(_target(item, folder), ".ath")
-        options = coding_options(item.settings, clip.metadata.get("unit"))
+        options = coding_options(item.settings)
         if _segment_count(clip, options) <= split:
             summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)
             return _done(item, source, summary, clip if verify else None, start)

@@ -33,8 +33,6 @@ from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
-from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
@@ -135,8 +133,7 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """Return the part of a file to decode: frames of a clip, or all clips."""
     level, of_one = args.level, args.clip is not None or len(decoder.file.clips) == 1
     if args.max_error is not None:
-        length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
-        level = decoder.level_within(length) if of_one else decoder.file.level_within(length)
+        level = (decoder if of_one else decoder.file).level_within(args.max_error)
     if of_one:
         return ClipView(decoder, level, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
@@ -256,22 +253,6 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
     return clip_with_branches(clip, found)
-
-
-def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
-    """The keyword of encode() that sets the bound, or the size of the file; empty for encode's own default."""
-    if args.max_error is not None:
-        return {"max_error": args.max_error.in_scene_units(unit)}
-    if args.target_size is not None:
-        return {"target_size": args.target_size}
-    return {} if args.rel_error is None else {"rel_error": args.rel_error}
-
-
-def thresholds(tam: tuple[Length, int, Length, int] | None, unit: Any) -> Thresholds | None:
-    if tam is None:
-        return None
-    epsilon, eta, xi, lam = tam
-    return Thresholds(epsilon.in_scene_units(unit), eta, xi.in_scene_units(unit), lam)
 
 
 def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:

@@ -18,7 +18,6 @@ import numpy as np
 import athcodec
 from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
-    bound,
     check_name,
     check_output,
     clip_to_encode,
@@ -29,7 +28,6 @@ from athcodec.cli.clips import (
     open_file,
     read_clip,
     refuse_broken_promises,
-    thresholds,
     tick_ratios,
     view_to_decode,
     what_is_missing,
@@ -61,6 +59,7 @@ from athcodec.files.shown import counted, echo, print_table
 from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
+from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
@@ -111,12 +110,14 @@ def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
 
 def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> Summary:
     with naming(path), progress() as report:
-        unit = clip.metadata.get("unit")
         summary = athcodec.encode(
             with_branches(clip, args.hierarchy),
             output,
             segment_frames=args.segment_frames,
-            tam=thresholds(args.tam, unit),
+            max_error=args.max_error,
+            rel_error=args.rel_error,
+            target_size=args.target_size,
+            tam=None if args.tam is None else Thresholds(*args.tam),
             exact_rest=args.exact_rest,
             rest_error=args.rest_error,
             lossless=args.lossless,
@@ -126,7 +127,6 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
             ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
-            **bound(args, unit),
             **options,
         )
     if summary.found_branches is not None:
@@ -350,15 +350,11 @@ def truncate(args: argparse.Namespace) -> int:
         check_name(args.output, ATH)
     check_output(args.output, args.input)
     with naming(args.input):
-        max_error = args.max_error
-        if max_error is not None:
-            with open_file(args.input, gltf_motion=args.gltf_motion) as decoder:
-                max_error = max_error.in_scene_units(decoder.metadata.get("unit"))
         athcodec.truncate(
             args.input,
             args.output,
             args.level,
-            max_error=max_error,
+            max_error=args.max_error,
             target_size=args.target_size,
             gltf_motion=args.gltf_motion,
         )

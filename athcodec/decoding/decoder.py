@@ -28,8 +28,10 @@ from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.transitions import transitions_of
+from athcodec.motion.units import LengthLike, length_of, scene_unit
 from athcodec.options import whole
 
+WITHIN = '; level_within("5cm") returns the level for a length'
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
 
@@ -218,13 +220,15 @@ class Decoder:
         """The stored levels, coarse to fine, with their errors in this clip."""
         return self.file.levels_in(self.clip.segments)
 
-    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
+    def level_for(
+        self, distance: LengthLike, fov: float, height: float, pixels: float = 1.0, measure: str = "max"
+    ) -> int:
         """Return the level to show at a distance.
 
         Parameters
         ----------
-        distance : float
-            Distance from the eye, in scene units.
+        distance : float or str
+            Distance from the eye, in scene units or text such as "40m".
         fov : float
             Vertical field of view, radians.
         height : float
@@ -239,15 +243,16 @@ class Decoder:
         int
             The coarsest stored level whose error is at most `pixels`; the deepest if none is.
         """
-        return self.file.core.level_for(self.clip.segments, measure, distance, fov, height, pixels)
+        length = length_of(distance, "distance").in_scene_units(scene_unit(self.metadata))
+        return self.file.core.level_for(self.clip.segments, measure, length, fov, height, pixels)
 
-    def level_within(self, max_error: float) -> int:
+    def level_within(self, max_error: LengthLike) -> int:
         """Return the coarsest stored level whose largest error in this clip is at most a length.
 
         Parameters
         ----------
-        max_error : float
-            Scene units.
+        max_error : float or str
+            Scene units, or text such as "5cm".
 
         Returns
         -------
@@ -258,8 +263,11 @@ class Decoder:
         ------
         LevelUnavailable
             If the error of the deepest level is larger.
+        BoundError
+            If it is text that is no length, or has a unit and the file states none.
         """
-        return self.file.level_within(max_error, self.clip.segments)
+        length = length_of(max_error, "max_error").in_scene_units(scene_unit(self.metadata))
+        return self.file.level_within(length, self.clip.segments)
 
     def summary(self) -> None:
         """Print the levels of the file with their bytes and errors, as `athcodec info` does."""
@@ -509,7 +517,7 @@ class Decoder:
     def _checked_level(self, level: int | None) -> int:
         if level is None:
             return self.level
-        if not 0 <= (level := whole("level", level)) < self.file.level_count:
+        if not 0 <= (level := whole("level", level, WITHIN)) < self.file.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {self.file.level_count - 1}")
         return level
 

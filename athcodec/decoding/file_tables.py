@@ -9,7 +9,7 @@ import numpy as np
 
 from athcodec.decoding import container as ct
 from athcodec.decoding.chunk_file import ChunkFile
-from athcodec.errors import ClipUnavailable, LevelUnavailable, Truncated
+from athcodec.errors import ClipUnavailable, Truncated
 from athcodec.options import whole
 
 
@@ -216,27 +216,6 @@ class FileTables(ChunkFile):
             )
             for level in range(self.level_count)
         ]
-
-    def level_within(self, max_error: float, segments: range | None = None) -> int:
-        """Return the coarsest stored level whose largest error is at most `max_error`.
-
-        Parameters
-        ----------
-        max_error : float
-            Scene units.
-        segments : range, optional
-            Numbers of segments in the whole file; by default all.
-
-        Raises
-        ------
-        LevelUnavailable
-            If the deepest level's largest error is above it.
-        """
-        segments = segments or range(self.segment_count)
-        largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
-        if not (within := np.flatnonzero(largest <= max_error)).size:
-            raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")
-        return int(within[0])
 
     @cached_property
     def errors(self) -> np.ndarray:

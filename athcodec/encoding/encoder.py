@@ -25,7 +25,10 @@ from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
-from athcodec.motion.clip import MotionClip
+from athcodec.motion.clip import ClipRange, MotionClip
+from athcodec.motion.joining import metadata_of
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, stated_scene
 from athcodec.options import DEFAULT_REL_ERROR
 
 
@@ -33,15 +36,14 @@ def encode_clip(
     clip: MotionClip,
     target: str | PathLike[str] | BinaryIO,
     *,
-    max_error: float | None = None,
+    max_error: LengthLike | None = None,
     rel_error: float | None = None,
-    target_size: int | None = None,
+    target_size: int | str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Summary:
     """Compress a clip into an .ath file: `athcodec.encode`, which documents the options, of a clip."""
-    checked = EncodingOptions.of(**options)
-    option = BoundOption(max_error, rel_error, target_size, checked.lossless)
+    option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with keeping(clip.inputs):
         _check(target)  # Refused targets cost no work.
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked))
@@ -58,6 +60,26 @@ def encode_clip(
             return summary
 
 
+def _checked(
+    clip: MotionClip,
+    max_error: LengthLike | None,
+    rel_error: float | None,
+    target_size: int | str | None,
+    *,
+    tam: Thresholds | None = None,
+    **options: Any,
+) -> tuple[BoundOption, EncodingOptions]:
+    """Return the options with lengths in the units of the clip. Raises ClipError for a clip whose unit or up axis is
+    unknown, and the errors of the options."""
+    for clip_range in clip.clip_ranges or (ClipRange("", clip.frame_count),):
+        stated_scene(metadata_of(clip.metadata, clip_range.name))
+    unit = scene_unit(clip.metadata)
+    checked = EncodingOptions.of(tam=None if tam is None else tam.in_scene_units(unit), **options)
+    length = None if max_error is None else length_of(max_error, "max_error").in_scene_units(unit)
+    size = None if target_size is None else size_of(target_size, "target_size")
+    return BoundOption(length, rel_error, size, checked.lossless), checked
+
+
 def _check(target: Any) -> None:
     """Refuse a target that cannot be written. Raises OSError, and TypeError for a file opened as text."""
     if not hasattr(target, "write"):
@@ -71,9 +93,9 @@ def _check(target: Any) -> None:
 def draft(
     clip: MotionClip,
     *,
-    max_error: float | None = None,
+    max_error: LengthLike | None = None,
     rel_error: float | None = None,
-    target_size: int | None = None,
+    target_size: int | str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Draft:
@@ -84,8 +106,7 @@ def draft(
     ClipError, BoundError, ValueError
         As `encode`.
     """
-    checked = EncodingOptions.of(**options)
-    option = BoundOption(max_error, rel_error, target_size, checked.lossless)
+    option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
         with job.refusing(bound):

@@ -24,7 +24,7 @@ from athcodec.exporters.scene_objects import face_materials, is_double_sided
 from athcodec.exporters.timing import start_frame_of
 from athcodec.motion.clip import ClipRange, stated_fps
 from athcodec.motion.joining import metadata_of
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import metres_of
 from athcodec.sources.scene_objects import FACE_MATERIAL, TWO_SIDES
 from athcodec.sources.timing import whole
 
@@ -239,7 +239,7 @@ def add_materials(glb: Glb, motion: Any) -> None:
 def root_transform(motion: Any) -> dict[str, Any]:
     """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
     metadata = motion.metadata
-    metres = METRES.get(unit_symbol(metadata.get("unit") or "m"), 1.0)
+    metres = metres_of(metadata) or 1.0
     axis = str(metadata.get("up_axis", "y")).lower()
     turn = TURNS.get(axis)
     transform = ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})

@@ -20,13 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.errors import ClipError, MissingExtra, SourceWarning
+from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import METRES, METRES_PER_UNIT, checked_axis, checked_unit, metres_of, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES
 
 # Parts of a scene that are not read and are no shapes.
@@ -71,9 +71,9 @@ class ReadOptions:
         The vertex, or one per connected component, at which branches that are derived from edges begin.
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, PVD, HDF5 and USD; by default that is refused.
-    max_memory : int, optional
-        Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
-        one file of it takes besides.
+    max_memory : int or str, optional
+        Bytes of memory that reading the source may take, or text such as "500MB"; 4 GiB by default: what of it is
+        held, and what one frame or one file of it takes besides.
 
     Raises
     ------
@@ -97,6 +97,7 @@ class ReadOptions:
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
+        object.__setattr__(self, "max_memory", size_of(self.max_memory, "max_memory"))
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
 
@@ -197,7 +198,7 @@ def read(
         by its suffix.
     unit : str, optional
         A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
-        is taken to be in it.
+        is taken to be in it, and so is, with a GuessWarning, one that states a unit which is none of these.
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
@@ -213,7 +214,8 @@ def read(
     Raises
     ------
     ClipError
-        Where the file holds no usable clip.
+        Where the file holds no usable clip, or states a unit or an up axis that is unknown; for a `unit` or `up_axis`
+        that is none of those above.
     MissingExtra
         Where a package is missing that the format needs.
     OSError
@@ -224,6 +226,8 @@ def read(
         For options that do not exist.
     """
     wanted = ReadOptions(**options)
+    unit = None if unit is None else checked_unit(unit)
+    up_axis = None if up_axis is None else checked_axis(up_axis)
     with naming_file(path):
         kind = find_format(path) if format is None else format_named(format, FORMATS)
         kind.check()
@@ -232,6 +236,7 @@ def read(
     with closing_on_failure(clip):
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
+        clip.metadata |= _stated(clip.metadata, path, unit=unit, up_axis=up_axis)
         return _in_axes(_in_units(clip, unit), up_axis)
 
 
@@ -289,16 +294,32 @@ def find_format(path: str | PathLike[str]) -> Format:
     return format_by_suffix(path, FORMATS)
 
 
+def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: str | None) -> dict[str, Any]:
+    """Return the unit and the up axis that a file states, None in place of one that is unknown and stated otherwise.
+
+    Raises ClipError for one that is unknown and not in `wanted`.
+    """
+    scene: dict[str, Any] = {}
+    for name, option in wanted.items():
+        try:
+            scene |= stated_scene({name: metadata.get(name)})
+        except ClipError as error:
+            words = f"--{name.replace('_', '-')} ({name}=)"
+            if option is None:
+                raise ClipError(f"{os.fspath(path)}: {error}; {words} says which one is meant") from None
+            warnings.warn(
+                f"{os.fspath(path)}: {error}; taken for {option!r}, as {words} says", GuessWarning, stacklevel=3
+            )
+            scene[name] = None
+    return scene
+
+
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
     if unit is None:
         return clip
-    unit = unit_symbol(unit)
-    before = unit_symbol(clip.metadata.get("unit") or unit)
-    if before != unit and not (before in METRES and unit in METRES):
-        raise ClipError(
-            f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to {unit!r}"
-        )
-    factor = 1.0 if before == unit else METRES[before] / METRES[unit]
+    metres = metres_of(clip.metadata)
+    factor = 1.0 if metres is None or clip.metadata.get("unit") == unit else metres / METRES[unit]
+    clip.metadata.pop(METRES_PER_UNIT, None)
     return _mapped(clip, np.eye(3) * factor, unit=unit)
 
 
@@ -306,12 +327,10 @@ def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
     """Turned by the right angle that takes its up axis to the wanted one."""
     if up_axis is None:
         return clip
-    up_axis = up_axis.lower()
-    if up_axis not in ("x", "y", "z"):
-        raise ClipError(f'up_axis: got {up_axis!r}, expected "x", "y" or "z"')
-    before, after = ("xyz".find(str(name).lower()) for name in (clip.metadata.get("up_axis", up_axis), up_axis))
+    stated = clip.metadata.get("up_axis") or up_axis
+    before, after = "xyz".find(stated), "xyz".find(up_axis)
     if before < 0:
-        raise ClipError(f'up_axis: got a clip with {clip.metadata["up_axis"]!r}, expected "x", "y" or "z"')
+        raise ClipError(f"up_axis: got a clip with {stated!r}, expected x, y or z to turn it to {up_axis!r}")
     turn = np.eye(3)
     if before != after:
         third = 3 - before - after
