@@ -16,11 +16,12 @@ from athcodec._native import WHOLE
 from athcodec.decoding import container as ct
 from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
-from athcodec.decoding.file_tables import Clip, median_rate
+from athcodec.decoding.file_tables import Clip
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.decoding.segment_decoder import SegmentDecoder
 from athcodec.decoding.static_data import StaticData
 from athcodec.errors import BadChunk, ClipError, Truncated
+from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds

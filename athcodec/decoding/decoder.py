@@ -23,9 +23,10 @@ from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
 from athcodec.decoding.facts import facts_of, print_facts
-from athcodec.decoding.file_tables import Clip, Level, median_rate
+from athcodec.decoding.file_tables import Clip, Level
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
+from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.transitions import transitions_of
 from athcodec.motion.units import LengthLike, length_of, scene_unit

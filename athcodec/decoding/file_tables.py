@@ -227,8 +227,3 @@ class FileTables(ChunkFile):
     def joins(self) -> np.ndarray:
         """How each segment goes on from the end of the one before it, (levels, segments) uint8; 0: it does not."""
         return self.core.joins()
-
-
-def median_rate(time: np.ndarray) -> float:
-    """Return the median frame rate of times in seconds, frames per second; 0 for a single frame."""
-    return float(1 / np.median(np.diff(time))) if len(time) > 1 else 0.0

@@ -22,7 +22,7 @@ from athcodec.errors import ClipError
 from athcodec.exporters.placing import origin_of
 from athcodec.exporters.scene_objects import face_materials, is_double_sided
 from athcodec.exporters.timing import start_frame_of
-from athcodec.motion.clip import ClipRange, stated_fps
+from athcodec.motion.clip import ClipRange, median_rate, stated_fps
 from athcodec.motion.joining import metadata_of
 from athcodec.motion.units import metres_of
 from athcodec.sources.scene_objects import FACE_MATERIAL, TWO_SIDES
@@ -283,8 +283,8 @@ def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
     is_loop = clip_range.loop and len(times) > 1
     extras = {"loop": True} if clip_range.loop else {}
     if len(motion.clip_ranges) > 1:
-        own_fps = 1 / np.median(np.diff(times)) if len(times) > 1 else motion.fps
-        extras |= _clock(metadata_of(motion.metadata, clip_range.name), times, own_fps)
+        fps = median_rate(times) or motion.fps
+        extras |= _clock(metadata_of(motion.metadata, clip_range.name), times, fps)
     times = times - times[0]
     if is_loop:
         times = np.append(times, times[-1] + times[-1] / (len(times) - 1))

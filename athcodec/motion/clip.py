@@ -21,6 +21,7 @@ LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
 CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
+LARGEST_RATE_SLACK = 2e-7  # Share of a rate; 29.97 and 30000 / 1001 are 1e-6 apart.
 NOT_KEPT = {
     "c": "complex array (store real and imaginary parts as two)",
     "V": "array of raw bytes (store unsigned integers)",
@@ -252,8 +253,8 @@ class MotionClip:
     @property
     def fps(self) -> float:
         """Median frame rate in frames per second; metadata["fps"] of a single frame, else 30."""
-        steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.clip_range_frames])
-        return float(1.0 / np.median(steps)) if len(steps) else frame_rate(self.metadata)
+        runs = [self.time[start:stop] for start, stop in self.clip_range_frames]
+        return median_rate(*runs) or frame_rate(self.metadata)
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
@@ -518,6 +519,22 @@ def frame_rate(metadata: Mapping[str, Any]) -> float:
     if fps is None:
         raise ClipError(f"fps: got {metadata['fps']!r}, expected a positive number")
     return fps
+
+
+def median_rate(*runs: np.ndarray) -> float:
+    """Return the frame rate of the median step in runs of times, (T,) seconds each; 0 if none has two frames.
+
+    A rate is the usual one (30, 23.976, 24000 / 1001) that the times were computed from, where it is as close as the
+    rounding of the times allows to tell.
+    """
+    steps = np.concatenate([np.diff(run) for run in runs])
+    if not len(steps):
+        return 0.0
+    rate = 1.0 / float(np.median(steps))
+    rounding = 4 * rate * float(np.spacing(max(np.abs(run).max(initial=0.0) for run in runs)))
+    slack = rate * min(1e-9 + rounding, LARGEST_RATE_SLACK)
+    usual = (float(round(rate)), round(rate, 3), round(rate * 1.001) * 1000 / 1001)
+    return next((number for number in usual if 0 < number and abs(number - rate) <= slack), rate)
 
 
 def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
