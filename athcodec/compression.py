@@ -68,9 +68,8 @@ def encode(
     Other Parameters
     ----------------
     faces, vertex_branch, branch_parent, fps, unit, up_axis : optional
-        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. The unit
-        is "m", "cm", "mm", "km", "in" or "ft", the up axis "x", "y" or "z". With a path, fps, unit and up_axis are
-        those of `read`.
+        What an array does not say, as in MotionClip; by default fps is 30 and branches are found. Units are "m", "cm",
+        "mm", "km", "in" and "ft", axes "x", "y" and "z". With a path, fps, unit and up_axis are those of `read`.
     max_error, rel_error, target_size : optional
         At most one: the largest distance of any vertex in any frame from the source, in scene units or as "1mm"; the
         same over the diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7); or the bytes that the
@@ -94,8 +93,7 @@ def encode(
     segment_frames, jobs : int, optional
         Longest run of frames that is decoded at once, 16 to 256; threads, which do not change the file.
     tam : Thresholds, optional
-        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows;
-        their lengths may have units, too.
+        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows.
     progress : callable, optional
         Called with the stage and the elapsed fraction of the whole time, which never falls and ends with 1.0.
 

@@ -38,6 +38,8 @@ CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 class ChunkFile:
     """An opened file that reads its chunks and feeds them to the C core. AthFile documents the attributes."""
 
+    is_closed = False  # Whether `close` has closed the file; a file object of a caller stays open.
+
     def __init__(
         self, path: Any, strict: bool, allow_partial: bool, limits: Limits | None, gltf_motion: str | None
     ) -> None:
@@ -69,6 +71,7 @@ class ChunkFile:
         if self._closes_source:
             with self._lock:
                 self._source.close()
+                self.is_closed = True
 
     def __del__(self) -> None:
         """Close a file that nobody can read from any more, as h5py does."""

@@ -5,12 +5,11 @@ The `AthFile` behind a `Decoder` holds what all clips share, and reads and decod
 
 from __future__ import annotations
 
-import math
 import threading
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from operator import itemgetter
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy.typing as npt
 
 from athcodec.decoding import core_file
 from athcodec.decoding.affines import Affines, affines_of, residual_of
+from athcodec.decoding.array_like import ArrayLike
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
@@ -36,13 +36,16 @@ WITHIN = '; level_within("5cm") returns the level for a length'
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
 
-class Decoder:
-    """One clip of an .ath file, an array-like of shape (frames, vertices, 3); a context manager.
+class Decoder(ArrayLike):
+    """One clip of an .ath file, a read-only array of shape (frames, vertices, 3); a context manager.
 
-    Indices, `len`, iteration and `np.asarray` mean what they mean for a NumPy array, and decode only the segments of
-    frames that they need. Positions come in the source's vertex order, in scene units. Frames, segments, times and
-    errors are those of the clip, counted from its first frame. `file` has what all clips share, such as vertices,
-    levels and the rest pose. Threads may share a decoder.
+    Indices, `len` and iteration mean what they mean for a NumPy array, and decode only the segments of frames that they
+    need. Operators, NumPy's functions and the methods of its arrays (`tree * 2`, `np.mean(tree, axis=0)`, `tree.max()`)
+    decode all of it, `nbytes` bytes, each time, and return plain arrays: keep `np.asarray(tree)` where that is done
+    often. `clip` is the clip and no method. Positions come in the source's vertex order, in scene units. Frames,
+    segments, times and errors are those of the clip, counted from its first frame. `file` has what all clips share,
+    such as vertices, levels and the rest pose. Threads may share a decoder. One of a path, a URL or bytes can be
+    pickled; it opens the same file again, at the same clip and level.
 
     Parameters
     ----------
@@ -76,6 +79,9 @@ class Decoder:
     >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
     ...     grass.shape, grass[10:20].shape, grass[-1, :100].shape, grass.at_level(1)[::30].dtype
     ((150, 1400, 3), (10, 1400, 3), (100, 3), dtype('float32'))
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     (grass - grass[0]).shape, grass.T.shape, np.mean(grass, axis=(0, 1)).shape
+    ((150, 1400, 3), (3, 1400, 150), (3,))
     """
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False, level: int | None = None):
@@ -134,6 +140,9 @@ class Decoder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), closes_file=self._closes_file, level=self._level), (self.file, self.clip.name)
+
     def __repr__(self) -> str:
         name = f" {self.clip.name!r}" if self.clip.name else ""
         last = self.file.level_count - 1
@@ -151,16 +160,6 @@ class Decoder:
     def shape(self) -> tuple[int, int, int]:
         """Frames, vertices and 3."""
         return self.frame_count, self.file.vertex_count, 3
-
-    @property
-    def ndim(self) -> int:
-        """Number of dimensions, 3."""
-        return 3
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates."""
-        return math.prod(self.shape)
 
     @property
     def dtype(self) -> np.dtype:

@@ -24,6 +24,7 @@ class StaticData(FileTables):
     """A file whose static data can be read."""
 
     _rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
+    host_mesh: np.ndarray | None = None  # Positions of the host's mesh that was set, (N, 3) float32.
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
@@ -242,5 +243,6 @@ class StaticData(FileTables):
             try:
                 with self._lock:
                     self.core.set_host_mesh(positions)
+                    self.host_mesh = positions
             except core_file.CoreError as error:
                 raise self._refusal(error) from None
