@@ -15,6 +15,7 @@ import numpy.typing as npt
 from athcodec.arrays import OF_ARRAYS, OF_FILES, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
 from athcodec.encoding.progress import Progress
+from athcodec.exporters import check_ath_name
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike
 
@@ -61,7 +62,8 @@ def encode(
         An array may be anything that slices by frames: NumPy, h5py, zarr, dask. It is never read whole. Integers and
         float16 are converted, and the summary says so. A path is that of a file that `read` knows.
     target : str, path-like or binary file object, optional
-        A path gets its file when that is whole; an older .ath file is replaced, any other refused. None: return bytes.
+        A path gets its file when that is whole; an older .ath file is replaced, any other refused, as is a name of
+        another format. None: return bytes.
     **options
         Those below.
 
@@ -119,6 +121,8 @@ def encode(
     """
     if unknown := options.keys() - EncodeOptions.__annotations__.keys():
         raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
+    if isinstance(target, (str, PathLike)):
+        check_ath_name(target)
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     of_source = {name: given.pop(name) for name in (*OF_ARRAYS, *OF_FILES) if name in given}
     out = io.BytesIO() if target is None else target

@@ -10,6 +10,7 @@ from typing import Any
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
+from athcodec.exporters import check_ath_name
 from athcodec.files.atomic import check_target, new_file
 from athcodec.motion.units import LengthLike, size_of
 from athcodec.options import whole
@@ -74,7 +75,10 @@ def truncate(
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
     with AthFile(source, gltf_motion=gltf_motion) as file:
-        check_target(target, ".glb" if Path(target).suffix.lower() == ".glb" else ".ath")
+        suffix = ".glb" if Path(target).suffix.lower() == ".glb" else ".ath"
+        if suffix == ".ath":
+            check_ath_name(target)
+        check_target(target, suffix)
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:

@@ -374,7 +374,7 @@ def test_branch_plans_are_no_clips_and_say_what_they_are_for(tmp_path, capsys):
 
 FAILURES = {
     "missing source": ("encode nowhere.h5 OUT", "nowhere.h5: No such file"),
-    "missing file": ("decode nowhere.ath OUT", "nowhere.ath: No such file"),
+    "missing file": ("decode nowhere.ath out.h5", "nowhere.ath: No such file"),
     "nothing to look at": ("info nowhere.ath", "nowhere.ath: No such file"),
     "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
     "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
@@ -383,14 +383,47 @@ FAILURES = {
     "a folder to encode": (f"encode {Path(SAMPLE).parent} OUT", "is a folder, expected a file: .*`athcodec batch`"),
     "a source to show": ("info SOURCE", r"SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec encode`"),
     "a source to truncate": ("truncate SOURCE OUT --level 0", "SOURCE: is not an .ath file .it looks like HDF5."),
+    "a source to decode": ("decode SOURCE out.usda", "SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec"),
+    "a source to view": (
+        "view SOURCE --export a.html",
+        "this is not an .ath file .it looks like HDF5.; use `athcodec enc",
+    ),
+    "a source to verify": ("verify SOURCE", "SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec encode`"),
+    "an .ath file to compare with": ("verify FILE --against FILE", "FILE: is an .ath file already; `athcodec decode`"),
+    "an .ath file to decode to": (
+        "decode FILE OUT",
+        "OUT: is the name of an .ath file, .* `athcodec truncate` shortens",
+    ),
+    "another format to encode to": (
+        "encode SOURCE a.h5",
+        "a.h5: is a name for HDF5, expected .* .ath; `athcodec decode`",
+    ),
+    "textures to encode to": (
+        "encode SOURCE a.vat",
+        "a.vat: is a name for vertex animation .* .ath; `athcodec decode`",
+    ),
+    "another format to truncate to": (
+        "truncate FILE a.USDC --level 0",
+        "a.USDC: is a name for USD, expected .* .ath; ",
+    ),
+    "HDF5 to put a motion into": (
+        "encode SOURCE --into x.glb",
+        "SOURCE: is no GLB .it looks like HDF5., expected an animated one for --into; `athcodec encode SOURCE .*f.ath` "
+        "makes an .ath file of it, and `athcodec decode .* x.glb` a GLB of that",
+    ),
+    "an .ath file to put a motion into": (
+        "encode FILE --into x.glb",
+        "FILE: is no GLB .it looks like .ath., expected an animated one for --into; `athcodec decode FILE x.glb` write",
+    ),
+    "HDF5 as glTF": ("encode SOURCE OUT --source-format gltf", "SOURCE: got HDF5, expected glTF: a GLB or JSON"),
     "several to view": ("view FILE FILE --export a.html", "view: got 2 files, expected one; --export DIR"),
     "no page": ("view FILE --export a.txt", "--export: got a.txt, expected PAGE.html, or a folder"),
     "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
     "a folder": ("decode FILE .", "got a directory, expected a file name"),
     "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
-    "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
-    "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
-    "beyond the levels": ("decode FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
+    "beyond the frames": ("decode FILE out.h5 --frames 100:121", r"FILE: .*100:121.*120"),
+    "no frames": ("decode FILE out.h5 --frames 7:7", "FILE: .*7:7"),
+    "beyond the levels": ("decode FILE out.h5 --level 6", "FILE: .*got 6.*0 to 4"),
     "truncate beyond the levels": ("truncate FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
     "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
     "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),

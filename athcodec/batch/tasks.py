@@ -233,7 +233,7 @@ def one_line(error: BaseException) -> str:
     """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
         return redacted(f"{error.filename}: {error.strerror}")
-    text = " ".join(redacted(str(error)).split())
+    text = " ".join(redacted(error.for_shell if isinstance(error, AthError) else str(error)).split())
     return text if text and isinstance(error, (AthError, OSError)) else f"{type(error).__name__}: {text}"
 
 

@@ -245,7 +245,7 @@ def one_line(error: Exception) -> str:
     """Return what went wrong in one line. An error that nobody foresaw is named by its class."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    text = " ".join(str(error).split())
+    text = " ".join((error.for_shell if isinstance(error, AthError) else str(error)).split())
     foreseen = isinstance(error, (AthError, OSError))
     return text if foreseen and text else f"{type(error).__name__}: {text} (--debug shows where)"
 

@@ -234,9 +234,11 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace, quiet: bool) -> int:
+    from athcodec.exporters import format_to_write
     from athcodec.sources import listed
 
     check_output(args.output, args.input, args.host_mesh, suffix="" if args.format else None)
+    format_to_write(args.output, args.format)  # An unknown one is refused before there is work.
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
         names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
@@ -274,7 +276,7 @@ def _goes_back(args: argparse.Namespace) -> bool:
 
 def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written:
     """In the format that is asked for; several are those of a GLB, to go back into it."""
-    from athcodec import exporters, sources
+    from athcodec import exporters
     from athcodec.files.gltf.motion import GltfMotion
 
     motion = motions[0]
@@ -283,7 +285,7 @@ def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written
 
         write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
-    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
+    name = exporters.format_to_write(args.output, args.format).name
     how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)

@@ -8,6 +8,7 @@ None, or what there is to know of the files: see Written.
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from os import PathLike
@@ -22,8 +23,9 @@ from athcodec.errors import ClipError
 from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
+from athcodec.files.kinds import kind_by_suffix
 from athcodec.options import whole
-from athcodec.sources import Format, format_by_suffix, format_named
+from athcodec.sources import ATH, Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
 Progress = Callable[[float], None]
@@ -152,7 +154,7 @@ def write(
     """
     wanted = WriteOptions(**options)
     motion = ClipView(motion) if isinstance(motion, Decoder) else motion
-    kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
+    kind = format_to_write(path, format)
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
         raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
@@ -172,6 +174,33 @@ def write(
         facts[NOT_WRITTEN] = lost
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
+
+
+def format_to_write(path: str | PathLike[str], format: str | None = None) -> Format:
+    """Return the format of FORMATS with a name, or else with the suffix of a path. Raises ClipError, ValueError."""
+    if format is not None:
+        return format_named(format, FORMATS)
+    if Path(path).suffix.lower() == ATH:
+        raise ClipError(
+            f"{os.fspath(path)}: is the name of an .ath file, expected that of another format",
+            python="athcodec.encode writes .ath files, athcodec.truncate shortens them",
+            shell="`athcodec encode` writes .ath files, `athcodec truncate` shortens them",
+        )
+    return format_by_suffix(path, FORMATS)
+
+
+def check_ath_name(path: str | PathLike[str]) -> None:
+    """Raise ClipError for a path whose suffix promises another format than that of .ath files; others are left to their
+    users."""
+    suffix = Path(path).suffix.lower()
+    title = next((kind.title for kind in FORMATS if suffix in kind.suffixes), None)
+    promised = kind_by_suffix(suffix) or title
+    if promised not in (None, ATH):
+        raise ClipError(
+            f"{os.fspath(path)}: is a name for {promised}, expected one that ends in {ATH}",
+            python="athcodec.write writes other formats, of a clip or a decoder",
+            shell="`athcodec decode` writes other formats, of an .ath file",
+        )
 
 
 def _check_clips(motion: Any, kind: Format) -> None:

@@ -30,7 +30,11 @@ _KINDS = {
     "JSON": ((".json",), rb"\s*[{\[]"),
     "OBJ or PLY": ((".obj", ".ply"), rb"ply\r?\n|[^\0]*?(?m:^v[ \t]+[-+.\d])"),
     "MDD": ((".mdd",), rb"(?!)"),  # The length of the file tells this kind.
+    "MTG": ((".mtg",), rb"(?!)"),  # Its text is that of any table.
 }
+SOURCES = ("HDF5", "NumPy archive", "USD", "glTF", "Alembic", "PC2", "XDMF", "VTK", "OBJ or PLY", "MDD")
+"""Kinds of files that `athcodec.encode` reads."""
+
 _PATTERNS = {kind: re.compile(pattern, re.DOTALL) for kind, (_, pattern) in _KINDS.items()}
 _MDD_HEADER = struct.Struct(">ii")
 
@@ -46,9 +50,13 @@ def kind_of(path: FilePath) -> str:
     OSError."""
     try:
         with open_plain(path) as file:
-            head, length = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
+            return kind_of_bytes(file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size)
     except OSError as error:
         raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def kind_of_bytes(head: bytes, length: int) -> str:
+    """Return the kind of a file, as `kind_of`, by its first HEAD_BYTES and its length."""
     match = next((kind for kind, pattern in _PATTERNS.items() if pattern.match(head)), None)
     if match is None and len(head) >= _MDD_HEADER.size:
         frames, vertices = _MDD_HEADER.unpack_from(head)

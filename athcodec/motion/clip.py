@@ -7,6 +7,7 @@ larger than memory works. It knows no file format and derives no hierarchy (see 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -530,7 +531,10 @@ def median_rate(*runs: np.ndarray) -> float:
     steps = np.concatenate([np.diff(run) for run in runs])
     if not len(steps):
         return 0.0
-    rate = 1.0 / float(np.median(steps))
+    step = float(np.median(steps))
+    rate = 1.0 / step if step > 1.0 / LARGEST_COORDINATE else math.inf
+    if rate == math.inf:
+        return rate
     rounding = 4 * rate * float(np.spacing(max(np.abs(run).max(initial=0.0) for run in runs)))
     slack = rate * min(1e-9 + rounding, LARGEST_RATE_SLACK)
     usual = (float(round(rate)), round(rate, 3), round(rate * 1.001) * 1000 / 1001)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
-from athcodec.files.kinds import HEAD_BYTES
+from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
@@ -40,9 +40,18 @@ MEANINGS = {
 }
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
-    ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
-    ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
+    ATH: (
+        "is an .ath file already",
+        "athcodec.open opens it, athcodec.write writes other formats of that, athcodec.truncate leaves levels out",
+        "`athcodec decode` writes other formats, `athcodec truncate` fewer levels",
+    ),
+    ".mtg": (
+        "holds branches and no motion (MTG)",
+        "the command `athcodec encode` takes it as --hierarchy of the clip of the same plant",
+        "encode the clip of the same plant, with --hierarchy and this file",
+    ),
 }
+"""What is no source, by its suffix: what it is, and what to do with it in Python and on the command line."""
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
 
 
@@ -262,14 +271,16 @@ def format_named(name: str, formats: Sequence[Format]) -> Format:
     raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
 
 
-def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
-    """The first of `formats` that has the suffix of a path. Raises ClipError."""
+def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format], content: str = UNKNOWN) -> Format:
+    """The first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
+    ClipError."""
     suffix = Path(path).suffix.lower()
     for candidate in formats:
         if suffix in candidate.suffixes:
             return candidate
     known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}")
+    looks = "" if content == UNKNOWN else f" (it looks like {content})"
+    raise ClipError(f"{os.fspath(path)}: got an unknown format{looks}, expected one of {known}")
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -289,9 +300,10 @@ def find_format(path: str | PathLike[str]) -> Format:
     for candidate in FORMATS:
         if head.startswith(candidate.magic or ()):
             return candidate
-    if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
-        raise ClipError(f"{os.fspath(path)}: {hint}")
-    return format_by_suffix(path, FORMATS)
+    if words := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
+        message, python, shell = words
+        raise ClipError(f"{os.fspath(path)}: {message}", python=python, shell=shell)
+    return format_by_suffix(path, FORMATS, "" if is_pattern(path) else kind_of(path))
 
 
 def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: str | None) -> dict[str, Any]:
