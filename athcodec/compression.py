@@ -62,8 +62,7 @@ def encode(
         An array may be anything that slices by frames: NumPy, h5py, zarr, dask. It is never read whole. Integers and
         float16 are converted, and the summary says so. A path is that of a file that `read` knows.
     target : str, path-like or binary file object, optional
-        A path gets its file when that is whole; an older .ath file is replaced, any other refused, as is a name of
-        another format. None: return bytes.
+        A path gets its file when that is whole; other files and names of other formats are refused. None: return bytes.
     **options
         Those below.
 

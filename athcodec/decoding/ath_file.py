@@ -24,7 +24,7 @@ from athcodec.decoding.segment_decoder import SegmentDecoder
 from athcodec.decoding.static_data import StaticData
 from athcodec.errors import BadChecksum, BadChunk, ClipError, Truncated
 from athcodec.files.atomic import is_url
-from athcodec.files.shown import redacted
+from athcodec.files.shown import counted, redacted
 from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.motion.presence import stated_presence
@@ -122,6 +122,13 @@ class AthFile(StaticData, SegmentDecoder):
         except BaseException:
             self.close()
             raise
+
+    def __repr__(self) -> str:
+        return (
+            f"<AthFile {self.name!r}: {counted(self.vertex_count, 'vertex', 'vertices')} on "
+            f"{counted(self.branch_count, 'branch', 'branches')}, {counted(self.frame_count, 'frame')} in "
+            f"{counted(len(self.clips), 'clip')}, {counted(self.level_count, 'level')}, {self.file_length:,} bytes>"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.is_closed:

@@ -83,6 +83,12 @@ class ChunkFile:
             self._source.close()
 
     @property
+    def name(self) -> str:
+        """The path or URL of the file, or the name of a file object; "file" if it has none."""
+        stated = self._name or getattr(self._source, "name", None)
+        return stated if isinstance(stated, str) and stated else "file"
+
+    @property
     def source(self) -> Any:
         """The file object that the bytes come from. That of a URL counts its `requests` and `bytes`."""
         return self._source

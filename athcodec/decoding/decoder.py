@@ -22,10 +22,11 @@ from athcodec.decoding.array_like import ArrayLike
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
 from athcodec.decoding.endless_play import EndlessPlay
-from athcodec.decoding.facts import facts_of, print_facts
+from athcodec.decoding.facts import facts_of, parts_of
 from athcodec.decoding.file_tables import Clip, Level
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
+from athcodec.files.shown import Report
 from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.transitions import transitions_of
@@ -154,6 +155,9 @@ class Decoder(ArrayLike):
             f"{shown.max_error:.3g}{f' {unit}' if unit else ''}>"
         )
 
+    def _repr_html_(self) -> str:
+        return Report(parts_of(facts_of(self.file.name, self)))._repr_html_()
+
     # ---- the array ----
 
     @property
@@ -269,9 +273,15 @@ class Decoder(ArrayLike):
         length = length_of(max_error, "max_error").in_scene_units(scene_unit(self.metadata))
         return self.file.level_within(length, self.clip.segments)
 
-    def summary(self) -> None:
-        """Print the levels of the file with their bytes and errors, as `athcodec info` does."""
-        print_facts(facts_of(str(getattr(self.file.source, "name", None) or "file"), self))
+    def summary(self) -> str:
+        """Return what `athcodec info` prints: the levels of the file with their bytes and errors.
+
+        Returns
+        -------
+        str
+            Lines of text, which a Python prompt shows as they are printed, and a notebook as tables.
+        """
+        return Report(parts_of(facts_of(self.file.name, self)))
 
     # ---- motion ----
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -71,7 +71,7 @@ class Clip:
     segment_count: int
     loop: bool
     duration: float
-    seam_errors: tuple[float, ...]
+    seam_errors: tuple[float, ...] = field(repr=False)
 
     @property
     def segments(self) -> range:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from athcodec.files.shown import counted
 from athcodec.files.threads import SERIAL, ThreadPool
 from athcodec.motion.affine_fit import Differences, Pieces, seen_from
 from athcodec.motion.algebra import largest_distance, length, multiply
@@ -45,7 +46,7 @@ class Gaps(NamedTuple):
     rms: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ath:
     """An affine transform hierarchy; `build_ath` makes it (Song, Yang and Peng 2011, section 3).
 
@@ -74,6 +75,10 @@ class Ath:
     node_parent: np.ndarray
     node_depth: np.ndarray
     whole: np.ndarray
+
+    def __repr__(self) -> str:
+        leaves = int((~self.is_inner).sum())
+        return f"<Ath: depth {self.height + 1}, {counted(self.node_count, 'node')}, {leaves:,} without children>"
 
     @property
     def node_count(self) -> int:

@@ -97,7 +97,7 @@ FORMATS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Written:
     """The result of `write`.
 
@@ -113,6 +113,12 @@ class Written:
 
     files: tuple[Path, ...]
     facts: dict[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        first, *others = map(os.fspath, self.files)
+        names = f"{1 + len(others):,} files, {first!r} to {others[-1]!r}" if others else repr(first)
+        facts = "".join(f", {name} {value:.3g}" for name, value in self.facts.items() if isinstance(value, float))
+        return f"<Written: {names}{facts}>"
 
 
 def write(

@@ -17,6 +17,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
+from athcodec.files.shown import counted
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
@@ -34,7 +35,7 @@ RESERVED_NAMES = frozenset(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Skin:
     """The joints that move a clip's vertices, as far as the source states them; only finding branches uses them.
 
@@ -51,6 +52,9 @@ class Skin:
     joint_parent: np.ndarray
     vertex_joint: np.ndarray
     names: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        return f"<Skin: {counted(len(self.joint_parent), 'joint')} of {len(self.vertex_joint):,} vertices>"
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,7 @@ class MotionClip:
     >>> positions = np.zeros((60, 20, 3), np.float32)
     >>> positions[..., 1] = np.linspace(0, 2, 20)  # a stem that stands still
     >>> athcodec.MotionClip(positions, np.arange(60) / 30, vertex_branch=np.zeros(20, int), branch_parent=[-1])
-    MotionClip(60 frames, 20 vertices, 1 branches, float32)
+    MotionClip(60 frames, 20 vertices, 1 branch, float32)
     """
 
     positions: Any
@@ -175,8 +179,9 @@ class MotionClip:
         self.check()
 
     def __repr__(self) -> str:
-        branches = f"{self.branch_count} branches" if self.has_branches else "branches unknown"
-        return f"MotionClip({self.frame_count} frames, {self.vertex_count} vertices, {branches}, {self.dtype})"
+        branches = counted(self.branch_count, "branch", "branches") if self.has_branches else "branches unknown"
+        frames, vertices = counted(self.frame_count, "frame"), counted(self.vertex_count, "vertex", "vertices")
+        return f"MotionClip({frames}, {vertices}, {branches}, {self.dtype})"
 
     def __enter__(self) -> MotionClip:
         return self
