@@ -58,6 +58,10 @@ class GuessWarning(SourceWarning):
     """What a source means was guessed; the message says what was taken for what, and how to say otherwise."""
 
 
+class BoundWarning(UserWarning):
+    """An error bound is so large a part of the plant that little of its motion may be left."""
+
+
 class BoundError(AthError, ValueError):
     """An error bound or target size cannot be kept."""
 

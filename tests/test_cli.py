@@ -197,11 +197,16 @@ def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsy
         sample_path("oak")
 
 
-def test_the_page_of_the_demo_shows_the_leafed_tree(tmp_path, capsys):
+def test_the_page_of_the_demo_shows_the_plant_of_its_table(tmp_path, capsys):
     assert run("demo", "--keep", tmp_path) == 0
-    assert "leafed_tree.ath moves in " in capsys.readouterr().out
-    data = base64.b64encode(sample_path("leafed").read_bytes()).decode()
-    assert data in (tmp_path / "athcodec_demo.html").read_text()
+    data, out = (tmp_path / "tree_1k_120f.ath").read_bytes(), capsys.readouterr().out
+    assert f"{len(data):,} bytes; the positions" in out and "It moves in " in out
+    [shown] = re.findall(r'id="ath-file"[^>]*>([^<]*)<', (tmp_path / "athcodec_demo.html").read_text())
+    assert base64.b64decode(shown) == data
+    assert f"`athcodec view {sample_path('leafed')}` shows one with leaves" in out
+
+
+def test_the_leafed_sample_is_whole_and_holds_two_loops():
     with athcodec.open(sample_path("leafed"), strict=True) as decoder:
         clips = [(clip.name, clip.loop, clip.frame_count) for clip in decoder.file.clips]
         assert clips == [("calm", True, 150), ("gale", True, 150)]

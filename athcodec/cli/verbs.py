@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -485,14 +486,14 @@ def demo(args: argparse.Namespace) -> int:
         floor = (
             {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()} if args.sample == "tree" else None
         )
-        shown = athcodec.sample_path("leafed") if floor else encoded
-        made = _export_demo(shown, page, floor)
+        made = _export_demo(encoded, page, floor)
         if args.json:
             print_json(facts | {"page": str(page) if made else None})
             return 0
         print_demo(facts, summary.max_error_bound / summary.relative_bound)
         if made:
-            echo(f"{shown.name} moves in {page}: open it in a browser.")
+            leafed = shlex.quote(str(athcodec.sample_path("leafed")))
+            echo(f"It moves in {page}: open it in a browser. `athcodec view {leafed}` shows one with leaves.")
         if args.keep is not None:
             echo(f"The file and its decoded levels are in {folder}.")
     return 0

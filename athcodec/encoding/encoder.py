@@ -10,6 +10,7 @@ import io
 import itertools
 import shutil
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator
 from os import PathLike
 from typing import Any, BinaryIO, cast
@@ -23,6 +24,7 @@ from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress,
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
+from athcodec.errors import BoundWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.clip import ClipRange, MotionClip
@@ -57,7 +59,8 @@ def encode_clip(
             if path is None:
                 out.seek(0)
                 shutil.copyfileobj(out, cast(BinaryIO, target))
-            return summary
+        _object(job, option, bound)
+        return summary
 
 
 def _checked(
@@ -110,7 +113,9 @@ def draft(
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
         with job.refusing(bound):
-            return job.draft(job.decide(bound))
+            made = job.draft(job.decide(bound))
+    _object(job, option, bound)
+    return made
 
 
 def code_segments(
@@ -207,7 +212,14 @@ def _begin(
         report("size", attempt / (attempt + 4))
         return size
 
-    return job, option.in_scene_units(job.source, file_size)
+    bound = option.in_scene_units(job.source, file_size)
+    return job, bound
+
+
+def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
+    """Warn the caller of `encode` of a bound that was kept and is coarse."""
+    if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
+        warnings.warn(objection, BoundWarning, stacklevel=4)
 
 
 def _weighted_progress(
