@@ -58,8 +58,9 @@ class GuessWarning(SourceWarning):
     """What a source means was guessed; the message says what was taken for what, and how to say otherwise."""
 
 
-class BoundWarning(UserWarning):
-    """An error bound is so large a part of the plant that little of its motion may be left."""
+class CoarseWarning(UserWarning):
+    """An error is so large a part of the plant that little of its motion may be left: that of a bound which was asked
+    for, or that of a skeleton."""
 
 
 class BoundError(AthError, ValueError):

@@ -23,7 +23,7 @@ import athcodec
 from athcodec import cli
 from athcodec.encoding import job, streams
 from athcodec.encoding import quantise as qz
-from athcodec.errors import BoundError, BoundWarning, ClipError
+from athcodec.errors import BoundError, ClipError, CoarseWarning
 from athcodec.metrics import ErrorMeter
 
 
@@ -249,7 +249,7 @@ BRANCH = {"vertex_branch": [0] * 20, "branch_parent": [-1], "effort": "fast", "u
     ids=str,
 )
 def test_a_bound_that_is_a_large_part_of_the_plant_is_said_to_be_that(options, message, tmp_path, capsys):
-    with pytest.warns(BoundWarning, match=message) as caught:
+    with pytest.warns(CoarseWarning, match=message) as caught:
         athcodec.encode(STEM, **BRANCH | options)
     assert [warning.filename for warning in caught] == [__file__]
     if "max_error" in options:

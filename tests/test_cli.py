@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import warnings
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -211,6 +212,18 @@ def test_the_leafed_sample_is_whole_and_holds_two_loops():
         clips = [(clip.name, clip.loop, clip.frame_count) for clip in decoder.file.clips]
         assert clips == [("calm", True, 150), ("gale", True, 150)]
         assert decoder.file.complete and decoder.file.faces is not None
+
+
+def test_a_skeleton_that_is_far_off_is_warned_of_with_what_to_do(encoded, tmp_path, capsys):
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert run("decode", encoded, tmp_path / "a.glb", "--rig", 2, "--level", 2) == 0
+    assert re.fullmatch(
+        r"athcodec: warning: .*a.glb: the skeleton is off by [\d.]+ m, [\d.]+ % of the diagonal of the rest pose; "
+        r"expected at most 1 %: more joints come closer, such as --rig 8 \(rig=8\); without a skeleton the vertices .*\n",
+        capsys.readouterr().err,
+    )
+    assert run("decode", encoded, tmp_path / "a.glb", "--rig", "--level", 2) == 0 and capsys.readouterr().err == ""
 
 
 # ---- damaged files ----

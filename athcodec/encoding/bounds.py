@@ -10,11 +10,8 @@ from typing import Any
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
-from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, LADDERS, LOSSLESS_REL_ERROR
+from athcodec.options import COARSE_SHARE, DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 
-# Share of the diagonal: the largest error that the default ladder has a layer for. On a screen where the plant is 1,000
-# pixels high, vertices stray by more than 10.
-COARSE_SHARE = max(LADDERS[DEFAULT_LADDER])
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
 SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
 

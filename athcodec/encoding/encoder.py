@@ -24,7 +24,7 @@ from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress,
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
-from athcodec.errors import BoundWarning
+from athcodec.errors import CoarseWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.clip import ClipRange, MotionClip
@@ -219,7 +219,7 @@ def _begin(
 def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
     """Warn the caller of `encode` of a bound that was kept and is coarse."""
     if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
-        warnings.warn(objection, BoundWarning, stacklevel=4)
+        warnings.warn(objection, CoarseWarning, stacklevel=4)
 
 
 def _weighted_progress(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from os import PathLike
@@ -19,12 +20,12 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, CoarseWarning
 from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.files.kinds import kind_by_suffix
-from athcodec.options import whole
+from athcodec.options import COARSE_SHARE, whole
 from athcodec.sources import ATH, Format, format_by_suffix, format_named
 
 Report = Callable[[str, float], None]
@@ -54,7 +55,8 @@ class WriteOptions:
         mesh, where transforms are off by no more than the level is; else, and by default, as vertices.
     rig : int, optional
         For USD and glTF: a skeleton for engines, with so many joints at most besides its root, in place of vertices. It
-        is as close as that many allow; `Written` says how close.
+        is as close as that many allow; `Written` says how close, and a CoarseWarning where that is above 1 % of the
+        rest pose's diagonal.
     nanite : bool, optional
         For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
         the joints, and the JSON of Dynamic Wind beside it.
@@ -178,8 +180,29 @@ def write(
         facts |= {"rounding": shown.rounding} if is_rounded else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
+    if wanted.rig is not None:
+        _object_to_rig(motion, path, wanted.rig, facts)
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
+
+
+def _object_to_rig(motion: Any, path: str | PathLike[str], most: int, facts: dict[str, Any]) -> None:
+    """Warn the caller of `write` of a skeleton that is far off the motion."""
+    diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
+    if not error > COARSE_SHARE * diagonal > 0:
+        return
+    unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
+    advice = "more joints come no closer to this motion"
+    if facts["joints"] >= most < MOST_RIGGED:
+        more = min(4 * most, MOST_RIGGED)
+        advice = f"more joints come closer, such as --rig {more} (rig={more})"
+    warnings.warn(
+        f"{os.fspath(path)}: the skeleton is off by {error:.3g}{unit}, {100 * error / diagonal:.2g} % of the diagonal "
+        f"of the rest pose; expected at most {100 * COARSE_SHARE:g} %: {advice}; without a skeleton the vertices "
+        "themselves are written",
+        CoarseWarning,
+        stacklevel=3,
+    )
 
 
 def format_to_write(path: str | PathLike[str], format: str | None = None) -> Format:
