@@ -226,6 +226,16 @@ def test_a_skeleton_that_is_far_off_is_warned_of_with_what_to_do(encoded, tmp_pa
     assert run("decode", encoded, tmp_path / "a.glb", "--rig", "--level", 2) == 0 and capsys.readouterr().err == ""
 
 
+def test_packing_the_extension_for_blender_without_a_wheel_says_how_to_make_one(tmp_path, capsys):
+    from athcodec.blender.build import main
+
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "a.zip")])
+    assert (
+        "wheels: got none, expected one of athcodec for each platform; in a clone `pip wheel" in capsys.readouterr().err
+    )
+
+
 # ---- damaged files ----
 
 
