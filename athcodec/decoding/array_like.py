@@ -67,9 +67,17 @@ class ArrayLike(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if any(isinstance(out, ArrayLike) for out in options.get("out", ())):
-            raise TypeError(f"{type(self).__name__}: got it for a result; expected an array, because it is read-only")
-        arrays = (np.asarray(value) if isinstance(value, ArrayLike) else value for value in inputs)
-        return getattr(ufunc, method)(*arrays, **options)
+            raise TypeError(f"out: got a {type(self).__name__}, which is read-only; expected an array")
+        return getattr(ufunc, method)(*map(_decoded, inputs), **options)
+
+    # NumPy compares arrays with what has no numbers, too.
+    def __eq__(self, other: Any) -> Any:
+        return np.asarray(self) == _decoded(other)
+
+    def __ne__(self, other: Any) -> Any:
+        return np.asarray(self) != _decoded(other)
+
+    __hash__ = None  # type: ignore[assignment]  # As of an array: its items are compared, not itself.
 
     def __contains__(self, item: Any) -> bool:
         return item in np.asarray(self)
@@ -121,3 +129,8 @@ class ArrayLike(NDArrayOperatorsMixin):
             """Raise AttributeError, which names the way to what only a whole array has: `sort`, `strides` ..."""
             hint = "; np.asarray of it has" if not name.startswith("_") and hasattr(np.ndarray, name) else ""
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}", name=name, obj=self)
+
+
+def _decoded(value: Any) -> Any:
+    """Return the array of an ArrayLike; anything else as it is."""
+    return np.asarray(value) if isinstance(value, ArrayLike) else value

@@ -47,7 +47,7 @@ NO_SOURCES = {
     ),
     ".mtg": (
         "holds branches and no motion (MTG)",
-        "the command `athcodec encode` takes it as --hierarchy of the clip of the same plant",
+        "encode the clip of the same plant by `athcodec encode`, with --hierarchy and this file",
         "encode the clip of the same plant, with --hierarchy and this file",
     ),
 }
