@@ -70,14 +70,14 @@ class ArrayLike(NDArrayOperatorsMixin):
             raise TypeError(f"out: got a {type(self).__name__}, which is read-only; expected an array")
         return getattr(ufunc, method)(*map(_decoded, inputs), **options)
 
-    # NumPy compares arrays with what has no numbers, too.
+    # The ufuncs behind == refuse what has no numbers, such as text; arrays do not.
     def __eq__(self, other: Any) -> Any:
         return np.asarray(self) == _decoded(other)
 
     def __ne__(self, other: Any) -> Any:
         return np.asarray(self) != _decoded(other)
 
-    __hash__ = None  # type: ignore[assignment]  # As of an array: its items are compared, not itself.
+    __hash__ = None  # type: ignore[assignment]  # Arrays have none, because == compares their items.
 
     def __contains__(self, item: Any) -> bool:
         return item in np.asarray(self)
