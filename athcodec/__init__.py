@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.encoding import Summary
     from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
-    from athcodec.motion.branches.finding import find_branches
+    from athcodec.finding import find_branches
     from athcodec.motion.branches.result import Found
     from athcodec.motion.clip import MotionClip
     from athcodec.motion.joining import in_wind, join, looped, split
@@ -60,7 +60,7 @@ _LAZY = {
     "decoding.clip_view": ("ClipView",),
     "decoding.decoder": ("Decoder",),
     "opening": ("open",),
-    "motion.branches.finding": ("find_branches",),
+    "finding": ("find_branches",),
     "motion.branches.result": ("Found",),
     "comparison": ("Comparison", "compare"),
     "compression": ("encode",),

@@ -256,7 +256,7 @@ answer({
   weights,
   blended: digest(file.blended(shares)),
   alone: same(file.blended(alone), file.positions(segments, shares[1].frame)),
-  missing: file.blended([{ segments: [], frame: 0, weight: 1 }]),
+  missing: thrown(() => file.blended([shares[0], { segments: [], frame: file.clips[1].firstFrame, weight: 1 }])),
   refused: [() => file.blended([]), () => file.blended([{ ...shares[0], weight: -1 }]),
             () => file.blended([...shares, ...shares])].map((call) => thrown(call) !== null),
 });
@@ -270,4 +270,5 @@ def test_webassembly_blends_to_the_same_bits(tree_ath, tmp_path):
         weights = decoder.wind_weights(5, 45)
         assert shown["weights"] == list(weights.values())
         assert shown["blended"] == digest(decoder.blended(weights, 0.55))
-    assert shown["alone"] and shown["missing"] is None and shown["refused"] == [True, True, True]
+    assert shown["alone"] and shown["refused"] == [True, True, True]
+    assert shown["missing"]["codeName"] == "NOT_PREPARED" and "got no segment, expected" in shown["missing"]["message"]

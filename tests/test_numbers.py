@@ -223,7 +223,7 @@ def test_frames_of_integers_that_numpy_has_no_common_type_for_are_frames(made):
     assert (made.decoder[[np.uint64(7), -1]] == made.decoder[[7, FRAMES - 1]]).all()
 
 
-@pytest.mark.parametrize("value", ["0.1", np.array(["0.1"]), 1j, np.complex64(1), True, np.bool_(1), np.array([0.1])])
+@pytest.mark.parametrize("value", [b"0.1", np.array(["0.1"]), 1j, np.complex64(1), True, np.bool_(1), np.array([0.1])])
 def test_what_is_no_number_is_refused_by_name(value):
     with pytest.raises(TypeError, match="max_error: got .*expected a number"):
         encoded(max_error=value)

@@ -27,7 +27,7 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.motion.positions import parse_order, written
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import parse_length, parse_size
+from athcodec.motion.units import AXES, METRES, parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
 from athcodec.sources import format_named, formats
 
@@ -154,23 +154,14 @@ def reading_options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def coding_options(settings: Settings, unit: Any) -> dict[str, Any]:
-    """Keywords of athcodec.encode, for a clip whose metadata says `unit`. Raises BoundError."""
+def coding_options(settings: Settings) -> dict[str, Any]:
+    """Keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:
         options["host_rest"] = True
-    if "max_error" in options:
-        options["max_error"] = _length(options["max_error"], unit)
-    if "target_size" in options:
-        options["target_size"] = parse_size(str(options["target_size"]))
     if "tam" in options:
-        epsilon, eta, xi, lam = options["tam"]
-        options["tam"] = Thresholds(_length(epsilon, unit), eta, _length(xi, unit), lam)
+        options["tam"] = Thresholds(*options["tam"])
     return options
-
-
-def _length(value: float | str, unit: Any) -> float:
-    return parse_length(str(value)).in_scene_units(unit)
 
 
 def _positive_length(value: Any) -> float | str:
@@ -295,8 +286,8 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "takes": _patterns,
     "allow_outside": _BOOL,
     "max_memory": _size,
-    "unit": _TEXT,
-    "up_axis": _one_of("x", "y", "z"),
+    "unit": _one_of(*METRES),
+    "up_axis": _one_of(*AXES),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
     "strength": _finite,

@@ -71,7 +71,7 @@ def begin(
         return {"kept": True, "source": source}
     with _opened(item, folder, source) as clip, keeping(clip.inputs):
         check_target(_target(item, folder), ".ath")
-        options = coding_options(item.settings, clip.metadata.get("unit"))
+        options = coding_options(item.settings)
         if _segment_count(clip, options) <= split:
             summary = athcodec.encode(clip, _target(item, folder), jobs=1, **options)
             return _done(item, source, summary, clip if verify else None, start)
@@ -221,5 +221,5 @@ def one_line(error: BaseException) -> str:
     """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
         return redacted(f"{error.filename}: {error.strerror}")
-    text = " ".join(redacted(str(error)).split())
+    text = " ".join(redacted(error.for_shell if isinstance(error, AthError) else str(error)).split())
     return text if text and isinstance(error, (AthError, OSError)) else f"{type(error).__name__}: {text}"

@@ -10,7 +10,7 @@ from typing import Any
 
 import athcodec
 from athcodec.files.shown import shown
-from athcodec.motion.units import METRES, Length, parse_length, parse_size
+from athcodec.motion.units import AXES, METRES, Length, checked_axis, checked_unit, parse_length, parse_size
 from athcodec.options import (
     DEFAULT_LADDER,
     DEFAULT_REL_ERROR,
@@ -444,8 +444,18 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(parse_size),
         help="bytes of memory that reading a source may take, such as 500MB or 16GiB (default 4GiB)",
     )
-    source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
-    source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
+    source.add_argument(
+        "--unit",
+        metavar="UNIT",
+        type=_argument(checked_unit),
+        help=f"unit of length to convert to, or that of a source without one: {', '.join(METRES)}",
+    )
+    source.add_argument(
+        "--up-axis",
+        metavar="AXIS",
+        type=_argument(checked_axis),
+        help=f"axis to turn up, or that of a source without one: {', '.join(AXES)}",
+    )
 
 
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:

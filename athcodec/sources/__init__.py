@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
-from athcodec.files.kinds import HEAD_BYTES
+from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.positions import Order, parse_order
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import METRES, METRES_PER_UNIT, checked_axis, checked_unit, metres_of, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
@@ -64,13 +64,23 @@ MEANINGS = {
 }
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
-    ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
-    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
-    **dict.fromkeys(
-        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ATH: (
+        "is an .ath file already",
+        "athcodec.open opens it, athcodec.write writes other formats of that, athcodec.truncate leaves levels out",
+        "`athcodec decode` writes other formats, `athcodec truncate` fewer levels",
     ),
-    ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
+    ".nc": ("is netCDF 3, expected netCDF 4, which is HDF5", *2 * ("`nccopy -k nc4` makes it",)),
+    **dict.fromkeys(
+        (".vti", ".vtr"),
+        ("is a grid without points of its own", *2 * ("in ParaView, Append Datasets makes it a .vtu",)),
+    ),
+    ".mtg": (
+        "holds branches and no motion (MTG)",
+        "encode the clip of the same plant by `athcodec encode`, with --hierarchy and this file",
+        "encode the clip of the same plant, with --hierarchy and this file",
+    ),
 }
+"""What is no source, by its suffix: what it is, and what to do with it in Python and on the command line."""
 _MESHES = (".obj", ".ply")
 _VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
 FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
@@ -109,9 +119,9 @@ class ReadOptions:
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
         refused.
-    max_memory : int, optional
-        Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
-        one file of it takes besides.
+    max_memory : int or str, optional
+        Bytes of memory that reading the source may take, or text such as "500MB"; 4 GiB by default: what of it is
+        held, and what one frame or one file of it takes besides.
 
     Raises
     ------
@@ -135,9 +145,10 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
-        set_numbers(self, reals=("fps",), wholes=("max_memory",))
+        set_numbers(self, reals=("fps",))
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
+        object.__setattr__(self, "max_memory", size_of(self.max_memory, "max_memory"))
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
         if self.axes is not None:
@@ -297,7 +308,7 @@ def read(
         by its suffix.
     unit : str, optional
         A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
-        is taken to be in it.
+        is taken to be in it, and so is, with a GuessWarning, one that states a unit which is none of these.
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
@@ -313,7 +324,8 @@ def read(
     Raises
     ------
     ClipError
-        Where the file holds no usable clip.
+        Where the file holds no usable clip, or states a unit or an up axis that is unknown; for a `unit` or `up_axis`
+        that is none of those above.
     MissingExtra
         Where a package is missing that the format needs.
     OSError
@@ -324,6 +336,8 @@ def read(
         For options that do not exist.
     """
     wanted = ReadOptions(**options)
+    unit = None if unit is None else checked_unit(unit)
+    up_axis = None if up_axis is None else checked_axis(up_axis)
     with naming_file(path):
         kind = find_format(path) if format is None else format_named(format, formats())
         kind.check()
@@ -334,6 +348,7 @@ def read(
             _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
+        clip.metadata |= _stated(clip.metadata, path, unit=unit, up_axis=up_axis)
         return _in_axes(_in_units(clip, unit), up_axis)
 
 
@@ -382,8 +397,9 @@ def format_named(name: str, formats: Iterable[Format]) -> Format:
     raise ValueError(f"format: got {name!r}, expected one of {', '.join(known)}")
 
 
-def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format]) -> Format:
-    """The first of `formats` that has the suffix of a path. Raises ClipError."""
+def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], content: str = UNKNOWN) -> Format:
+    """The first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
+    ClipError."""
     name, candidates = Path(path).name.lower(), iter(formats)
     known: list[str] = []
     for candidate in candidates:
@@ -391,8 +407,9 @@ def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format]) -> Fo
             _warn_of_others(path, candidate, candidates)
             return candidate
         known += candidate.suffixes
+    looks = "" if content == UNKNOWN else f" (it looks like {content})"
     hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {' '.join(known)}{hint}")
+    raise ClipError(f"{os.fspath(path)}: got an unknown format{looks}, expected one of {' '.join(known)}{hint}")
 
 
 def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
@@ -428,32 +445,53 @@ def find_format(path: str | PathLike[str]) -> Format:
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
     if head.startswith(ATH_MAGIC):
-        raise ClipError(f"{os.fspath(path)}: {NO_SOURCES[ATH]}")
+        raise _no_source(path, ATH)
     for candidates in (lambda: FORMATS, _others):  # Others are searched for only if it is none of athcodec's own.
         known = candidates()
         if kind := _by_first_bytes(head, known):
             return kind
         with suppress(ClipError):
             return format_by_suffix(path, known)
-    if hint := NO_SOURCES.get(Path(path).suffix.lower()):
-        raise ClipError(f"{os.fspath(path)}: {hint}")
-    return format_by_suffix(path, formats())
+    if (suffix := Path(path).suffix.lower()) in NO_SOURCES:
+        raise _no_source(path, suffix)
+    return format_by_suffix(path, formats(), "" if is_pattern(path) else kind_of(path))
+
+
+def _no_source(path: str | PathLike[str], suffix: str) -> ClipError:
+    message, python, shell = NO_SOURCES[suffix]
+    return ClipError(f"{os.fspath(path)}: {message}", python=python, shell=shell)
 
 
 def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
     return next((candidate for candidate in formats if candidate.begins(head)), None)
 
 
+def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: str | None) -> dict[str, Any]:
+    """Return the unit and the up axis that a file states, None in place of one that is unknown and stated otherwise.
+
+    Raises ClipError for one that is unknown and not in `wanted`.
+    """
+    scene: dict[str, Any] = {}
+    for name, option in wanted.items():
+        try:
+            scene |= stated_scene({name: metadata.get(name)})
+        except ClipError as error:
+            words = f"--{name.replace('_', '-')} ({name}=)"
+            if option is None:
+                raise ClipError(f"{os.fspath(path)}: {error}; {words} says which one is meant") from None
+            warnings.warn(
+                f"{os.fspath(path)}: {error}; taken for {option!r}, as {words} says", GuessWarning, stacklevel=3
+            )
+            scene[name] = None
+    return scene
+
+
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
     if unit is None:
         return clip
-    unit = unit_symbol(unit)
-    before = unit_symbol(clip.metadata.get("unit") or unit)
-    if before != unit and not (before in METRES and unit in METRES):
-        raise ClipError(
-            f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to {unit!r}"
-        )
-    factor = 1.0 if before == unit else METRES[before] / METRES[unit]
+    metres = metres_of(clip.metadata)
+    factor = 1.0 if metres is None or clip.metadata.get("unit") == unit else metres / METRES[unit]
+    clip.metadata.pop(METRES_PER_UNIT, None)
     return _mapped(clip, np.eye(3) * factor, unit=unit)
 
 
@@ -461,12 +499,10 @@ def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
     """Turned by the right angle that takes its up axis to the wanted one."""
     if up_axis is None:
         return clip
-    up_axis = up_axis.lower()
-    if up_axis not in ("x", "y", "z"):
-        raise ClipError(f'up_axis: got {up_axis!r}, expected "x", "y" or "z"')
-    before, after = ("xyz".find(str(name).lower()) for name in (clip.metadata.get("up_axis", up_axis), up_axis))
+    stated = clip.metadata.get("up_axis") or up_axis
+    before, after = "xyz".find(stated), "xyz".find(up_axis)
     if before < 0:
-        raise ClipError(f'up_axis: got a clip with {clip.metadata["up_axis"]!r}, expected "x", "y" or "z"')
+        raise ClipError(f"up_axis: got a clip with {stated!r}, expected x, y or z to turn it to {up_axis!r}")
     turn = np.eye(3)
     if before != after:
         third = 3 - before - after
