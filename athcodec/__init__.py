@@ -13,12 +13,11 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.encoding import Summary
     from athcodec.encoding.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
-    from athcodec.motion.branches.finding import find_branches
+    from athcodec.finding import find_branches
     from athcodec.motion.branches.result import Found
     from athcodec.motion.clip import MotionClip
     from athcodec.motion.joining import in_wind, join, looped, split
     from athcodec.motion.thresholds import Thresholds
-    from athcodec.motion.transitions import endless
     from athcodec.opening import open
     from athcodec.sources import read, read_hdf5, sample_path
     from athcodec.truncation import truncate
@@ -37,7 +36,6 @@ __all__ = [
     "build_ath",
     "compare",
     "encode",
-    "endless",
     "errors",
     "find_branches",
     "in_wind",
@@ -62,7 +60,7 @@ _LAZY = {
     "decoding.clip_view": ("ClipView",),
     "decoding.decoder": ("Decoder",),
     "opening": ("open",),
-    "motion.branches.finding": ("find_branches",),
+    "finding": ("find_branches",),
     "motion.branches.result": ("Found",),
     "comparison": ("Comparison", "compare"),
     "compression": ("encode",),
@@ -70,7 +68,6 @@ _LAZY = {
     "exporters": ("write", "write_hdf5"),
     "motion.joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
-    "motion.transitions": ("endless",),
     "truncation": ("truncate",),
 }
 _MODULES = ("errors", "metrics")

@@ -28,7 +28,7 @@ from athcodec.motion.positions import (
     seconds_of_dates,
     turned_advice,
 )
-from athcodec.motion.units import unit_symbol
+from athcodec.motion.units import checked_axis, checked_unit
 
 Source: TypeAlias = Any
 """An array (frames, vertices, 3), a MotionClip, a Decoder or ClipView, or a path."""
@@ -83,8 +83,9 @@ def _clip_of_array(source: Source, given: dict[str, Any]) -> tuple[MotionClip, s
     given = stated | given
     rate = frame_rate({"fps": given.pop("fps", DEFAULT_FPS)})
     metadata: dict[str, Any] = {name: given.pop(name) for name in OF_FILES if name in given}
-    if "unit" in metadata:
-        metadata["unit"] = unit_symbol(metadata["unit"])
+    for name, checked in (("unit", checked_unit), ("up_axis", checked_axis)):
+        if name in metadata:
+            metadata[name] = checked(metadata[name])
     time = np.arange(positions.shape[0]) / rate if time is None else time
     return MotionClip(positions, time, metadata=metadata, **given), converted
 

@@ -12,14 +12,15 @@ from athcodec.arrays import Source, clip_of
 from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.decoder import Decoder
 from athcodec.errors import ClipError
+from athcodec.files.shown import Report, Table, counted
 from athcodec.metrics.blocks import paired
 from athcodec.motion.joining import split
 from athcodec.opening import open
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """Distances between the vertices of a file and of its source, in scene units.
+    """Distances between the vertices of a file and of its source, in scene units; `str` is a table of the levels.
 
     Attributes
     ----------
@@ -45,6 +46,30 @@ class Comparison:
     rms_error: np.ndarray
     worst_vertex: np.ndarray
     promised: np.ndarray
+
+    def __repr__(self) -> str:
+        levels, frames = self.max_error.shape
+        largest = self.max_error.max(axis=1)
+        coarse = f", {largest[0]:.3g} at level 0" if levels > 1 else ""
+        return (
+            f"<Comparison: {counted(levels, 'level')} in {counted(frames, 'frame')}, largest error "
+            f"{largest[-1]:.3g} at level {levels - 1}{coarse}>"
+        )
+
+    def __str__(self) -> str:
+        return str(self._report())
+
+    def _repr_html_(self) -> str:
+        return self._report()._repr_html_()
+
+    def _report(self) -> Report:
+        rows = []
+        for level, (largest, rms) in enumerate(zip(self.max_error, self.rms_error)):
+            frame = int(largest.argmax())
+            errors = (self.promised[level], largest[frame], np.sqrt(np.mean(rms**2)))
+            place = f"{frame:,}", f"{self.time[frame]:.4g}", f"{self.worst_vertex[level, frame]:,}"
+            rows.append([f"{level}", *(f"{error:.4g}" for error in errors), *place])
+        return Report([Table(["level", "promised", "max", "RMS", "in frame", "at seconds", "vertex"], rows)])
 
 
 def compare(source: Source, file: Decoder | Openable, **options: Any) -> Comparison:

@@ -15,8 +15,9 @@ import numpy.typing as npt
 from athcodec.arrays import OF_ARRAYS, OF_PATHS, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
 from athcodec.encoding.progress import Progress
+from athcodec.exporters import check_ath_name
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import Length
+from athcodec.motion.units import LengthLike
 
 
 class EncodeOptions(TypedDict, total=False):
@@ -30,14 +31,14 @@ class EncodeOptions(TypedDict, total=False):
     up_axis: str | None
     axes: str | Sequence[str] | None
     dataset: str | None
-    max_error: float | None
+    max_error: LengthLike | None
     rel_error: float | None
-    target_size: int | None
+    target_size: int | str | None
     ladder: str | Sequence[float]
     lossless: bool
     exact_rest: bool
     host_rest: bool
-    rest_error: float | str | Length | None
+    rest_error: LengthLike | None
     weights: str | np.ndarray | None
     attributes: str
     effort: str
@@ -63,22 +64,23 @@ def encode(
         An array may be anything that slices by frames: NumPy, h5py, zarr, dask. It is never read whole. Integers and
         float16 are converted, and the summary says so. A path is that of a file that `read` knows.
     target : str, path-like or binary file object, optional
-        A path gets its file when that is whole; an older .ath file is replaced, any other refused. None: return bytes.
+        A path gets its file when that is whole; other files and names of other formats are refused. None: return bytes.
     **options
         Those below.
 
     Other Parameters
     ----------------
     faces, vertex_branch, branch_parent, fps, unit, up_axis, axes, dataset : optional
-        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. axes is
-        the order of its axes, such as "vertices,frames,xyz". With a path, all from fps on are those of `read`.
+        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. Units are
+        "m", "cm", "mm", "km", "in" and "ft", axes of space "x", "y" and "z"; axes is the order of an array's own, such
+        as "vertices,frames,xyz". With a path, all from fps on are those of `read`.
     max_error, rel_error, target_size : optional
-        At most one: the largest distance of any vertex in any frame from the source in scene units, the same over the
-        diagonal of the bounding box of all frames (default 1e-4, lossless 4e-7), or the bytes that the file may take.
+        At most one: the largest distance of any vertex in any frame from the source, in scene units or as "1mm"; the
+        same over the diagonal of all frames (default 1e-4, lossless 4e-7); or the bytes of the file, or "50kB".
     ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which decoding can stop, each held by a layer; "none", a single layer, is a
-        few percent smaller, and is taken for "decades" too where it seems to be a fifth smaller. Errors below 4 bounds,
-        or less than 2.5 times apart, make no layer of their own.
+        few percent smaller, and taken for "decades" where it seems to be a fifth smaller. Errors below 4 bounds, or
+        less than 2.5 times apart, make no layer.
     lossless, exact_rest, host_rest : bool
         Add a level that is the source bit for bit; keep the rest pose so; leave it out (`open`, host_mesh).
     rest_error : float, str or Length, optional
@@ -120,6 +122,8 @@ def encode(
     """
     if unknown := options.keys() - EncodeOptions.__annotations__.keys():
         raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
+    if isinstance(target, (str, PathLike)):
+        check_ath_name(target)
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
     of_source = {name: given.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in given}
     out = io.BytesIO() if target is None else target

@@ -15,9 +15,35 @@ Examples
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class AthError(Exception):
-    """Base of all errors raised by athcodec on purpose."""
+    """Base of all errors raised by athcodec on purpose.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, where, what was found and what was expected.
+    python, shell : str, optional
+        What to do next in the words of the Python API, which end the message, and in those of the command line, which
+        end `for_shell`.
+
+    Attributes
+    ----------
+    for_shell : str
+        The message as the command line shows it.
+    """
+
+    def __init__(self, message: object = "", *, python: str = "", shell: str = ""):
+        super().__init__(f"{message}; {python}" if python else message)
+        self.for_shell = f"{message}; {shell}" if shell else str(self)
+
+    def about(self, what: str) -> Self:
+        """Return the same error with a name before its messages."""
+        error = type(self)(f"{what}: {self}")
+        error.for_shell = f"{what}: {self.for_shell}"
+        return error
 
 
 class ClipError(AthError, ValueError):
@@ -30,6 +56,11 @@ class SourceWarning(UserWarning):
 
 class GuessWarning(SourceWarning):
     """What a source means was guessed; the message says what was taken for what, and how to say otherwise."""
+
+
+class CoarseWarning(UserWarning):
+    """An error is so large a part of the plant that little of its motion may be left: that of a bound which was asked
+    for, or that of a skeleton."""
 
 
 class BoundError(AthError, ValueError):

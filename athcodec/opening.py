@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from typing import cast
 
 from athcodec.decoding.ath_file import AthFile
@@ -10,6 +11,8 @@ from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.host_mesh import HostMesh
+from athcodec.errors import ClipError
+from athcodec.motion.units import stated_scene
 
 
 def open(
@@ -88,6 +91,9 @@ def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
         return
     from athcodec.sources import read  # The sources take long to import, and most files need no mesh.
 
-    units = {name: file.metadata[name] for name in ("unit", "up_axis") if isinstance(file.metadata.get(name), str)}
-    with read(path, **units) as clip:
+    scene: dict[str, str] = {}
+    for name in ("unit", "up_axis"):
+        with suppress(ClipError):  # A file may hold a unit that no source can be brought to.
+            scene |= stated_scene({name: file.metadata.get(name)})
+    with read(path, **scene) as clip:
         file.set_host_mesh(clip)

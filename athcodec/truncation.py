@@ -10,8 +10,9 @@ from typing import cast
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.errors import ClipError, LevelUnavailable, Truncated
+from athcodec.exporters import check_ath_name
 from athcodec.files.atomic import check_target, new_file
-from athcodec.options import real
+from athcodec.motion.units import LengthLike, size_of
 
 
 def truncate(
@@ -19,8 +20,8 @@ def truncate(
     target: str | os.PathLike[str],
     level: int | None = None,
     *,
-    max_error: float | None = None,
-    target_size: int | None = None,
+    max_error: LengthLike | None = None,
+    target_size: int | str | None = None,
     gltf_motion: str | None = None,
 ) -> int:
     """Write the first levels of an .ath file as a complete file, whose error bound is that of the last of them.
@@ -37,10 +38,10 @@ def truncate(
         shorter file in it.
     level : int, optional
         The last level to keep.
-    max_error : float, optional
-        Scene units: keep the levels down to the first whose largest error this is or less.
-    target_size : int, optional
-        Bytes: keep as many levels as fit.
+    max_error : float or str, optional
+        Scene units, or text such as "5cm": keep the levels down to the first whose largest error this is or less.
+    target_size : int or str, optional
+        Bytes, or text such as "2kB": keep as many levels as fit.
     gltf_motion : str, optional
         Of a GLB that has several motions, the name of the one to shorten.
 
@@ -73,11 +74,14 @@ def truncate(
     if sum(option is not None for option in (level, max_error, target_size)) != 1:
         raise TypeError("truncate: expected one of level, max_error and target_size")
     with AthFile(source, gltf_motion=gltf_motion) as file:
-        check_target(target, ".glb" if Path(target).suffix.lower() == ".glb" else ".ath")
+        suffix = ".glb" if Path(target).suffix.lower() == ".glb" else ".ath"
+        if suffix == ".ath":
+            check_ath_name(target)
+        check_target(target, suffix)
         if max_error is not None:
             last = file.level_within(max_error)
         elif target_size is not None:
-            last = _last_within(file, real("target_size", target_size))
+            last = _last_within(file, size_of(target_size, "target_size"))
         else:
             last = file.checked_level(cast(int, level))
         front, chunks = _shortened(file, last)

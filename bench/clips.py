@@ -71,12 +71,6 @@ def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:
     )
 
 
-def add_segment_frames(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--segment-frames", type=int, metavar="FRAMES", help="longest segment (default: the encoder's own choice)"
-    )
-
-
 def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
     parser.add_argument("--effort", choices=EFFORTS, default=default, help="the encoder's effort (default %(default)s)")
 

@@ -28,6 +28,7 @@ from bench.codecs.program import split
 from bench.codecs.sz3 import ALGORITHMS, Sz3
 from bench.tables import table
 
+SOURCE = Path(__file__).with_suffix(".c")
 ROUNDS, SEEKS = 9, 1000
 TABLES = ("whole", "levels", "onward", "memory", "sz3")
 
@@ -143,7 +144,7 @@ def compile_program(folder: Path) -> Path:
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
     program = folder / "decode"
-    compile_c(program, [Path(__file__).with_suffix(".c"), *(CORE / source for source in sources[1].split())])
+    compile_c(program, [SOURCE, *(CORE / source for source in sources[1].split())])
     return program
 
 

@@ -17,10 +17,9 @@ import athcodec
 from athcodec._native import LOOSE
 from athcodec.decoding.file_tables import Level
 from athcodec.encoding.survey import Ath, Gaps
-from athcodec.metrics import ErrorMeter, MotionMeter
+from athcodec.metrics import ErrorMeter, MotionMeter, level_meters
 from bench import data
 from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded
-from bench.smoothness import measured_levels
 from bench.tables import table
 
 GAP_FRAMES = 9
@@ -45,6 +44,16 @@ here); 'measured' are the other joints. The paper's: the distance between the pl
 parent's maps put the attach vertex. The RMS goes over all joints and frames on both sides. 'Loose' joints are
 measured ones whose child the encoder lets come off, because it does so in the source.
 """
+
+
+def measured_levels(decoder: athcodec.Decoder, clip: athcodec.MotionClip) -> list[MotionMeter]:
+    """Return a meter for each level, with all frames."""
+    meters = level_meters(decoder, clip)
+    for start, stop in decoder.segments:
+        source = clip.block(start, stop)
+        for number, meter in enumerate(meters):
+            meter.add(source, decoder.positions(slice(start, stop), number))
+    return meters
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -32,8 +32,8 @@ from bench.codec_registry import OURS, chosen
 from bench.codecs import Codec, Source
 from bench.codecs.ours import LayeredAthcodec
 from bench.codecs.program import CannotKeep
+from bench.levels import measured_levels
 from bench.memory import peak_bytes
-from bench.smoothness import measured_levels
 from bench.speed import processor_seconds
 
 

@@ -36,6 +36,8 @@ SHOWN = (
     "athcodec/core/include/ath_gpu.h",
     "athcodec/core/include/ath_player.h",
     "athcodec/core/examples/play.c",
+    "tests/points_plugin/pyproject.toml",
+    "tests/points_plugin/athcodec_points/*.py",
 )
 
 

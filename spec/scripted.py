@@ -645,7 +645,9 @@ def mesh_of(faces: bytes, place_of: list, places: list | None = None):
 
 def places_chunk(places: list, place_count: int, columns: int = 3) -> bytes:
     """PLACES, by the place of each vertex."""
-    stream = write(lambda data, *counts: rules.decode_places(bytes([columns]) + data, *counts), places, len(places), place_count)
+    stream = write(
+        lambda data, *counts: rules.decode_places(bytes([columns]) + data, *counts), places, len(places), place_count
+    )
     return bytes([columns]) + stream
 
 

@@ -132,6 +132,13 @@ def opened_file(opened):
 
 
 @pytest.fixture
+def any_unit(monkeypatch):
+    """Lets encoding store whatever unit and up axis a clip has, as encoders of other versions did."""
+    for module in ("encoder", "job"):
+        monkeypatch.setattr(f"athcodec.encoding.{module}.stated_scene", lambda metadata: {})
+
+
+@pytest.fixture
 def sample_file():
     return sample_path()
 

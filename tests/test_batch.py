@@ -7,7 +7,6 @@ import functools
 import http.server
 import json
 import os
-import pty
 import re
 import resource
 import signal
@@ -15,7 +14,6 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
 from pathlib import Path
 
 import distributed
@@ -105,8 +103,7 @@ def test_files_are_those_that_encode_writes_also_of_clips_that_workers_share(cli
 def test_a_long_clip_is_the_same_under_settings_of_all_kinds(settings, tmp_path, cluster, sample_file):
     items = batch.find([sample_file], tmp_path / "out", settings=settings | FAST)
     [record] = batch.run(items, tmp_path / "out", scheduler=cluster, split=2).done
-    with athcodec.read(sample_file) as clip:
-        options = batch.settings.coding_options(items[0].settings, clip.metadata["unit"])
+    options = batch.settings.coding_options(items[0].settings)
     assert Path(items[0].output).read_bytes() == alone(sample_file, **options)
     assert record["bytes"] == Path(items[0].output).stat().st_size
 
@@ -127,17 +124,6 @@ def test_clips_become_loops_by_pattern_and_by_option(clips, tmp_path, cluster):
     assert cli.main([*words, "--loop"]) == 0
     with athcodec.open(out / "b.ath") as decoder:
         assert (decoder.clip.loop, decoder.frame_count) == (True, 40)
-
-
-def test_clips_get_transitions_by_pattern_and_by_option(sample_file, clips, tmp_path, cluster):
-    out, settings = tmp_path / "out", tmp_path / "s.toml"
-    settings.write_text('["a.h5"]\nendless = false\n')
-    words = ["batch", str(sample_file), str(clips / "a.h5"), "--out", str(out), "--scheduler", cluster, *WORDS]
-    assert cli.main([*words, "--settings", str(settings), "--endless"]) == 0
-    with athcodec.read(sample_file) as clip, athcodec.open(out / f"{sample_file.stem}.ath") as decoder:
-        assert decoder.metadata["transitions"] == athcodec.endless(clip).metadata["transitions"]
-    with athcodec.open(out / "a.ath") as decoder:
-        assert "transitions" not in decoder.metadata
 
 
 def test_a_blend_that_is_too_long_for_a_clip_is_reported(clips, tmp_path, cluster, capsys):
@@ -473,18 +459,18 @@ def test_an_unusable_output_url_is_an_error_of_one_line(out, message, clips, cap
 # ---- what is shown ----
 
 
-def test_a_terminal_shows_a_table_and_the_result_goes_elsewhere(clips, tmp_path):
-    reader, writer = pty.openpty()
-    command = [*BATCH, str(clips / "a.h5"), "--out", str(tmp_path / "out"), *WORDS, "--workers", "1"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=writer, text=True)
-    os.close(writer)
-    shown = b""
-    with suppress(OSError):  # the other end is closed
-        while part := os.read(reader, 1 << 16):
-            shown += part
-    os.close(reader)
-    assert "1 clip done, 0 kept, 0 failed" in process.communicate()[0] and process.returncode == 0
-    assert b"1 of 1: 1 done" in shown and b"a.h5" in shown
+def test_each_clip_has_a_line_once_it_is_done_or_has_failed(clips, cluster, out):
+    (clips / "b.h5").write_bytes(b"no clip")
+    items, said = batch.find([clips / "a.h5", clips / "b.h5"], out, settings=FAST), []
+    outcome = batch.run(items, out, scheduler=cluster, report=said.append)
+    assert [re.match(r"\[([12])/2\] ([ab]\.h5): ", line)[1] for line in said] == ["1", "2"]
+    done, failed = sorted(line.split(": ", 1)[1] for line in said)
+    assert done.startswith(f"{outcome.done[0]['bytes']:,} bytes, ") and failed.startswith("failed: ")
+    (out / "a.ath").unlink()
+    (clips / "b.h5").unlink()
+    batch.run(batch.find([clips], out, settings=FAST), out, scheduler=cluster, report=lambda line: None)
+    batch.run([*batch.find([clips], out, settings=FAST), items[1]], out, scheduler=cluster, report=said.append)
+    assert said[2] == "3 kept, 1 to do" and said[3].startswith("[1/1] b.h5: failed: ")
 
 
 # ---- what goes wrong ----
@@ -522,15 +508,14 @@ def test_an_unreachable_scheduler_is_an_error_of_one_line(clips, tmp_path, monke
 
 def test_a_scheduler_that_goes_away_ends_the_run_and_not_what_was_done(clips, cluster, monkeypatch, out):
 
-    class Close(batch.show.Show):
-        def finished(self, item, record) -> None:
-            if len(seen := list(lines(out))) == 1:
-                assert seen[0]["status"] == "done"
-                threading.Thread(target=own.close).start()
+    def close(line: str) -> None:
+        if len(seen := list(lines(out))) == 1:
+            assert seen[0]["status"] == "done"
+            threading.Thread(target=own.close).start()
 
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as own:
         with pytest.raises(runs.SchedulerError, match="the same command goes on"):
-            batch.run(batch.find([clips], out), out, scheduler=own.scheduler_address, show=Close())
+            batch.run(batch.find([clips], out), out, scheduler=own.scheduler_address, report=close)
     before = len(lines(out))
     assert 1 <= before < 4 and not leftovers(out)
     outcome = batch.run(batch.find([clips], out), out, scheduler=cluster)
@@ -645,13 +630,17 @@ def test_a_run_that_is_killed_goes_on_where_it_ended(after, many, out):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number, expected", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_an_interrupted_run_leaves_whole_files_only(number, expected, many, out):
+@pytest.mark.parametrize(
+    "number, expected, last",
+    [(signal.SIGINT, 130, "athcodec: interrupted; the same command goes on from here\n"), (signal.SIGTERM, 143, "")],
+)
+def test_an_interrupted_run_leaves_whole_files_only(number, expected, last, many, out):
     process = start(many, out, start_new_session=True)
     wait_for(lambda: lines_so_far(out) >= 2, process)
     os.killpg(process.pid, number)  # as a terminal does it: workers get it too
     code, err = finished(process)
-    assert code == expected and all(line.startswith("[") for line in err.splitlines()), err
+    assert code == expected and err.endswith(last), err
+    assert all(line.startswith("[") for line in err.removesuffix(last).splitlines()), err
     assert not leftovers(out) and done_once(out) == {line["output"] for line in lines(out)} < ALL
     assert finished(start(many, out))[0] == 0 and done_once(out) == ALL
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import zipfile
 from pathlib import Path
 
@@ -437,3 +438,28 @@ def test_a_package_holds_the_extension_and_its_wheels(tmp_path):
     assert 'version = "1.2.0"' in manifest and 'platforms = ["windows-x64"]' in manifest
     with pytest.raises(ValueError, match="expected one of athcodec"):
         build.pack(tmp_path / "b.zip", wheels[1:])
+
+
+def test_packing_without_a_wheel_says_what_is_missing_and_how_to_make_it(tmp_path, capsys, monkeypatch):
+    other = tmp_path / "zstandard-1-cp311-cp311-win_amd64.whl"
+    strange = tmp_path / "athcodec-1-py3-none-any.whl"
+    for wheel in (other, strange):
+        wheel.write_bytes(b"wheel")
+    make = "in a clone `pip wheel --no-deps -w dist .` makes dist/athcodec-*.whl for this platform"
+    for wheels, message in (
+        ([], f"wheels: got none, expected one of athcodec for each platform; {make}"),
+        (["dist/athcodec-*.whl"], f"dist/athcodec-*.whl: there is no such wheel; {make}"),
+        ([other], f"wheels: got {other.name}, expected one of athcodec for each platform; {make}"),
+        ([strange], f"{strange.name}: got the platform any, expected one that Blender has"),
+    ):
+        with pytest.raises(SystemExit) as left:
+            build.main([str(tmp_path / "a.zip"), *map(str, wheels)])
+        assert left.value.code == 2 and capsys.readouterr().err.endswith(f"error: {message}\n")
+    monkeypatch.setattr(build.subprocess, "run", lambda *_, **__: subprocess.CompletedProcess([], 1))
+    own = tmp_path / "athcodec-1-py3-none-win_amd64.whl"
+    own.write_bytes(b"wheel")
+    with pytest.raises(SystemExit):
+        build.main([str(tmp_path / "a.zip"), str(own)])
+    err = capsys.readouterr().err
+    assert "pip has no zstandard of Python 3.11 for win_amd64" in err and "pip download " in err
+    assert not (tmp_path / "a.zip").exists()

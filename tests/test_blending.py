@@ -152,6 +152,29 @@ def test_each_clip_has_a_time_and_a_level_of_its_own(tree_ath):
         assert np.allclose(shown, _shown(decoder, "storm", 0.5), atol=1e-4)
 
 
+def test_transitions_in_the_metadata_are_read_and_a_host_blends_over_them(tmp_path):
+    """From frame L on, a clip may blend over N frames into what begins at frame E."""
+    clips, transitions = athcodec.split(simulated()), [[18, 3, 4], [15, 1, 3]]
+    clips["storm"] = clips["storm"].replace(metadata=clips["storm"].metadata | {"transitions": transitions})
+    with athcodec.open(_encoded(athcodec.join(clips), tmp_path / "tree.ath")) as decoder:
+        assert "transitions" not in decoder.play("calm").metadata
+        storm, edges = decoder.play("storm"), _edges(decoder)
+        assert storm.metadata["transitions"] == transitions and storm.file.info()["clips"][1]["wind"]
+        leave, enter, frames = transitions[0]
+        rounding = 1e-5 * np.ptp(decoder.file.rest, axis=0).max()
+        for passed, share in ((0.0, 1e-9), (frames / 2, 0.5), (frames, 1 - 1e-9)):
+            places = [((leave + passed) / 30, 1 - share), ((enter + passed) / 30, share)]
+            ends = [storm.blended_places([(seconds, 1.0)]) for seconds, _ in places]
+            lengths = np.array([_lengths(end, edges) for end in ends])
+            shown = storm.blended_places(places)
+            assert np.allclose(shown, ends[round(share)], atol=1e-4) or share == 0.5
+            blended = _lengths(shown, edges)
+            assert (blended <= lengths.max(axis=0) * 1.01 + rounding).all()
+            assert (blended >= lengths.min(axis=0) * 0.99 - rounding).all()
+        with pytest.raises(ValueError, match="places"):
+            storm.blended_places([])
+
+
 def test_weights_that_say_nothing_are_refused(tree_ath):
     with athcodec.open(tree_ath) as decoder:
         for weights in ({}, {"calm": 0.0}, {"calm": math.nan}, {"calm": math.inf}, {"calm": -1.0}):
@@ -233,7 +256,7 @@ answer({
   weights,
   blended: digest(file.blended(shares)),
   alone: same(file.blended(alone), file.positions(segments, shares[1].frame)),
-  missing: file.blended([{ segments: [], frame: 0, weight: 1 }]),
+  missing: thrown(() => file.blended([shares[0], { segments: [], frame: file.clips[1].firstFrame, weight: 1 }])),
   refused: [() => file.blended([]), () => file.blended([{ ...shares[0], weight: -1 }]),
             () => file.blended([...shares, ...shares])].map((call) => thrown(call) !== null),
 });
@@ -247,4 +270,5 @@ def test_webassembly_blends_to_the_same_bits(tree_ath, tmp_path):
         weights = decoder.wind_weights(5, 45)
         assert shown["weights"] == list(weights.values())
         assert shown["blended"] == digest(decoder.blended(weights, 0.55))
-    assert shown["alone"] and shown["missing"] is None and shown["refused"] == [True, True, True]
+    assert shown["alone"] and shown["refused"] == [True, True, True]
+    assert shown["missing"]["codeName"] == "NOT_PREPARED" and "got no segment, expected" in shown["missing"]["message"]

@@ -9,7 +9,9 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import re
+import warnings
 
+import h5py
 import numpy as np
 import pytest
 from attacks import ACTIONS, LARGE, Attack, attacks, broken_promises
@@ -18,9 +20,10 @@ from hypothesis import strategies as st
 from plants import STEADY, clip_of, plant
 
 import athcodec
+from athcodec import cli
 from athcodec.encoding import job, streams
 from athcodec.encoding import quantise as qz
-from athcodec.errors import BoundError, ClipError
+from athcodec.errors import BoundError, ClipError, CoarseWarning
 from athcodec.metrics import ErrorMeter
 
 
@@ -221,3 +224,51 @@ def test_one_number_that_is_not_finite_is_refused_wherever_it_is(scratch, frame,
     with pytest.raises(ClipError, match=f"frame {frame}, vertex {vertex} "):
         athcodec.encode(clip, scratch / "refused.ath", effort="fast")
     assert not (scratch / "refused.ath").exists()
+
+
+# ---- bounds that are a large part of the plant ----
+
+
+STEM = np.zeros((12, 20, 3), np.float32)
+STEM[..., 1] = np.linspace(0, 3, 20)
+STEM[..., 0] = np.linspace(0, 4, 12)[:, None] * STEM[..., 1] / 3  # The diagonal of the bounding box is 5 m.
+BRANCH = {"vertex_branch": [0] * 20, "branch_parent": [-1], "effort": "fast", "unit": "m"}
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (
+            {"max_error": 1},
+            "^max_error: got 1 m, 20 % of the diagonal of all frames, 5 m; .*most 1 %, .*unit, such as 1mm",
+        ),
+        ({"max_error": "0.051m"}, "^max_error: got 0.051 m, 1 % of the diagonal of all frames, 5 m; "),
+        ({"max_error": 50, "lossless": True}, "^max_error: got 50 m, 10 times the diagonal of all frames, 5 m; "),
+        ({"target_size": 150}, r"^target_size: got 150 bytes, whose error is [\d.]+ % of the diagonal .*: allow more"),
+    ],
+    ids=str,
+)
+def test_a_bound_that_is_a_large_part_of_the_plant_is_said_to_be_that(options, message, tmp_path, capsys):
+    with pytest.warns(CoarseWarning, match=message) as caught:
+        athcodec.encode(STEM, **BRANCH | options)
+    assert [warning.filename for warning in caught] == [__file__]
+    if "max_error" in options:
+        with h5py.File(tmp_path / "stem.h5", "w") as file:
+            file["positions"], file["vertex_branch"], file["branch_parent"] = STEM, np.zeros(20, int), [-1]
+            file.attrs["unit"] = "m"
+        words = ["--max-error", str(options["max_error"]), *(["--lossless"] if "lossless" in options else [])]
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            paths = [str(tmp_path / name) for name in ("stem.h5", "a.ath")]
+            assert cli.main(["encode", *paths, "--effort", "fast", *words]) == 0
+        assert re.fullmatch(f"athcodec: warning: {message[1:]}.*\n", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"max_error": "4.9cm"}, {"rel_error": 0.2}, {"lossless": True}, {"target_size": "1kB"}], ids=str
+)
+def test_other_bounds_and_fractions_that_were_asked_for_are_taken_without_a_word(options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        athcodec.encode(STEM, **BRANCH | options)
+        athcodec.encode(np.ones((3, 20, 3), np.float32), **BRANCH | options)

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import warnings
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -197,15 +198,42 @@ def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsy
         sample_path("oak")
 
 
-def test_the_page_of_the_demo_shows_the_leafed_tree(tmp_path, capsys):
+def test_the_page_of_the_demo_shows_the_plant_of_its_table(tmp_path, capsys):
     assert run("demo", "--keep", tmp_path) == 0
-    assert "leafed_tree.ath moves in " in capsys.readouterr().out
-    data = base64.b64encode(sample_path("leafed").read_bytes()).decode()
-    assert data in (tmp_path / "athcodec_demo.html").read_text()
+    data, out = (tmp_path / "tree_1k_120f.ath").read_bytes(), capsys.readouterr().out
+    assert f"{len(data):,} bytes; the positions" in out and "It moves in " in out
+    [shown] = re.findall(r'id="ath-file"[^>]*>([^<]*)<', (tmp_path / "athcodec_demo.html").read_text())
+    assert base64.b64decode(shown) == data
+    assert f"`athcodec view {sample_path('leafed')}` shows one with leaves" in out
+
+
+def test_the_leafed_sample_is_whole_and_holds_two_loops():
     with athcodec.open(sample_path("leafed"), strict=True) as decoder:
         clips = [(clip.name, clip.loop, clip.frame_count) for clip in decoder.file.clips]
         assert clips == [("calm", True, 150), ("gale", True, 150)]
         assert decoder.file.complete and decoder.file.faces is not None
+
+
+def test_a_skeleton_that_is_far_off_is_warned_of_with_what_to_do(encoded, tmp_path, capsys):
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert run("decode", encoded, tmp_path / "a.glb", "--rig", 2, "--level", 2) == 0
+    assert re.fullmatch(
+        r"athcodec: warning: .*a.glb: the skeleton is off by [\d.]+ m, [\d.]+ % of the diagonal of the rest pose; "
+        r"expected at most 1 %: more joints come closer, such as --rig 8 \(rig=8\); without a skeleton the .*\n",
+        capsys.readouterr().err,
+    )
+    assert run("decode", encoded, tmp_path / "a.glb", "--rig", "--level", 2) == 0 and capsys.readouterr().err == ""
+
+
+def test_packing_the_extension_for_blender_without_a_wheel_says_how_to_make_one(tmp_path, capsys):
+    from athcodec.blender.build import main
+
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "a.zip")])
+    assert (
+        "wheels: got none, expected one of athcodec for each platform; in a clone `pip wheel" in capsys.readouterr().err
+    )
 
 
 # ---- damaged files ----
@@ -374,7 +402,7 @@ def test_branch_plans_are_no_clips_and_say_what_they_are_for(tmp_path, capsys):
 
 FAILURES = {
     "missing source": ("encode nowhere.h5 OUT", "nowhere.h5: No such file"),
-    "missing file": ("decode nowhere.ath OUT", "nowhere.ath: No such file"),
+    "missing file": ("decode nowhere.ath out.h5", "nowhere.ath: No such file"),
     "nothing to look at": ("info nowhere.ath", "nowhere.ath: No such file"),
     "nothing to verify": ("verify nowhere.ath", "nowhere.ath: No such file"),
     "nothing to compare": ("verify FILE --against nowhere.h5", "nowhere.h5: No such file"),
@@ -383,14 +411,47 @@ FAILURES = {
     "a folder to encode": (f"encode {Path(SAMPLE).parent} OUT", "is a folder, expected a file: .*`athcodec batch`"),
     "a source to show": ("info SOURCE", r"SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec encode`"),
     "a source to truncate": ("truncate SOURCE OUT --level 0", "SOURCE: is not an .ath file .it looks like HDF5."),
+    "a source to decode": ("decode SOURCE out.usda", "SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec"),
+    "a source to view": (
+        "view SOURCE --export a.html",
+        "this is not an .ath file .it looks like HDF5.; use `athcodec enc",
+    ),
+    "a source to verify": ("verify SOURCE", "SOURCE: is not an .ath file .it looks like HDF5.; use `athcodec encode`"),
+    "an .ath file to compare with": ("verify FILE --against FILE", "FILE: is an .ath file already; `athcodec decode`"),
+    "an .ath file to decode to": (
+        "decode FILE OUT",
+        "OUT: is the name of an .ath file, .* `athcodec truncate` shortens",
+    ),
+    "another format to encode to": (
+        "encode SOURCE a.h5",
+        "a.h5: is a name for HDF5, expected .* .ath; `athcodec decode`",
+    ),
+    "textures to encode to": (
+        "encode SOURCE a.vat",
+        "a.vat: is a name for vertex animation .* .ath; `athcodec decode`",
+    ),
+    "another format to truncate to": (
+        "truncate FILE a.USDC --level 0",
+        "a.USDC: is a name for USD, expected .* .ath; ",
+    ),
+    "HDF5 to put a motion into": (
+        "encode SOURCE --into x.glb",
+        "SOURCE: is no GLB .it looks like HDF5., expected an animated one for --into; `athcodec encode SOURCE .*f.ath` "
+        "makes an .ath file of it, and `athcodec decode .* x.glb` a GLB of that",
+    ),
+    "an .ath file to put a motion into": (
+        "encode FILE --into x.glb",
+        "FILE: is no GLB .it looks like .ath., expected an animated one for --into; `athcodec decode FILE x.glb` write",
+    ),
+    "HDF5 as glTF": ("encode SOURCE OUT --source-format gltf", "SOURCE: got HDF5, expected glTF: a GLB or JSON"),
     "several to view": ("view FILE FILE --export a.html", "view: got 2 files, expected one; --export DIR"),
     "no page": ("view FILE --export a.txt", "--export: got a.txt, expected PAGE.html, or a folder"),
     "no folder": ("encode SOURCE none/a.ath", "none/a.ath: the directory none does not exist"),
     "a folder": ("decode FILE .", "got a directory, expected a file name"),
     "onto itself": ("truncate FILE FILE --level 0", "FILE: is the input"),
-    "beyond the frames": ("decode FILE OUT --frames 100:121", r"FILE: .*100:121.*120"),
-    "no frames": ("decode FILE OUT --frames 7:7", "FILE: .*7:7"),
-    "beyond the levels": ("decode FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
+    "beyond the frames": ("decode FILE out.h5 --frames 100:121", r"FILE: .*100:121.*120"),
+    "no frames": ("decode FILE out.h5 --frames 7:7", "FILE: .*7:7"),
+    "beyond the levels": ("decode FILE out.h5 --level 6", "FILE: .*got 6.*0 to 4"),
     "truncate beyond the levels": ("truncate FILE OUT --level 6", "FILE: .*got 6.*0 to 4"),
     "too close": ("encode SOURCE OUT --max-error 1e-12", "SOURCE: .*1e-12"),
     "too small": ("encode SOURCE OUT --target-size 100 --effort fast", "SOURCE: .*100"),
@@ -607,7 +668,7 @@ def test_a_missing_package_is_named_with_the_command_that_installs_it(encoded, t
     assert capsys.readouterr().err.endswith('needs pxr: pip install "athcodec[usd]"\n')
 
 
-def test_no_control_characters_of_a_file_reach_the_terminal(tmp_path, capsys):
+def test_no_control_characters_of_a_file_reach_the_terminal(tmp_path, capsys, any_unit):
     unit = "m\x1b[2J\x9b1A\u202e\x7f\a\r"
     with read_hdf5(SAMPLE) as clip:
         athcodec.encode(clip.replace(metadata=clip.metadata | {"unit": unit}), tmp_path / "a.ath")

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import athcodec
 from athcodec.errors import ClipError
 from athcodec.motion import clip as clip_module
 from athcodec.motion.clip import MotionClip
@@ -54,6 +55,27 @@ def test_a_changed_clip_keeps_the_dtype_of_its_rest_pose_unless_another_is_given
 
 def test_fps_is_the_median_rate_of_uneven_times(forked_clip):
     assert forked_clip.fps == pytest.approx(1 / 0.15)
+
+
+@pytest.mark.parametrize("fps", [30, 24, 25.0, 12.5, 23.976, 24000 / 1001, 30000 / 1001, 59.94, 1000, 0.1])
+def test_a_rate_that_times_are_made_of_comes_back_as_it_was(fps, tmp_path):
+    for frames, start in ((2, 0.0), (61, 0.0), (61, 3600.5), (3000, 1e5)):
+        positions = np.cumsum(np.ones((frames, 1, 3), np.float32), axis=0) % 7
+        if start == 0:
+            data = athcodec.encode(positions, fps=fps, vertex_branch=[0], branch_parent=[-1], effort="fast")
+            with athcodec.open(data) as still:
+                assert (still.fps, still.file.info()["fps"], athcodec.ClipView(still).fps) == (fps,) * 3
+                for suffix in ("npz", "glb", "mdd") if frames == 61 else ():
+                    athcodec.write(still, tmp_path / f"a.{suffix}")
+                    with athcodec.read(tmp_path / f"a.{suffix}") as again:
+                        assert again.fps == fps, suffix
+        assert MotionClip(positions, start + np.arange(frames) / fps).fps == fps
+
+
+def test_a_rate_beside_a_usual_one_stays():
+    for fps in (30.00001, 29.97002, 7.1234567, 1 / 3):
+        clip = MotionClip(np.zeros((100, 1, 3), np.float32), np.arange(100) / fps)
+        assert clip.fps == pytest.approx(fps, rel=1e-13)
 
 
 def test_a_single_frame_is_a_clip_at_the_rate_it_states(forked):

@@ -415,3 +415,31 @@ def test_pieces_need_no_scipy_and_are_those_that_hang_together(dressed, monkeypa
     found = finding.pieces(bare(dressed))
     assert np.array_equal(found.vertex_branch, expected) and (found.branch_parent == -1).all()
     assert len(finding.pieces(bare(dressed, faces=None, edges=None)).branch_parent) == 1
+
+
+def test_branches_are_found_for_whatever_is_encoded(tmp_path):
+    clip = bare(plant(seed=3, branches=5, frames=20), edges=None)
+    positions = clip.block(0, 20)
+    expected = athcodec.find_branches(clip)
+    np.savez(tmp_path / "a.npz", positions=positions)
+    athcodec.encode(clip, tmp_path / "a.ath", lossless=True, effort="fast")
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        sources = [positions, positions.tolist(), decoder, athcodec.ClipView(decoder), tmp_path / "a.npz"]
+        for source in (*sources, str(tmp_path / "a.npz")):
+            found = athcodec.find_branches(source)
+            assert found.method == expected.method and np.array_equal(found.vertex_branch, expected.vertex_branch)
+            assert np.array_equal(found.branch_parent, expected.branch_parent)
+    whole = athcodec.find_branches(positions, "motion", root=3, fps=24, unit="m")
+    data = athcodec.encode(
+        positions, vertex_branch=whole.vertex_branch, branch_parent=whole.branch_parent, effort="fast"
+    )
+    with athcodec.open(data) as again:
+        assert np.array_equal(again.file.vertex_branch, whole.vertex_branch)
+    faces = np.array([[0, 1, 2], [2, 1, 3], [4, 5, 6], [6, 5, 7]])
+    pieces = athcodec.find_branches(positions[:, :8], "components", faces=faces)
+    assert len(pieces.branch_parent) == 2 and pieces.vertex_branch.tolist() == [0] * 4 + [1] * 4
+    for wrong, error in ((np.zeros((4, 5)), ClipError), (tmp_path / "a.ath", ClipError), ("none.h5", OSError)):
+        with pytest.raises(error):
+            athcodec.find_branches(wrong)
+    with pytest.raises(ClipError, match="did you mean 'm'"):
+        athcodec.find_branches(positions, unit="meter")

@@ -229,11 +229,14 @@ import athcodec
 
 def shown(positions: npt.NDArray[np.float32], path: Path) -> npt.NDArray[np.float32]:
     summary = athcodec.encode(positions, path, fps=24, unit="m", rel_error=1e-3, ladder=(1e-2,))
-    data = athcodec.encode(str(path), max_error=0.01)
+    data = athcodec.encode(str(path), max_error="1cm", target_size=None, tam=athcodec.Thresholds("1mm", 0, 0.1, 0))
     with athcodec.open(data) as decoder, athcodec.open(memoryview(data), clip="calm") as calm:
         frames, vertices, three = decoder.shape
         largest = max(float(frame.max()) for frame in decoder.at_level(0))
         errors = athcodec.compare(decoder[10:20, ::2], calm)
+        doubled, mean, turned = decoder * 2 - positions, decoder.mean(axis=0), decoder.T
+        near = decoder.at_level(decoder.level_within("5cm"))
+        print(np.abs(doubled).max(), mean.shape, turned.shape, (near == decoder).all(), near.nbytes)
         print(summary.ratio, len(data), frames * vertices * three, largest, np.asarray(decoder).mean())
         print(errors.max_error.max(axis=1), decoder.levels[0].max_error, decoder.positions([1, 2], level=0).shape)
         return decoder.at(0.5)

@@ -41,7 +41,7 @@ def grove(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def winds(tmp_path_factory):
-    """A file of two clips that say how strong their wind is, and have transitions."""
+    """A file of two clips that say how strong their wind is."""
     path = tmp_path_factory.mktemp("winds") / "winds.ath"
     clips = {
         "calm": in_wind(blown_tree(3, 60, 48, sway=0.02), 2.0, 0.0),
@@ -165,23 +165,6 @@ def test_a_clip_that_comes_late_does_not_jump(opened, winds):
     assert 0 <= np.abs(after - before).max() < 1e-3
     page.evaluate("athcodecForest.forest.ease = 0")
     assert np.abs(settled(page, 0.3, level) - before).max() > 0.01
-
-
-def test_plants_play_without_an_end(opened, tmp_path, sample_clip):
-    path = tmp_path / "endless.ath"
-    athcodec.encode(athcodec.endless(sample_clip), path, rel_error=1e-3)
-    page = opened(path, 1, "true")
-    page.wait_for_function(f"() => {{ athcodecForest.forest.update(athcodecForest.camera, 1e6, 0); return {FINEST}; }}")
-    level = page.evaluate("athcodecForest.ath.motion.levelCount - 1")
-    page.evaluate("athcodecForest.forest.endless(7)")
-    ((clip, phase),) = page.evaluate("athcodecForest.forest.plants")
-    with athcodec.open(path) as decoder:
-        play, core = decoder.endless(7), GpuFile(path.read_bytes()).core
-        round_of = decoder.time[-1] * decoder.frame_count / (decoder.frame_count - 1)
-        for seconds in np.linspace(0.4, 60.0, 40):
-            wanted = play.positions(seconds + phase * round_of)[core.vertex_source()] - np.array(core.info.origin)
-            got = shown(page, float(seconds), level)[0, :, :3]
-            assert np.abs(got - wanted).max() <= decoder.file.max_error_bound
 
 
 def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(opened, grove):

@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import venv
 from pathlib import Path
 
 import numpy as np
@@ -224,25 +223,6 @@ def said_of(path: Path) -> str:
         numbers = decoder.file.vertex_count, decoder.frame_count, len(decoder.segments), decoder.file.level_count
         crc = crc32c(np.ascontiguousarray(decoder.positions(), np.float32).tobytes())
     return "OK {} {} {} {} {:08x}\n".format(*numbers, crc)
-
-
-@pytest.mark.programs
-def test_conan_makes_a_package_that_find_package_finds(expected, sample_ath, tmp_path):
-    """Takes Conan from the index."""
-    venv.create(tmp_path / "venv", with_pip=True)
-    scripts = tmp_path / "venv" / "bin"
-    run(scripts / "pip", "install", "-q", "conan")
-    tools = {**TOOLS, "CONAN_HOME": str(tmp_path / "conan"), "PATH": os.pathsep.join([str(scripts), TOOLS["PATH"]])}
-    run("conan", "profile", "detect", env=tools)
-    run("conan", "create", CORE, env=tools)
-    project = tmp_path / "engine"
-    wanted = ["--requires", f"athcodec/{athcodec.__version__}", "-g", "CMakeToolchain", "-of", project]
-    run("conan", "install", *wanted, env=tools)
-    write_project(project, "find_package(athcodec REQUIRED)")
-    options = ["-DCMAKE_TOOLCHAIN_FILE=conan_toolchain.cmake", "-DCMAKE_BUILD_TYPE=Release"]
-    run("cmake", "-G", "Ninja", "-S", project, "-B", project / "build", *options, env=tools)
-    run("cmake", "--build", project / "build", env=tools)
-    assert {run(project / "build" / name, sample_ath) for name in ("shared", "static", "cxx")} == {expected}
 
 
 def library_folder(installed: Path) -> Path:

@@ -107,17 +107,22 @@ class Scarce:
 def test_memory_that_fails_for_the_core_leaves_a_decoder_that_goes_on(sample_ath, monkeypatch):
     with athcodec.open(sample_ath) as decoder:
         expected = decoder.positions()
-    scarce, failures, done = Scarce(monkeypatch), 0, False
-    while not done:
-        scarce.left = failures + 1
-        try:
-            with athcodec.open(sample_ath) as decoder:
-                for level in (0, decoder.file.level_count - 1):
-                    decoder.positions(0, level)
-            done = True
-        except MemoryError:
-            failures += 1
-    assert failures == 13, "the file, its work and bases; of two levels what segments share, one, and room to go on"
+
+    def show_two_levels() -> None:
+        with athcodec.open(sample_ath) as decoder:
+            for level in (0, decoder.file.level_count - 1):
+                decoder.positions(0, level)
+
+    scarce = Scarce(monkeypatch)
+    show_two_levels()
+    requests = -1 - scarce.left
+    assert requests > 4, "the file, and of two levels what segments share and a segment"
+    for n in range(1, requests + 1):
+        scarce.left = n
+        with pytest.raises(MemoryError):
+            show_two_levels()
+    scarce.left = requests + 1
+    show_two_levels()
     for n in (1, 2):
         scarce.left = -1
         with athcodec.open(sample_ath) as decoder:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from files import coded
 from plants import bending_tube, distance, ring_quads, tube
 from programs import CACHE, install_once, printed
 from test_gltf_motion import encoded
@@ -254,20 +253,6 @@ def test_a_wind_shows_the_blended_clips_of_the_decoder(with_faces, sample_clip, 
     path = tmp_path / "winds.ath"
     athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, segment_frames=16)
     assert run_node("winds", path) == {"off": [], "eased": True, "refused": ["RangeError", "RangeError"]}
-
-
-def test_endless_play_shows_what_the_decoder_in_python_does(sample_clip, tmp_path):
-    path = tmp_path / "endless.ath"
-    transitions = [[30, 2, 6], [50, 10, 8], [50, 20, 6], [40, 31, 7]]
-    clip = sample_clip.replace(metadata=sample_clip.metadata | {"transitions": transitions})
-    with coded(clip, path, rel_error=1e-3, segment_frames=16) as decoder:
-        play = decoder.endless(7)
-        seconds = [float(t) for t in np.arange(0, 40, 0.63)]
-        wanted = [hashlib.sha256(play.positions(t)).hexdigest() for t in seconds]
-        assert sum(len(play.places(t)) == 2 for t in seconds) > 5
-    found = run_node("endless", path, *seconds)
-    assert found["duration"] and found["refused"] == "RangeError" and found["shown"] == []
-    assert found["positions"] == wanted
 
 
 def test_parse_takes_buffers_and_views_of_all_kinds_and_leaves_them_as_they_are(layered_ath):

@@ -292,13 +292,13 @@ def test_plants_of_all_kinds_are_not_asked_about(recwarn):
         clip = awkward(seed=seed, branches=6, longest=7, frames=40, shape=shape, motion=motion)
         athcodec.encode(
             clip.block(0, 40),
-            max_error=1.0,
+            rel_error=0.05,
             effort="fast",
             vertex_branch=clip.vertex_branch,
             branch_parent=clip.branch_parent,
         )
     travelling = MOTION + np.linspace(0, 60, 6)[:, None, None]
-    athcodec.encode(travelling, max_error=1.0, effort="fast", vertex_branch=np.zeros(18, int), branch_parent=[-1])
+    athcodec.encode(travelling, rel_error=0.05, effort="fast", vertex_branch=np.zeros(18, int), branch_parent=[-1])
     assert not recwarn.list
 
 

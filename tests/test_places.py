@@ -209,9 +209,7 @@ def test_matrices_and_residuals_are_those_of_all_vertices():
         parts, hierarchy = decoder.affines(3, 0), decoder.file.hierarchy
         assert int(parts.vertex_count.sum()) == len(order)
         rest, shown = decoder.level_rest(0)[hierarchy.vertex_source], decoder.positions(3, 0)[hierarchy.vertex_source]
-        for first, count, matrix, is_stem in zip(
-            parts.first_vertex, parts.vertex_count, parts.matrices, parts.is_stem
-        ):
+        for first, count, matrix, is_stem in zip(parts.first_vertex, parts.vertex_count, parts.matrices, parts.is_stem):
             rows = slice(first, first + count)
             if not is_stem:
                 assert np.abs(rest[rows] @ matrix[:, :3].T + matrix[:, 3] - shown[rows]).max() < 1e-4 * diagonal(clip)

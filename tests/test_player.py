@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from counting import COUNTER
-from files import Parts, coded
+from files import Parts
 from fuzz.targets import CORE
 from header import Fade
 from moving_meshes import leafed_tree, mixed_clip
@@ -50,15 +50,6 @@ class Share(ctypes.Structure):
 
 class Moment(ctypes.Structure):
     _fields_ = [("frame", c_double), ("level", c_int32), ("count", c_int32), ("segments", c_void_p * 2)]
-
-
-class Transition(ctypes.Structure):
-    _fields_ = [("leave", c_int32), ("enter", c_int32), ("frames", c_int32)]
-
-
-class Endless(ctypes.Structure):
-    _fields_ = [("transitions", POINTER(Transition)), ("count", c_int32), ("clip", c_int32), ("seed", c_uint32)]
-    _fields_ += [("state", c_uint32), ("run", c_int32), ("next", c_int32), ("begins", c_double)]
 
 
 @pytest.fixture(scope="module")
@@ -530,6 +521,13 @@ def test_clips_are_blended_as_python_blends_them(lib, medley_ath):
             np.testing.assert_array_equal(shown, file.blended(weights, seconds, level))
 
 
+def test_two_times_of_a_clip_are_blended_as_python_blends_them(lib, medley_ath):
+    with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes()) as player:
+        places = [(0.1, 0.25), (0.7, 0.75)]
+        shown = player.blended(file.file.vertex_count, [Share(0, -1, AS_MARKED, *place) for place in places])
+        np.testing.assert_array_equal(shown, file.blended_places(places))
+
+
 def test_the_wind_chooses_what_is_blended(lib, medley_ath):
     with athcodec.open(medley_ath) as file, Player(lib, medley_ath.read_bytes()) as player:
         names = [clip.name for clip in file.file.clips]
@@ -567,30 +565,6 @@ def test_what_comes_of_each_blended_clip_is_prepared_ahead(lib, sample_clip):
         assert lib.ath_player_begin(player.player) is None  # nothing is left to do
         taken = memory.taken
         assert isinstance(at(1.5), np.ndarray) and memory.taken == taken
-
-
-def test_a_play_without_an_end_is_that_of_python_also_backwards(lib, scratch, sample_clip):
-    path = scratch / "endless.ath"
-    with coded(athcodec.endless(sample_clip), path, rel_error=1e-3) as file, Player(lib, path.read_bytes()) as player:
-        ways = [Transition(*way) for way in reversed(file.metadata["transitions"])]
-        play, table, xyz = Endless(), (Transition * len(ways))(*ways), np.empty((file.file.vertex_count, 3), np.float32)
-        begin = lib.ath_player_endless_begin
-        assert begin(player.player, byref(play), 0, table, len(ways), 9) == OK
-        wanted = file.endless(seed=9)
-        for seconds in (0.0, *np.arange(30, 40, 0.11), 3600.3, 7.7):
-            assert OK == lib.ath_player_endless_positions(
-                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
-            )
-            np.testing.assert_array_equal(xyz, wanted.positions(seconds))
-        for seconds in (-1.0, float("nan"), float("inf")):
-            assert BAD_ARGUMENT == lib.ath_player_endless_positions(
-                player.player, byref(play), c_double(seconds), -1, SOURCE_ORDER, xyz.ctypes, c_size_t(12)
-            )
-        frames, most = file.frame_count, 2**31 - 1
-        for way in ((5, 5, 0), (-1, 0, 2), (5, -1, 2), (5, 9, 2), (frames - 2, 0, 2), (most, most, most)):
-            assert begin(player.player, byref(play), 0, (Transition * 1)(way), 1, 1) == BAD_ARGUMENT
-        assert begin(player.player, byref(play), 1, table, len(ways), 1) == BAD_ARGUMENT
-        assert begin(player.player, byref(play), 0, table, 0, 1) == BAD_ARGUMENT
 
 
 # ---- topology ----

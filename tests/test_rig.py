@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import warnings
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from test_usd import complaints, leafy_stage
 
 import athcodec
 from athcodec import ClipView, cli
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, CoarseWarning
 from athcodec.exporters.rig import fit_rig
 
 pytestmark = pytest.mark.formats
@@ -35,6 +37,26 @@ def test_more_joints_are_closer(sample_ath, sample_clip, tmp_path):
     assert rigs[0].max_error > 3 * rigs[1].max_error > 6 * rigs[2].max_error
     assert athcodec.write(sample_clip, tmp_path / "a.glb", rig=20).facts["joints"] == 21
     assert [len(rig.bind) for rig in rigs] <= [21, 129, 257]
+
+
+@pytest.mark.parametrize("name", ["a.usda", "a.glb"])
+def test_a_rig_that_is_far_off_warns_and_more_joints_as_it_advises_end_that(sample_ath, tmp_path, name):
+    with athcodec.open(sample_ath) as decoder:
+        view = ClipView(decoder, frames=range(30))
+        diagonal, joints = np.linalg.norm(np.ptp(decoder.file.rest, axis=0)), [4]
+        while True:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always", CoarseWarning)
+                written = athcodec.write(view, tmp_path / name, rig=joints[-1])
+            with athcodec.read(tmp_path / name) as clip:
+                off = np.linalg.norm(clip.block(0, 30) - view.positions[:], axis=2).max() / diagonal
+            assert (off > 0.01) == bool(caught)
+            if not caught:
+                break
+            said = str(caught[0].message)
+            assert re.search(rf"off by {written.facts['max_error']:.3g} m, {100 * off:.2g} % of the diagonal", said)
+            joints.append(int(re.search(r"such as --rig (\d+) \(rig=\1\)", said)[1]))
+    assert joints in ([4, 16], [4, 16, 64])
 
 
 def test_joints_are_a_tree_over_the_branches_and_weights_add_up_to_one(sample_ath):

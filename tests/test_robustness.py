@@ -1,4 +1,4 @@
-"""`python -m spec.robustness` counts crashes, hangs, floods of memory and wrong results, and reports all of them."""
+"""`python -m spec.robustness` reports what it has counted, and hostile files do no harm."""
 
 from __future__ import annotations
 
@@ -7,29 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from bad_cases import behave
 from programs import printed
 
 from spec import robustness
-from spec.robust import Row, _cases
+from spec.robust import Row
 
 ROOT = Path(__file__).resolve().parent.parent
 
 pytestmark = pytest.mark.tools
-
-
-def test_crashes_hangs_floods_and_wrong_results_are_counted_and_the_rest_goes_on():
-    ways = ["well", "crash", "be wrong", "well", "hang", "flood", "crash", "well"]
-    cases = _cases.Cases("all ways", {"plant": b"seed"}, [("plant", how) for how in ways], behave)
-    row = _cases.run(cases, 60, hang=4)
-    assert (row.tried, row.crashes, row.hangs, row.over_limit, row.wrong) == (8, 2, 1, 1, 1)
-    assert row.faults == 5 and row.note.startswith("all; ")
-
-
-def test_cases_stop_when_their_time_is_up():
-    cases = _cases.Cases("slow", {"plant": b"seed"}, [("plant", "nap")] * 500, behave)
-    row = _cases.run(cases, 1)
-    assert 0 < row.tried < 500 and row.faults == 0 and row.note == "of 500"
 
 
 def test_the_report_has_every_row_and_keeps_what_a_run_leaves_out(tmp_path, monkeypatch):

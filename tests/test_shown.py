@@ -36,7 +36,7 @@ def test_urls_are_shown_without_users_passwords_and_values():
 
 
 @pytest.fixture
-def hostile_ath(tmp_path):
+def hostile_ath(tmp_path, any_unit):
     """A file whose unit is such text."""
     clip = plant(seed=1, branches=2, frames=4)
     clip.metadata = {"unit": HOSTILE}

@@ -108,7 +108,7 @@ from athcodec.cli import main
 try:
     main({words})
 except SystemExit:
-    heavy = {{"numpy", "h5py", "scipy", "rich", "zstandard"}}
+    heavy = {{"numpy", "h5py", "scipy", "rich", "zstandard", "importlib.metadata"}}
     print("imported:", sorted(heavy & set(sys.modules)))
 """
     assert printed(sys.executable, "-c", program).splitlines()[-1] == "imported: []"

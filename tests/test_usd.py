@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from fractions import Fraction
 
@@ -120,8 +121,15 @@ def test_units_without_a_symbol_are_kept_in_metres_and_missing_ones_stay_missing
     clip, _ = read_saved(stage)
     assert clip.metadata.keys().isdisjoint({"unit", "up_axis", "meters_per_unit"}) and clip.metadata["fps"] == 24
     UsdGeom.SetStageMetersPerUnit(stage, 0.9144)
-    clip, _ = read_saved(stage)
+    clip, yards = read_saved(stage)
     assert clip.metadata["meters_per_unit"] == 0.9144 and "unit" not in clip.metadata
+    clip, feet = read_saved(stage, unit="ft")
+    assert clip.metadata["unit"] == "ft" and "meters_per_unit" not in clip.metadata
+    assert np.allclose(feet, 3 * yards, rtol=1e-6)
+    for metres in (0.0, -1.0, math.nan):
+        UsdGeom.SetStageMetersPerUnit(stage, metres)
+        with pytest.raises(ClipError, match="metersPerUnit: got .* expected a number above 0"):
+            read_saved(stage)
     layer = Sdf.Layer.FindOrOpen(str(tmp_path / "a.usda"))
     layer.pseudoRoot.SetInfo("metersPerUnit", Vt.Float(0.01))
     layer.Export(str(tmp_path / "a.usdc"))

@@ -322,7 +322,8 @@ feed([...wanted].reverse());
 Object.assign(result, {
   left: file.ranges(1, last, last), all: same(file.ranges(1, last, last, true), wanted),
   ready: file.readyLevel(last), others: file.readyLevel(0), same: shown(file, 1) === shown(whole, 1),
-  deeper: thrown(() => file.prepare(last, deepest)), elsewhere: file.positions([file.prepare(last, 1)], 0),
+  deeper: thrown(() => file.prepare(last, deepest)),
+  elsewhere: thrown(() => file.positions([file.prepare(last, 1)], 0)),
 });
 feed(file.ranges(deepest).reverse());
 result.deepest = shown(file, deepest) === shown(whole, deepest);
@@ -340,7 +341,7 @@ def test_ranges_fed_in_any_order_are_enough_and_dropped_ones_are_missing(sample_
     assert result["before"]["codeName"] == result["deeper"]["codeName"] == "MISSING"
     assert (result["none"], result["ready"], result["others"]) == (-1, 1, -1)
     assert result["left"] == [] and result["all"] and result["same"] and result["deepest"]
-    assert result["elsewhere"] is None
+    assert result["elsewhere"]["codeName"] == "NOT_PREPARED"
     assert "segment 0" in result["busy"]["message"]
     assert result["dropped"] == [-1, True]
 
@@ -464,7 +465,7 @@ const { nodeCount, exactCount } = file.parts(cut), exact = file.exact(all, place
 const result = { before, levels: fade.levels, weights, cut, off: Math.max(...off),
   exact: same([...exact], [...faded].slice(0, exact.length)), // all vertices are
   sizes: [file.matrices(all, place, { fade }).length === 12 * nodeCount, exact.length === 3 * exactCount],
-  lacking: file.positions(prepared[0], place, { fade }),
+  lacking: thrown(() => file.positions(prepared[0], place, { fade })),
   alone: same(file.positions(all, place, { fade: new AthFade().to(1, 0) }), file.positions(prepared[0], place)),
   errors: [() => file.positions(all, 0, { fade: { levels: [], weights: [] } }),
     () => file.positions(all, 0, { fade: { levels: [0, 0, 0, 0, 0], weights: [1, 0, 0, 0, 0] } }),
@@ -484,7 +485,8 @@ def test_levels_fade_into_each_other(sample_ath, tmp_path):
     assert result["levels"] == [1, deepest, 0] and result["cut"] == deepest
     assert sum(result["weights"]) == pytest.approx(1) and result["weights"][2] == 0 < result["weights"][1]
     assert result["off"] < 2e-6 * size and result["exact"] and result["sizes"] == [True, True]
-    assert result["lacking"] is None and result["alone"]
+    assert result["alone"] and result["lacking"]["codeName"] == "NOT_PREPARED"
+    assert f"pass what prepare(0, 1) and prepare(0, {deepest}) returns" in result["lacking"]["message"]
     assert result["errors"] == ["RangeError"] * 3 + ["TypeError"] + ["RangeError", "TypeError"]
     assert result["end"] == [[0], [1]]
 
@@ -505,7 +507,8 @@ const calls = [
   () => file.feed([1, 2, 3], 0), () => file.chunkBytes(-1), () => file.segmentOf(file.info.frameCount),
 ];
 const result = {
-  errors: calls.map((call) => thrown(call)?.type ?? String(call)), freed: file.positions([freed, null], 0),
+  errors: calls.map((call) => thrown(call)?.type ?? String(call)),
+  freed: thrown(() => file.positions([freed, null], 0)),
   held: [0.25, file.segmentStart(1) - 0.25].map((t) => [file.positions([segment], t) !== null, file.held]),
 };
 file.dispose();
@@ -518,9 +521,47 @@ answer(result);
 def test_arguments_out_of_range_are_refused_before_they_reach_the_memory(sample_ath, tmp_path):
     result = run_node(tmp_path, MISUSE, sample_ath)
     assert set(result["errors"]) == {"RangeError", "TypeError"}
-    assert result["freed"] is None
+    assert "NOT_PREPARED: frame 0: got no segment, expected segment 0" in result["freed"]["message"]
     assert result["held"] == [[True, False], [True, True]]
     assert "dispose" in result["disposed"]
+
+
+SEVERAL = """
+const file = AthFile.open(read(path)), level = file.info.levelCount - 1, frame = file.segmentStart(1) + 2.5;
+const first = file.prepare(0, level), segments = [first], out = new Float32Array(3 * file.info.vertexCount).fill(7);
+const calls = {
+  positions: () => file.positions(segments, frame, { out }), none: () => file.positions([null], frame),
+  matrices: () => file.matrices(segments, frame), exact: () => file.exact(segments, frame),
+  blended: () => file.blended([{ segments, frame: 0, weight: 1 }, { segments, frame, weight: 1 }]),
+};
+const errors = Object.fromEntries(Object.entries(calls).map(([name, call]) => [name, thrown(call)]));
+const advice = errors.positions.message.match(/prepare\\((\\d+), (\\d+)\\)/).slice(1).map(Number);
+const untouched = out.every((number) => number === 7);
+const shown = digest(file.positions([first, file.prepare(...advice)], frame));
+answer({ errors, untouched, shown, level: thrown(() => file.prepare(0)), of: file.segmentOf(Math.floor(frame)) });
+"""
+
+
+def test_a_frame_of_a_segment_that_is_not_prepared_is_an_error_that_says_which_to_prepare(sample_ath, tmp_path):
+    result = run_node(tmp_path, SEVERAL, sample_ath)
+    with athcodec.open(sample_ath) as decoder:
+        deepest, (start, _) = decoder.file.level_count - 1, decoder.segments[1]
+        between = decoder.blended({"": 1.0}, float(decoder.time[start + 2] + decoder.time[start + 3]) / 2)
+        assert digest(between) == result["shown"]
+    message = (
+        f"NOT_PREPARED: frame {start + 2.5}: got segment 0 at level {deepest}, expected segment 1, the one of 3 that "
+        f"has this frame: pass what prepare(1, {deepest}) returns; segmentOf(Math.floor(frame)) is its number"
+    )
+    errors = result["errors"]
+    for name in ("positions", "matrices", "exact", "blended"):
+        assert (errors[name]["type"], errors[name]["codeName"]) == ("AthError", "NOT_PREPARED")
+        assert errors[name]["message"] == message
+    assert f"frame {start + 2.5}: got no segment, expected segment 1" in errors["none"]["message"]
+    assert result["untouched"] and result["of"] == 1
+    assert (
+        result["level"]["type"] == "RangeError"
+        and "levelFor() and readyLevel() return one" in result["level"]["message"]
+    )
 
 
 # ---- the module ----

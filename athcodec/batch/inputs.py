@@ -13,6 +13,7 @@ import os
 import posixpath
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -24,10 +25,9 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
-from athcodec.sources import FORMATS, FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, is_pattern
+from athcodec.sources import FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, formats, is_pattern
 from athcodec.sources.numbering import each_once, numbered_files
 
-SUFFIXES = (SERIES, *(suffix for form in FORMATS for suffix in form.suffixes if suffix not in FRAME_SUFFIXES))
 TAGS = (
     "ETag",
     "Last-Modified",
@@ -178,7 +178,12 @@ def _below(folder: str, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 
 def _is_clip(name: str) -> bool:
-    return not name.startswith(".") and name.lower().endswith(SUFFIXES)
+    return not name.startswith(".") and name.lower().endswith(_clip_suffixes())
+
+
+@cache
+def _clip_suffixes() -> tuple[str, ...]:
+    return SERIES, *(suffix for form in formats() for suffix in form.suffixes if suffix not in FRAME_SUFFIXES)
 
 
 def _fixed_part(pattern: str, separator: str) -> str:

@@ -3,6 +3,10 @@
 Only this process writes the manifest, and only when a clip's file is in its place. Clips that fail are noted and
 do not stop the others. Drafts and coded segments of long clips, and inputs that were downloaded, lie in a folder
 beside the outputs (the manifest, where those go to a URL), which goes when the run ends, or when the next one begins.
+
+Dask does the rest: `Client.submit` with `priority` orders the tasks, and runs those of a worker that died again, as
+often as its setting distributed.scheduler.allowed-failures says; `as_completed` gives results as they come;
+`Client.wait_for_workers` waits for the first worker; the dashboard of a scheduler shows what each worker does.
 """
 
 from __future__ import annotations
@@ -10,12 +14,10 @@ from __future__ import annotations
 import logging
 import multiprocessing.resource_tracker
 import os
-import queue
-import secrets
 import shutil
 import signal
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -26,7 +28,6 @@ import athcodec
 from athcodec.batch import tasks
 from athcodec.batch.inputs import Item, identity, is_telling, remote_identity, sha256
 from athcodec.batch.manifest import Manifest, ManifestError, Record, read_records
-from athcodec.batch.show import Show
 from athcodec.batch.tasks import Result, one_line
 from athcodec.errors import AthError, MissingExtra
 from athcodec.files.atomic import is_url, remove_leftovers_of, scratch_folder
@@ -36,14 +37,13 @@ from athcodec.files.shown import without_secrets
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
 SPLIT = 4  # segments
-PATIENCE = 0.25  # seconds between looks at the scheduler
-CONNECTING = 30  # seconds, to a scheduler, and of a scheduler without workers
+CONNECTING = 30  # Seconds to wait for a scheduler, and then for the first of its workers.
 ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 LOST = "scheduler: the connection was lost, expected one until the end; the same command goes on where this one ended"
 
 
 class SchedulerError(AthError):
-    """The scheduler, or all of its workers, cannot be reached."""
+    """The scheduler cannot be reached, or has no worker when the run begins."""
 
 
 @dataclass
@@ -130,7 +130,7 @@ def run(
     split: int = SPLIT,
     verify: bool = False,
     redo: bool = False,
-    show: Show | None = None,
+    report: Callable[[str], None] | None = None,
 ) -> Outcome:
     """Encode those clips of a batch whose files are not up to date.
 
@@ -155,8 +155,8 @@ def run(
         Open each file and decode every level of it before it is recorded.
     redo : bool, optional
         Keep nothing.
-    show : Show, optional
-        How the run is followed; not at all by default.
+    report : callable, optional
+        Called with a line of text when a clip is done or has failed.
 
     Returns
     -------
@@ -170,13 +170,13 @@ def run(
     ManifestError
         Where the manifest is in use, or is none.
     SchedulerError
-        Where the scheduler, or all workers, cannot be reached.
+        Where the scheduler cannot be reached, or has no worker when the run begins.
     OSError
         Where the manifest cannot be written.
     """
     if find_spec("distributed") is None:
         raise MissingExtra('batch: needs dask.distributed: pip install "athcodec[batch]"')
-    start, outcome, show = time.monotonic(), Outcome(), show or Show()
+    start, outcome, say = time.monotonic(), Outcome(), report or (lambda line: None)
     manifest = _manifest_path(output, manifest)
     place = os.path.dirname(manifest) if is_url(output) else os.path.abspath(output)
     os.makedirs(place, exist_ok=True)
@@ -186,14 +186,16 @@ def run(
         for item in items:
             entry = _todo(item, notes.records.get(_key(item, output)), redo)
             todo.append(entry) if entry.reason else outcome.kept.append(item)
-        show.begin([entry.item for entry in todo], len(outcome.kept))
+        if outcome.kept:
+            say(f"{len(outcome.kept)} kept, {len(todo)} to do")
         try:
             if todo:
                 with _client(workers, scheduler) as client:
-                    _Run(client, output, folder, notes, outcome, show, split, verify).all(todo)
+                    results = _results(client, todo, folder, split, verify)
+                    for count, (item, result) in enumerate(results, 1):
+                        say(f"[{count}/{len(todo)}] {item.name}: {_noted(item, result, output, notes, outcome)}")
         finally:
             _tidy(entry.item.output for entry in todo if not is_url(entry.item.output))
-            show.end()
     outcome.seconds = time.monotonic() - start
     return outcome
 
@@ -322,143 +324,81 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class _Run:
-    """The clips that workers encode, and their results."""
+def _results(client: Any, todo: Sequence[Todo], folder: str, split: int, verify: bool) -> Iterator[tuple[Item, Result]]:
+    """Encode clips and yield the result of each one as soon as it is there. Raises SchedulerError."""
+    import distributed
 
-    def __init__(
-        self,
-        client: Any,
-        output: str,
-        folder: str,
-        notes: Manifest,
-        outcome: Outcome,
-        show: Show,
-        split: int,
-        verify: bool,
-    ):
-        self.client, self.output, self.folder, self.notes = client, output, folder, notes
-        self.outcome, self.show, self.split, self.verify = outcome, show, split, verify
-        self.topic = f"{SCRATCH}-{secrets.token_hex(8)}"
-        self.seen_workers = time.monotonic()
-        self.finished: queue.SimpleQueue = queue.SimpleQueue()
-        self.pending: dict[str, tuple[Item, str, Any]] = {}  # by key: the clip, what is done with it, the future
-        self.parts: dict[str, list[Any]] = {}  # futures of a long clip's segments, by output
+    items: dict[str, Item] = {}  # by key of a future
 
-    def all(self, todo: Sequence[Todo]) -> None:
-        """Until each clip is in the manifest."""
-        outputs = {entry.item.fingerprint: entry.item.output for entry in todo}
-
-        def show(event: tuple[float, dict[str, Any]]) -> None:
-            self.show.stage(outputs[event[1]["clip"]], event[1]["stage"], event[1]["fraction"])
-
-        self.client.subscribe_topic(self.topic, show)
-        try:
-            for entry in todo:
-                if not is_url(entry.item.output):
-                    os.makedirs(os.path.dirname(entry.item.output), exist_ok=True)
-                self._submit(
-                    entry.item,
-                    "begin",
-                    tasks.begin,
-                    self._folder(entry.item),
-                    split=self.split,
-                    verify=self.verify,
-                    version=athcodec.__version__,
-                    topic=self.topic,
-                    known=entry.known,
-                )
-            while self.pending:
-                self._take()
-        finally:
-            self.client.unsubscribe_topic(self.topic)
-
-    def _folder(self, item: Item) -> str:
-        """Paths of one clip in the scratch folder."""
-        return os.path.join(self.folder, item.fingerprint)
-
-    def _submit(self, item: Item, what: str, function: Any, *arguments: Any, **options: Any) -> Any:
-        """Put the remaining steps of clips that were begun first."""
-        future = self.client.submit(function, item, *arguments, **options, pure=False, priority=what != "begin")
-        self.pending[future.key] = item, what, future
-        future.add_done_callback(self.finished.put)
+    def submit(task: Callable[..., Result], item: Item, *arguments: Any, **options: Any) -> Any:
+        """Let the remaining steps of clips that were begun go before the others."""
+        place, first = _folder(folder, item), task is not tasks.begin
+        future = client.submit(task, item, place, *arguments, **options, pure=False, priority=first)
+        items[future.key] = item
         return future
 
-    def _take(self) -> None:
-        """One result, if one comes soon."""
-        try:
-            future = self.finished.get(timeout=PATIENCE)
-        except queue.Empty:
-            self._check_scheduler()
-            return
-        self.seen_workers = time.monotonic()
-        item, what, _ = self.pending.pop(future.key)
-        result = self._result(future, item)
+    for entry in todo:
+        if not is_url(entry.item.output):
+            os.makedirs(os.path.dirname(entry.item.output), exist_ok=True)
+    options = {"split": split, "verify": verify, "version": athcodec.__version__}
+    finished = distributed.as_completed(
+        [submit(tasks.begin, entry.item, **options, known=entry.known) for entry in todo], loop=client.loop
+    )
+    for future in finished:
+        item = items.pop(future.key)
+        result = _result(future, item)
         if "draft" in result:
-            self._code(item, result["draft"])
-        elif what == "code":
-            done = self.parts.get(item.output, [future])
-            left = sum(part.key in self.pending for part in done)
-            self.show.stage(item.output, "motion", 1 - left / len(done))
-        else:
-            self._note(item, result)
+            segments = range(result["draft"])
+            parts = [submit(tasks.code, item, list(segments[first : first + split])) for first in segments[::split]]
+            finished.add(submit(tasks.finish, item, parts, verify=verify))
+            continue
+        shutil.rmtree(_folder(folder, item), ignore_errors=True)
+        yield item, result
 
-    def _check_scheduler(self) -> None:
-        if self.client.status != "running":
-            raise SchedulerError(LOST)
-        if self.client.scheduler_info()["workers"]:
-            self.seen_workers = time.monotonic()
-        elif time.monotonic() - self.seen_workers > CONNECTING:
-            raise SchedulerError(
-                f"scheduler: got no worker for {CONNECTING} s, expected at least one; the same "
-                "command goes on where this one ended"
-            )
 
-    def _result(self, future: Any, item: Item) -> Result:
-        import distributed
+def _folder(folder: str, item: Item) -> str:
+    """Return where the files of one clip are in the scratch folder."""
+    return os.path.join(folder, item.fingerprint)
 
-        try:
-            return future.result()
-        except distributed.scheduler.KilledWorker as error:
-            times = getattr(error, "allowed_failures", 0) + 1
-            return {
-                "failed": f"{item.shown}: {times} workers died that worked on it, expected none to; perhaps there "
-                "is too little memory"
-            }
-        except Exception as error:
-            if future.status == "cancelled":
-                raise SchedulerError(LOST) from None
-            return {"failed": one_line(error)}
 
-    def _code(self, item: Item, segments: int) -> None:
-        """A long clip, some segments at a time, and its file when all are there."""
-        folder = self._folder(item)
-        groups = [list(range(first, min(first + self.split, segments))) for first in range(0, segments, self.split)]
-        parts = [self._submit(item, "code", tasks.code, folder, group) for group in groups]
-        self.parts[item.output] = parts  # kept until the file is there: a worker that dies may take results with it
-        self._submit(item, "finish", tasks.finish, folder, parts, verify=self.verify, topic=self.topic)
+def _result(future: Any, item: Item) -> Result:
+    import distributed
 
-    def _note(self, item: Item, result: Result) -> None:
-        """A clip that is finished, or failed."""
-        self.parts.pop(item.output, None)
-        shutil.rmtree(self._folder(item), ignore_errors=True)
-        if "kept" in result:
-            self.outcome.kept.append(item)
-            self.show.kept(item)
-            return
-        if "done" in result and is_url(item.output) and _fault_of_output(item, result["done"]):
-            result = {
-                "failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
-                "workers need a file system that all share"
-            }
-        status = "done" if "done" in result else "failed"
-        record = {
-            "output": _key(item, self.output),
-            "input": item.shown,
-            "status": status,
-            "settings": item.settings,
-            "version": athcodec.__version__,
+    try:
+        return future.result()
+    except distributed.scheduler.KilledWorker as error:
+        times = getattr(error, "allowed_failures", 0) + 1
+        return {
+            "failed": f"{item.shown}: {times} workers died that worked on it, expected none to; perhaps there "
+            "is too little memory"
         }
-        record |= result.get("done") or {"reason": result["failed"]}
-        self.notes.add(record)
-        (self.outcome.done if "done" in result else self.outcome.failed).append(record)
-        self.show.finished(item, record)
+    except Exception as error:
+        if future.status == "cancelled":
+            raise SchedulerError(LOST) from None
+        return {"failed": one_line(error)}
+
+
+def _noted(item: Item, result: Result, output: FilePath, notes: Manifest, outcome: Outcome) -> str:
+    """Put the result of a clip into the manifest and the outcome, and return it as text."""
+    if "kept" in result:
+        outcome.kept.append(item)
+        return "kept"
+    if "done" in result and is_url(item.output) and _fault_of_output(item, result["done"]):
+        result = {
+            "failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
+            "workers need a file system that all share"
+        }
+    record = {
+        "output": _key(item, output),
+        "input": item.shown,
+        "status": "done" if "done" in result else "failed",
+        "settings": item.settings,
+        "version": athcodec.__version__,
+    }
+    record |= result.get("done") or {"reason": result["failed"]}
+    notes.add(record)
+    if "done" not in result:
+        outcome.failed.append(record)
+        return f"failed: {record['reason']}"
+    outcome.done.append(record)
+    return f"{record['bytes']:,} bytes, {record['raw_bytes'] / record['bytes']:.1f} to 1"

@@ -27,9 +27,9 @@ from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath
 from athcodec.motion.positions import parse_order, written
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import parse_length, parse_size
+from athcodec.motion.units import AXES, METRES, parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
-from athcodec.sources import FORMATS, format_named
+from athcodec.sources import format_named, formats
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
@@ -48,7 +48,7 @@ READING = (
     "up_axis",
 )
 # These settings change a clip before it is encoded.
-SHAPING = ("hierarchy", "loop", "loop_blend", "endless", "strength", "heading")
+SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
 
 Settings = dict[str, Any]
 
@@ -94,7 +94,7 @@ def check_settings(settings: Mapping[str, Any], where: str = "settings", folder:
     ----------
     settings : dict
         Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
-        loop_blend, endless, strength and heading.
+        loop_blend, strength and heading.
         Lengths and sizes may be text with a unit, "1mm".
     where : str, optional
         What error messages begin with.
@@ -154,23 +154,14 @@ def reading_options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def coding_options(settings: Settings, unit: Any) -> dict[str, Any]:
-    """Keywords of athcodec.encode, for a clip whose metadata says `unit`. Raises BoundError."""
+def coding_options(settings: Settings) -> dict[str, Any]:
+    """Keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:
         options["host_rest"] = True
-    if "max_error" in options:
-        options["max_error"] = _length(options["max_error"], unit)
-    if "target_size" in options:
-        options["target_size"] = parse_size(str(options["target_size"]))
     if "tam" in options:
-        epsilon, eta, xi, lam = options["tam"]
-        options["tam"] = Thresholds(_length(epsilon, unit), eta, _length(xi, unit), lam)
+        options["tam"] = Thresholds(*options["tam"])
     return options
-
-
-def _length(value: float | str, unit: Any) -> float:
-    return parse_length(str(value)).in_scene_units(unit)
 
 
 def _positive_length(value: Any) -> float | str:
@@ -234,7 +225,7 @@ def _rate(value: Any) -> float:
 
 
 def _format(value: Any) -> str:
-    return format_named(value, FORMATS).name
+    return format_named(value, formats()).name
 
 
 def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:
@@ -295,11 +286,10 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "takes": _patterns,
     "allow_outside": _BOOL,
     "max_memory": _size,
-    "unit": _TEXT,
-    "up_axis": _one_of("x", "y", "z"),
+    "unit": _one_of(*METRES),
+    "up_axis": _one_of(*AXES),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
-    "endless": _BOOL,
     "strength": _finite,
     "heading": _finite,
 }

@@ -34,12 +34,8 @@ from athcodec.motion.joining import in_wind
 from athcodec.sources import listed
 from athcodec.sources.branches import find_or_load
 
-BETWEEN_REPORTS = 0.3  # seconds
-
 Result = dict[str, Any]
 """Of a task: "failed" with a reason, or "done" with figures, "draft" with the number of segments, "kept", "part"."""
-
-Report = Callable[[str, float], None]
 
 
 def _task(work: Callable[..., Result]) -> Callable[..., Result]:
@@ -60,14 +56,7 @@ def _task(work: Callable[..., Result]) -> Callable[..., Result]:
 
 @_task
 def begin(
-    item: Item,
-    folder: str,
-    *,
-    split: int,
-    verify: bool,
-    version: str,
-    topic: str | None = None,
-    known: dict[str, Any] | None = None,
+    item: Item, folder: str, *, split: int, verify: bool, version: str, known: dict[str, Any] | None = None
 ) -> Result:
     """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
     folder. known: the record of an output that is up to date unless the content of its input has changed."""
@@ -77,16 +66,16 @@ def begin(
     path = os.path.join(folder, "draft")
     if os.path.exists(path):
         return {"draft": _unpickled(path)[0].segment_count}
-    source, report = _source(item, folder), _reporter(item, topic)
+    source = _source(item, folder)
     if known is not None and source.get("sha256") == known["source"].get("sha256"):
         return {"kept": True, "source": source}
     with _opened(item, folder, source) as clip, keeping(clip.inputs):
         check_target(_target(item, folder), ".ath")
-        options = coding_options(item.settings, clip.metadata.get("unit"))
+        options = coding_options(item.settings)
         if _segment_count(clip, options) <= split:
-            summary = athcodec.encode(clip, _target(item, folder), jobs=1, progress=report, **options)
+            summary = athcodec.encode(clip, _target(item, folder), jobs=1, **options)
             return _done(item, source, summary, clip if verify else None, start)
-        draft = encoding.draft(clip, jobs=1, progress=report, **options)
+        draft = encoding.draft(clip, jobs=1, **options)
     _pickle(path, [(draft, source, time.perf_counter() - start)])
     return {"draft": draft.segment_count}
 
@@ -105,14 +94,14 @@ def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
 
 
 @_task
-def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool, topic: str | None = None) -> Result:
+def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) -> Result:
     """The file of a long clip, from the results of `code`."""
     if failed := [part for part in parts if "failed" in part]:
         return failed[0]
     start = time.perf_counter()
     draft, source, seconds = _unpickled(os.path.join(folder, "draft"))
     with _opened(item, folder, source) as clip:
-        summary = encoding.write(clip, draft, _coded(parts), _target(item, folder), progress=_reporter(item, topic))
+        summary = encoding.write(clip, draft, _coded(parts), _target(item, folder))
         start -= seconds + sum(part["seconds"] for part in parts)
         return _done(item, source, summary, clip if verify else None, start)
 
@@ -151,7 +140,7 @@ def _done(
 
 @contextmanager
 def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
-    """The clip as a loop, without an end and on the branches, if its settings ask for that. Raises ClipError where it
+    """The clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
     is another than `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)
@@ -167,7 +156,6 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
             clip = in_wind(clip, item.settings["strength"], item.settings.get("heading", 0.0))
         blend = loop_frames(item.settings)
         clip = clip if blend is None else athcodec.looped(clip, blend)
-        clip = athcodec.endless(clip) if item.settings.get("endless") else clip
         hierarchy = item.settings.get("hierarchy")
         yield clip if hierarchy is None else with_branches(clip, find_or_load(clip, hierarchy))
     _check_source(item, source)
@@ -226,29 +214,12 @@ def _coded(parts: Sequence[Result]) -> Iterator[CodedSegment]:
                 yield pickle.load(file)
 
 
-# ---- errors and reports ----
+# ---- errors ----
 
 
 def one_line(error: BaseException) -> str:
     """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
         return redacted(f"{error.filename}: {error.strerror}")
-    text = " ".join(redacted(str(error)).split())
+    text = " ".join(redacted(error.for_shell if isinstance(error, AthError) else str(error)).split())
     return text if text and isinstance(error, (AthError, OSError)) else f"{type(error).__name__}: {text}"
-
-
-def _reporter(item: Item, topic: str | None) -> Report:
-    """Sends stages and fractions to whoever listens to the topic, now and then."""
-    if topic is None:
-        return lambda stage, fraction: None
-    from distributed import get_worker
-
-    worker, last = get_worker(), 0.0
-
-    def report(stage: str, fraction: float) -> None:
-        nonlocal last
-        if time.monotonic() - last >= BETWEEN_REPORTS:
-            last = time.monotonic()
-            worker.log_event(topic, {"clip": item.fingerprint, "stage": stage, "fraction": fraction})
-
-    return report

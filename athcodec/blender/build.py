@@ -19,6 +19,7 @@ from athcodec.files.atomic import new_file
 
 PYTHONS = ("3.11", "3.13")  # Blender 4.2 to 5.0 has the first, Blender 5.1 and later the second.
 NEEDED = ("zstandard",)
+MAKE = "in a clone `pip wheel --no-deps -w dist .` makes dist/athcodec-*.whl for this platform"
 EXTENSION = Path(__file__).resolve().parent / "extension"
 PLATFORMS = {"linux": "linux", "manylinux": "linux", "win": "windows", "macosx": "macos"}
 MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64"}
@@ -27,19 +28,39 @@ MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m athcodec.blender.build", description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path, help="the .zip to write, which Blender installs")
-    parser.add_argument("wheels", type=Path, nargs="+", help="wheels of athcodec, and of the others if not by pip")
+    parser.add_argument("wheels", type=Path, nargs="*", help="wheels of athcodec, and of the others if not by pip")
     args = parser.parse_args(argv)
-    with tempfile.TemporaryDirectory() as folder:
-        pack(args.output, [*args.wheels, *_fetched(args.wheels, Path(folder))])
+    try:
+        check(args.wheels)
+        with tempfile.TemporaryDirectory() as folder:
+            pack(args.output, [*args.wheels, *_fetched(args.wheels, Path(folder))])
+    except (ValueError, OSError) as error:
+        parser.error(str(error))
     print(f"{args.output}: {args.output.stat().st_size:,} bytes")
     return 0
 
 
+def check(wheels: Sequence[Path]) -> None:
+    """Raise ValueError where a wheel is not there, where none is athcodec's, or one of those for no platform of
+    Blender."""
+    for wheel in wheels:
+        if not wheel.is_file():
+            raise ValueError(f"{wheel}: there is no such wheel; {MAKE}")
+    for wheel in _of_athcodec(wheels):
+        platform(wheel)
+    if not _of_athcodec(wheels):
+        names = ", ".join(wheel.name for wheel in wheels) or "none"
+        raise ValueError(f"wheels: got {names}, expected one of athcodec for each platform; {MAKE}")
+
+
+def _of_athcodec(wheels: Sequence[Path]) -> list[Path]:
+    return [wheel for wheel in wheels if wheel.name.startswith("athcodec-")]
+
+
 def pack(output: Path, wheels: Sequence[Path]) -> None:
-    """Write the extension with these wheels. Raises ValueError where none of them is athcodec's, OSError."""
-    own = [wheel for wheel in wheels if wheel.name.startswith("athcodec-")]
-    if not own:
-        raise ValueError(f"wheels: got {', '.join(wheel.name for wheel in wheels)}, expected one of athcodec")
+    """Write the extension with these wheels. Raises ValueError as `check` does, OSError."""
+    check(wheels)
+    own = _of_athcodec(wheels)
     platforms = sorted({platform(wheel) for wheel in own})
     names = sorted({wheel.name: wheel for wheel in wheels})
     manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
@@ -79,24 +100,21 @@ def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
     for tag in sorted({wheel.stem.split("-")[-1] for wheel in wheels}):
         tags = [option for name in _pip_platforms(tag) for option in ("--platform", name)]
         for python in PYTHONS:
-            subprocess.run(
-                [
-                    sys.executable,
-                    "-m",
-                    "pip",
-                    "download",
-                    "--quiet",
-                    "--no-deps",
-                    "--only-binary=:all:",
-                    "--python-version",
-                    python,
-                    *tags,
-                    "--dest",
-                    str(folder),
-                    *missing,
-                ],
-                check=True,
-            )
+            words = [
+                "pip",
+                "download",
+                "--quiet",
+                "--no-deps",
+                "--only-binary=:all:",
+                "--python-version",
+                python,
+                *tags,
+            ]
+            if subprocess.run([sys.executable, "-m", *words, "--dest", str(folder), *missing]).returncode:
+                raise ValueError(
+                    f"wheels: pip has no {', '.join(missing)} of Python {python} for {tag}; name its wheels beside "
+                    f"those of athcodec, from another machine by: {' '.join(words)} {' '.join(missing)}"
+                )
     return sorted(folder.glob("*.whl"))
 
 

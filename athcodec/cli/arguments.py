@@ -10,8 +10,7 @@ from typing import Any
 
 import athcodec
 from athcodec.files.shown import shown
-from athcodec.motion.positions import parse_order, written
-from athcodec.motion.units import METRES, Length, parse_length, parse_size
+from athcodec.motion.units import AXES, METRES, Length, checked_axis, checked_unit, parse_length, parse_size
 from athcodec.options import (
     DEFAULT_LADDER,
     DEFAULT_REL_ERROR,
@@ -213,13 +212,6 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         "them into those at their beginning",
     )
     verb.add_argument(
-        "--endless",
-        metavar="NAME,...",
-        type=_argument(_names),
-        help="clips to find transitions in, between like frames, over which players play them without an end; all: "
-        "every one",
-    )
-    verb.add_argument(
         "--strength",
         metavar="S,...",
         type=_argument(_numbers),
@@ -294,11 +286,6 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
     verb.add_argument("--dry-run", action="store_true", help="only say what would be done with each clip, and why")
     verb.add_argument("--loop", action="store_true", help="mark clips as loops, their first frame following their last")
-    verb.add_argument(
-        "--endless",
-        action="store_true",
-        help="find transitions between like frames, over which players play clips without an end",
-    )
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",
@@ -457,8 +444,18 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(parse_size),
         help="bytes of memory that reading a source may take, such as 500MB or 16GiB (default 4GiB)",
     )
-    source.add_argument("--unit", metavar="UNIT", help="unit of length to convert to, or that of a source without one")
-    source.add_argument("--up-axis", choices=("x", "y", "z"), help="axis to turn up, or that of a source without one")
+    source.add_argument(
+        "--unit",
+        metavar="UNIT",
+        type=_argument(checked_unit),
+        help=f"unit of length to convert to, or that of a source without one: {', '.join(METRES)}",
+    )
+    source.add_argument(
+        "--up-axis",
+        metavar="AXIS",
+        type=_argument(checked_axis),
+        help=f"axis to turn up, or that of a source without one: {', '.join(AXES)}",
+    )
 
 
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
@@ -517,7 +514,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "--nanite",
         action="store_true",
         help="with --rig and USD: laid out as Nanite Assemblies of Unreal Engine 5.7, copies as instances on the "
-        "joints, and the JSON of Dynamic Wind beside it",
+        "joints, and the JSON of Dynamic Wind beside it; not run in Unreal",
     )
     verb.add_argument(
         "--instances",
@@ -715,6 +712,8 @@ def _names(text: str) -> list[str]:
 
 
 def _axes(text: str) -> str:
+    from athcodec.motion.positions import parse_order, written  # The import takes longer than all of this module.
+
     return written(parse_order(text))
 
 

@@ -15,28 +15,18 @@ from athcodec.cli.printing import progress, say
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.file_tables import Level
-from athcodec.errors import (
-    AthError,
-    ClipError,
-    GuessWarning,
-    LevelUnavailable,
-    NeedsHostMesh,
-    NotAnAthFile,
-    RemoteError,
-    SourceWarning,
-)
+from athcodec.errors import AthError, ClipError, GuessWarning, LevelUnavailable, RemoteError, SourceWarning
+from athcodec.exporters import check_ath_name
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping
-from athcodec.files.kinds import kind_of
+from athcodec.files.kinds import SOURCES, kind_of
 from athcodec.files.reading import naming_file
 from athcodec.files.shown import counted
 from athcodec.metrics import MotionMeter, SmoothnessMeter, level_meters
 from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
-from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.units import Length
 from athcodec.options import HOST, MAX_MEMORY
-from athcodec.sources import LISTED, ReadOptions, find_format, listed
+from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
 from athcodec.sources.numbering import each_once
 
@@ -57,15 +47,14 @@ def clip_to_encode(
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
             parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
-        loops, endless = _checked_names(names, len(parts), args)
+        loops = _checked_names(names, len(parts), args)
         winds = _checked_winds(len(parts), args)
         clips: dict[str, MotionClip] = {}
         for name, wind, (_, _, clip) in zip(names, winds, parts):
             if args.rest not in ("auto", HOST) and clips:  # one that was made: the first clip's is as good for all
                 clip = clip.replace(rest=next(iter(clips.values())).source_rest, rest_given=False)
             clip = in_wind(clip, *wind) if wind else clip
-            clip = athcodec.looped(clip, args.loop_blend) if name in loops else clip
-            clips[name] = _endless(name, clip) if name in endless else clip
+            clips[name] = athcodec.looped(clip, args.loop_blend) if name in loops else clip
         joined = athcodec.join(clips) if len(clips) > 1 or names != [""] else clips[""]
         opened.pop_all()
     return joined
@@ -77,6 +66,14 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
 
     if len(paths) != 1 or args.output:
         raise ClipError(f"--into: got {len(paths)} inputs or an output besides, expected one GLB and no other output")
+    if (kind := kind_of(paths[0])) != "glTF":
+        path, glb = shlex.quote(paths[0]), shlex.quote(args.into)
+        encoded = shlex.quote(str(Path(paths[0]).with_suffix(ATH)))
+        hint = f"; `athcodec decode {path} {glb}` writes one of it" if kind == ATH else ""
+        if kind in SOURCES:
+            hint = f"; `athcodec encode {path} {encoded}` makes an .ath file of it, and "
+            hint += f"`athcodec decode {encoded} {glb}` a GLB of that"
+        raise ClipError(f"{paths[0]}: is no GLB (it looks like {kind}), expected an animated one for --into{hint}")
     for name in ("source_format", "mesh", "field", "dataset", "axes", "unit", "up_axis"):
         if getattr(args, name) is not None:
             raise ClipError(f"--into: got --{name.replace('_', '-')} too, expected the GLB as it is")
@@ -85,25 +82,17 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
     return Into(paths[0], _gltf_options(args), args.keep_animation, args.gltf_motion)
 
 
-def _endless(name: str, clip: MotionClip) -> MotionClip:
-    """The clip with transitions. ClipError where there are none."""
-    with naming(name or "clip"):
-        return athcodec.endless(clip)
-
-
-def _checked_names(
-    names: Sequence[str], clip_count: int, args: argparse.Namespace
-) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the names of the loops and of the clips without an end. ClipError where they do not fit the clips."""
+def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
+    """Return the names of the loops. ClipError where they do not fit the clips."""
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
-    loops, endless = (names if given == ["all"] else given or [] for given in (args.loop, args.endless))
-    for name in (*loops, *endless, *names):
+    loops = names if args.loop == ["all"] else args.loop or []
+    for name in (*loops, *names):
         if names.count(name) != 1:
             raise ClipError(f"clip {name!r}: got {names.count(name)} of this name, expected one (see --names)")
     if args.loop_blend and not loops:
         raise ClipError("--loop-blend: got no clips to make loops of, expected some with --loop")
-    return loops, endless
+    return loops
 
 
 def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:
@@ -123,8 +112,7 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
     """Return the part of a file to decode: frames of a clip, or all clips."""
     level, of_one = args.level, args.clip is not None or len(decoder.file.clips) == 1
     if args.max_error is not None:
-        length = args.max_error.in_scene_units(decoder.metadata.get("unit"))
-        level = decoder.level_within(length) if of_one else decoder.file.level_within(length)
+        level = (decoder if of_one else decoder.file).level_within(args.max_error)
     if of_one:
         return ClipView(decoder, level, _frames(args.frames, decoder.frame_count))
     if args.frames != (None, None):
@@ -231,21 +219,9 @@ def naming(path: str | Path) -> Iterator[None]:
         with naming_file(path):
             yield
     except AthError as error:
-        if isinstance(error, NotAnAthFile) and (kind := _kind_of_source(path)):
-            hint = f"is not an .ath file (it looks like {kind}); use `athcodec encode` first"
-            raise NotAnAthFile(f"{path}: {hint}") from error
         if str(error).startswith(f"{path}: ") or isinstance(error, RemoteError):
             raise
-        hint = "; --host-mesh names it" if isinstance(error, NeedsHostMesh) else ""
-        raise type(error)(f"{path}: {error}{hint}") from error
-
-
-def _kind_of_source(path: str | Path) -> str:
-    """Return what a file looks like, if it is a source that can be encoded; else nothing."""
-    with suppress(AthError, OSError):
-        find_format(path)
-        return kind_of(path)
-    return ""
+        raise error.about(str(path)) from error
 
 
 def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
@@ -255,22 +231,6 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     found = find_or_load(clip, hierarchy)
     say("hierarchy", str(found))
     return clip_with_branches(clip, found)
-
-
-def bound(args: argparse.Namespace, unit: Any) -> dict[str, float | int]:
-    """The keyword of encode() that sets the bound, or the size of the file; empty for encode's own default."""
-    if args.max_error is not None:
-        return {"max_error": args.max_error.in_scene_units(unit)}
-    if args.target_size is not None:
-        return {"target_size": args.target_size}
-    return {} if args.rel_error is None else {"rel_error": args.rel_error}
-
-
-def thresholds(tam: tuple[Length, int, Length, int] | None, unit: Any) -> Thresholds | None:
-    if tam is None:
-        return None
-    epsilon, eta, xi, lam = tam
-    return Thresholds(epsilon.in_scene_units(unit), eta, xi.in_scene_units(unit), lam)
 
 
 def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
@@ -357,6 +317,8 @@ def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
     with suppress(ClipError, OSError):
         is_source = bool(inputs) and find_format(output) is not None
     if not is_source:
+        if suffix == ATH:
+            check_ath_name(output)
         raise ClipError(f"{output}: got this name for the output, expected one that ends in {suffix}")
     paths = [path for path, _ in each_once([*inputs, output])]
     words = " ".join(map(shlex.quote, paths if len(paths) <= LISTED else [*paths[:2], "...", paths[-1]]))

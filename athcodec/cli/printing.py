@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, level_rows, print_facts, size_of
+from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, level_rows, parts_of, size_of
 from athcodec.errors import AthError
-from athcodec.files.shown import counted, echo, print_table, redacted
+from athcodec.files.shown import counted, echo, print_parts, print_table, redacted
 from athcodec.options import DEFAULT_REL_ERROR
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
         print_motions(facts)
         return
     for each in facts:
-        print_facts(each)
+        print_parts(parts_of(each))
 
 
 def print_motions(results: list[dict[str, Any]]) -> None:
@@ -245,7 +245,7 @@ def one_line(error: Exception) -> str:
     """Return what went wrong in one line. An error that nobody foresaw is named by its class."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    text = " ".join(str(error).split())
+    text = " ".join((error.for_shell if isinstance(error, AthError) else str(error)).split())
     foreseen = isinstance(error, (AthError, OSError))
     return text if foreseen and text else f"{type(error).__name__}: {text} (--debug shows where)"
 

@@ -13,10 +13,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from athcodec.errors import ClipError
-from athcodec.exporters import FORMATS as WRITTEN
+from athcodec.exporters import formats as written_formats
 from athcodec.files.kinds import HEAD_BYTES
-from athcodec.sources import FORMATS as READ
-from athcodec.sources import format_named
+from athcodec.sources import format_named, formats
 
 STREAM = "-"
 ATH = ".ath"
@@ -41,9 +40,9 @@ class Streams:
         if path != STREAM:
             return path
         if format is not None or self._input:
-            return self._read(format_named(format, READ).suffixes[0] if format else "")
+            return self._read(format_named(format, formats()).suffixes[0] if format else "")
         head = sys.stdin.buffer.peek(HEAD_BYTES)
-        kind = next((kind for kind in READ if kind.begins(head)), None)
+        kind = next((kind for kind in formats() if kind.begins(head)), None)
         if kind is None:
             raise ClipError(f"{STREAM}: got a format that its first bytes do not tell, expected --source-format")
         return self._read(kind.suffixes[0])
@@ -52,7 +51,7 @@ class Streams:
         """The file to write in place of `path`: format is None for .ath. Raises ClipError."""
         if path != STREAM:
             return path
-        suffix = ATH if format is None else format_named(format, WRITTEN).suffixes[0]
+        suffix = ATH if format is None else format_named(format, written_formats()).suffixes[0]
         os.mkdir(os.path.join(self._folder, "out"))
         self._output = os.path.join(self._folder, "out", f"standard_output{suffix}")
         return self._output

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shlex
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -18,7 +19,6 @@ import numpy as np
 import athcodec
 from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
-    bound,
     check_name,
     check_output,
     clip_to_encode,
@@ -29,7 +29,6 @@ from athcodec.cli.clips import (
     open_file,
     read_clip,
     refuse_broken_promises,
-    thresholds,
     tick_ratios,
     view_to_decode,
     what_is_missing,
@@ -61,6 +60,7 @@ from athcodec.files.shown import counted, echo, print_table
 from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
+from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
@@ -115,12 +115,14 @@ def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
 
 def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> Summary:
     with naming(path), progress() as report:
-        unit = clip.metadata.get("unit")
         summary = athcodec.encode(
             with_branches(clip, args.hierarchy),
             output,
             segment_frames=args.segment_frames,
-            tam=thresholds(args.tam, unit),
+            max_error=args.max_error,
+            rel_error=args.rel_error,
+            target_size=args.target_size,
+            tam=None if args.tam is None else Thresholds(*args.tam),
             exact_rest=args.exact_rest,
             rest_error=args.rest_error,
             lossless=args.lossless,
@@ -130,7 +132,6 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
             ladder=args.ladder,
             jobs=args.jobs,
             progress=report,
-            **bound(args, unit),
             **options,
         )
     if summary.found_branches is not None:
@@ -142,7 +143,6 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
 
 def batch(args: argparse.Namespace) -> int:
     from athcodec import batch
-    from athcodec.batch.show import show_of_terminal
 
     inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
     items = batch.find(
@@ -158,7 +158,7 @@ def batch(args: argparse.Namespace) -> int:
     if args.dry_run:
         print_preview(batch.preview(items, args.out, **where), args.json)
         return 0
-    outcome = batch.run(items, args.out, **where, **how, show=show_of_terminal())
+    outcome = batch.run(items, args.out, **where, **how, report=partial(echo, file=sys.stderr))
     print_outcome(outcome, args)
     return 1 if outcome.failed else 0
 
@@ -175,7 +175,7 @@ def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
     given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    given |= {name: True for name in ("exact_rest", "lossless", "loop", "endless") if getattr(args, name)}
+    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
     given |= {
         name: getattr(args, name)
         for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
@@ -238,9 +238,11 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace, quiet: bool) -> int:
+    from athcodec.exporters import format_to_write
     from athcodec.sources import listed
 
     check_output(args.output, args.input, args.host_mesh, suffix="" if args.format else None)
+    format_to_write(args.output, args.format)  # An unknown one is refused before there is work.
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
         names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
@@ -278,7 +280,7 @@ def _goes_back(args: argparse.Namespace) -> bool:
 
 def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written:
     """In the format that is asked for; several are those of a GLB, to go back into it."""
-    from athcodec import exporters, sources
+    from athcodec import exporters
     from athcodec.files.gltf.motion import GltfMotion
 
     motion = motions[0]
@@ -287,7 +289,7 @@ def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written
 
         write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
-    name = args.format or sources.format_by_suffix(args.output, exporters.FORMATS).name
+    name = exporters.format_to_write(args.output, args.format).name
     how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
@@ -354,15 +356,11 @@ def truncate(args: argparse.Namespace) -> int:
         check_name(args.output, ATH)
     check_output(args.output, args.input)
     with naming(args.input):
-        max_error = args.max_error
-        if max_error is not None:
-            with open_file(args.input, gltf_motion=args.gltf_motion) as decoder:
-                max_error = max_error.in_scene_units(decoder.metadata.get("unit"))
         athcodec.truncate(
             args.input,
             args.output,
             args.level,
-            max_error=max_error,
+            max_error=args.max_error,
             target_size=args.target_size,
             gltf_motion=args.gltf_motion,
         )
@@ -378,7 +376,7 @@ def truncate(args: argparse.Namespace) -> int:
 def formats(args: argparse.Namespace) -> int:
     from athcodec import exporters, sources
 
-    read, written = ({kind.name: kind for kind in module.FORMATS} for module in (sources, exporters))
+    read, written = ({kind.name: kind for kind in module.formats()} for module in (sources, exporters))
     rows = [
         {
             "format": name,
@@ -386,6 +384,7 @@ def formats(args: argparse.Namespace) -> int:
             "writes": _suffixes(written.get(name)),
             "title": kind.title,
             "extra": kind.extra,
+            "package": kind.package or "athcodec",
             "installed": kind.is_installed,
         }
         for name, kind in (written | read).items()
@@ -406,8 +405,8 @@ def _suffixes(kind: Any) -> list[str]:
 
 def _needs(row: dict[str, Any]) -> str:
     if not row["extra"]:
-        return ""
-    return f"athcodec[{row['extra']}]" + (", installed" if row["installed"] else "")
+        return "" if row["package"] == "athcodec" else row["package"]
+    return f"{row['package']}[{row['extra']}]" + (", installed" if row["installed"] else "")
 
 
 def view(args: argparse.Namespace) -> int:
@@ -491,14 +490,14 @@ def demo(args: argparse.Namespace) -> int:
         floor = (
             {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()} if args.sample == "tree" else None
         )
-        shown = athcodec.sample_path("leafed") if floor else encoded
-        made = _export_demo(shown, page, floor)
+        made = _export_demo(encoded, page, floor)
         if args.json:
             print_json(facts | {"page": str(page) if made else None})
             return 0
         print_demo(facts, summary.max_error_bound / summary.relative_bound)
         if made:
-            echo(f"{shown.name} moves in {page}: open it in a browser.")
+            leafed = shlex.quote(str(athcodec.sample_path("leafed")))
+            echo(f"It moves in {page}: open it in a browser. `athcodec view {leafed}` shows one with leaves.")
         if args.keep is not None:
             echo(f"The file and its decoded levels are in {folder}.")
     return 0

@@ -9,10 +9,11 @@ import numpy as np
 from athcodec.decoding import core_file
 from athcodec.decoding.ath_file import AthFile
 from athcodec.errors import BadChunk
+from athcodec.files.shown import counted
 from athcodec.motion.affine_fit import stem_maps
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Affines:
     """The parts of a level as matrices, K of them, by first vertex.
 
@@ -34,6 +35,9 @@ class Affines:
     vertex_count: np.ndarray
     is_stem: np.ndarray
     matrices: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"<Affines: {counted(len(self.branch), 'part')}, {int(self.is_stem.sum()):,} of them exact stems>"
 
 
 def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, what: str) -> Affines:

@@ -6,7 +6,9 @@ in static_data.py, and the decoding of segments in segment_decoder.py. Playing a
 
 from __future__ import annotations
 
+import hashlib
 import math
+import os
 from dataclasses import asdict
 from typing import Any
 
@@ -16,15 +18,17 @@ from athcodec._native import WHOLE
 from athcodec.decoding import container as ct
 from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
-from athcodec.decoding.file_tables import Clip, median_rate
+from athcodec.decoding.file_tables import Clip
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.decoding.segment_decoder import SegmentDecoder
 from athcodec.decoding.static_data import StaticData
-from athcodec.errors import BadChunk, ClipError, Truncated
+from athcodec.errors import BadChecksum, BadChunk, ClipError, Truncated
+from athcodec.files.atomic import is_url
+from athcodec.files.shown import counted, redacted
+from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds
-from athcodec.motion.transitions import transitions_of
 
 
 class AthFile(StaticData, SegmentDecoder):
@@ -100,6 +104,8 @@ class AthFile(StaticData, SegmentDecoder):
         gltf_motion: str | None = None,
     ):
         super().__init__(path, strict, allow_partial, limits, gltf_motion)
+        self._place = _place_of(path)
+        self._options = {"strict": strict, "allow_partial": allow_partial, "limits": limits, "gltf_motion": gltf_motion}
         info = self.core.info
         self.vertex_count: int = info.vertex_count
         self.branch_count: int = info.branch_count
@@ -116,11 +122,34 @@ class AthFile(StaticData, SegmentDecoder):
             self.close()
             raise
 
+    def __repr__(self) -> str:
+        return (
+            f"<AthFile {self.name!r}: {counted(self.vertex_count, 'vertex', 'vertices')} on "
+            f"{counted(self.branch_count, 'branch', 'branches')}, {counted(self.frame_count, 'frame')} in "
+            f"{counted(len(self.clips), 'clip')}, {counted(self.level_count, 'level')}, {self.file_length:,} bytes>"
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.is_closed:
+            raise ValueError("AthFile: is closed; expected an open file to pickle")
+        if not self._closes_source:
+            raise TypeError(
+                "AthFile: got one of a file object, which only this process has; expected one of a path, a URL or "
+                "bytes to pickle"
+            )
+        place = self.source.getvalue() if self._place is None else self._place
+        return _reopened, (type(self), place, self._options | {"host_mesh": self.host_mesh}, self._fingerprint)
+
     def __enter__(self) -> AthFile:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @property
+    def _fingerprint(self) -> str:
+        """Tells this file from another at the same place, by its front, which has the checksums of all chunks."""
+        return hashlib.sha256(self.core.prelude.tobytes()).hexdigest()
 
     def table1(self) -> dict[str, float]:
         """Return Table 1 of the paper: depth (levels of nodes), nodes, leaves, and the encoder's thresholds."""
@@ -179,7 +208,6 @@ class AthFile(StaticData, SegmentDecoder):
             "loop": clip.loop,
             "wind": None if math.isnan(strength) else {STRENGTH: strength, HEADING: heading},
             "presence": stated_presence(metadata),
-            "transitions": len(transitions_of(metadata, clip.frame_count)),
             "seam_errors": list(clip.seam_errors),
             "max_errors": [level.max_error for level in self.levels_in(clip.segments)],
         }
@@ -205,3 +233,20 @@ class AthFile(StaticData, SegmentDecoder):
         for segment in range(self.segment_count):
             for level in range(self.level_count):
                 ready = self.prepare(segment, level, ready)
+
+
+def _place_of(path: Openable) -> str | None:
+    """Return the path or URL that opens the same file from any folder; None for bytes and file objects."""
+    if not isinstance(path, (str, os.PathLike)):
+        return None
+    return str(path) if is_url(path) else os.path.abspath(os.fspath(path))
+
+
+def _reopened(kind: type[AthFile], place: str | bytes, options: dict[str, Any], fingerprint: str) -> AthFile:
+    """Open the file of a pickled AthFile. Raises BadChecksum if another is in its place, and the errors of opening."""
+    file = kind(place, **options)
+    if file._fingerprint != fingerprint:
+        file.close()
+        name = redacted(place) if isinstance(place, str) else "bytes"
+        raise BadChecksum(f"{name}: got another file than the one that was pickled; open it again")
+    return file

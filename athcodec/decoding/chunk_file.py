@@ -21,13 +21,16 @@ from athcodec.errors import (
     ClipError,
     FormatError,
     LevelUnavailable,
+    NeedsHostMesh,
     NotAnAthFile,
     TrailingBytes,
     Truncated,
     error_class,
 )
 from athcodec.files.atomic import file_ids, is_url
+from athcodec.files.kinds import HEAD_BYTES, SOURCES, UNKNOWN, kind_of_bytes
 from athcodec.files.plain import open_plain
+from athcodec.files.shown import redacted
 
 Openable: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO
 """A path, a URL, the bytes of a file, or a file object."""
@@ -38,6 +41,8 @@ CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 class ChunkFile:
     """An opened file that reads its chunks and feeds them to the C core. AthFile documents the attributes."""
 
+    is_closed = False  # Whether `close` has closed the file; a file object of a caller stays open.
+
     def __init__(
         self, path: Any, strict: bool, allow_partial: bool, limits: Limits | None, gltf_motion: str | None
     ) -> None:
@@ -46,6 +51,7 @@ class ChunkFile:
         self._lock = threading.Lock()
         self._closes_source = not hasattr(path, "read")
         self._source = _opened(path, gltf_motion)
+        self._name = redacted(os.fspath(path)) if isinstance(path, (str, os.PathLike)) else ""
         self.inputs = file_ids(path if isinstance(path, (str, os.PathLike)) else getattr(path, "name", None))
         try:
             self.available_length: int = self._source.seek(0, os.SEEK_END)
@@ -69,11 +75,18 @@ class ChunkFile:
         if self._closes_source:
             with self._lock:
                 self._source.close()
+                self.is_closed = True
 
     def __del__(self) -> None:
         """Close a file that nobody can read from any more, as h5py does."""
         if getattr(self, "_closes_source", False) and hasattr(self, "_source"):
             self._source.close()
+
+    @property
+    def name(self) -> str:
+        """The path or URL of the file, or the name of a file object; "file" if it has none."""
+        stated = self._name or getattr(self._source, "name", None)
+        return stated if isinstance(stated, str) and stated else "file"
 
     @property
     def source(self) -> Any:
@@ -110,7 +123,7 @@ class ChunkFile:
             while len(data) < needed:
                 more = self._read_some(len(data), needed - len(data))
                 if not more:
-                    raise Truncated(str(lacking)) if data else NotAnAthFile("file: got no bytes; expected an .ath file")
+                    raise Truncated(str(lacking)) if data else self._no_ath_file()
                 data += more
                 if len(data) < needed or not memory:
                     needed, memory, lacking = core_file.front(data, limits)
@@ -118,9 +131,25 @@ class ChunkFile:
         except core_file.CoreError as error:
             raise self._refusal(error) from None
 
+    def _no_ath_file(self) -> NotAnAthFile:
+        """Return the exception for another file, which says what it looks like and how to encode it."""
+        head, name = self._read_some(0, HEAD_BYTES), self._name
+        kind = kind_of_bytes(head, self.available_length)
+        looks = f"it looks like {kind}" if kind != UNKNOWN else "got first bytes of no format that athcodec knows"
+        message = f"is not an .ath file ({looks if head else 'got no bytes'})"
+        message = f"{name}: {message}" if name else f"this {message}"
+        if kind not in SOURCES:
+            return NotAnAthFile(message)
+        names = f"{name!r}, {os.path.splitext(name)[0] + '.ath'!r}" if name else "PATH, 'a.ath'"
+        return NotAnAthFile(message, python=f"athcodec.encode({names}) makes one", shell="use `athcodec encode` first")
+
     def _refusal(self, error: core_file.CoreError) -> FormatError:
         """Return the exception for an error of the core. A bad checksum may be that of a remote file that changed."""
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
+        if refused is NotAnAthFile:
+            return self._no_ath_file()
+        if refused is NeedsHostMesh:
+            return refused(error, python="athcodec.open takes it as host_mesh", shell="--host-mesh names it")
         return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
 
     @contextmanager

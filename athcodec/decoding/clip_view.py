@@ -12,6 +12,7 @@ from athcodec.decoding.affines import Affines
 from athcodec.decoding.decoder import Decoder
 from athcodec.errors import LevelUnavailable
 from athcodec.files.atomic import FileId
+from athcodec.files.shown import counted
 from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, polygons, stated_fps
 from athcodec.motion.frames import Frames
 from athcodec.motion.presence import presence_within
@@ -61,6 +62,15 @@ class ClipView:
         self.level = decoder.level if level is None else decoder.file.checked_level(level)
         played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
+
+    def __repr__(self) -> str:
+        names = ", ".join(repr(clip_range.name) for clip_range in self.clip_ranges if clip_range.name)
+        unit = self.metadata.get("unit")
+        return (
+            f"<ClipView{f' {names}' if names else ''}: {counted(self.frame_count, 'frame')} of {self.vertex_count:,} "
+            f"vertices, {self.dtype}, level {self.level} of 0 to {self.decoder.file.level_count - 1}, error at most "
+            f"{self.max_error:.3g}{f' {unit}' if unit else ''}>"
+        )
 
     vertex_count = _of_file("vertex_count", "Vertices of the plant, N.")
     branch_count = _of_file("branch_count", "Branches of the plant, B.")

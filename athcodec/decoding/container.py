@@ -97,6 +97,10 @@ class Limits:
         set_numbers(self, wholes=self.__dataclass_fields__)
 
 
+def _array() -> Any:
+    return field(default=None, compare=False, repr=False)
+
+
 @dataclass
 class Header:
     """The counts at the front. `max_error` is the promise of the deepest stored level, in scene units; frames and
@@ -117,8 +121,8 @@ class Header:
     chunk_count: int = 0
     file_length: int = 0
     stages: tuple[int, ...] = ()  # Of each of the full_level_count levels; (): no stage is left out.
-    joins: np.ndarray | None = field(default=None, compare=False)  # (levels, segments) uint8; None: all are 0
-    repeats: np.ndarray | None = field(default=None, compare=False)  # (frames,) bool: like the one before; None: none
+    joins: np.ndarray | None = _array()  # (levels, segments) uint8; None: all are 0
+    repeats: np.ndarray | None = _array()  # (frames,) bool: like the one before; None: none
 
 
 def is_prelude(kind: Any) -> Any:

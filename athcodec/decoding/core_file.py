@@ -196,6 +196,11 @@ class File:
         """Address of the ath_file, for functions outside ath.h."""
         return self._file
 
+    @property
+    def prelude(self) -> np.ndarray:
+        """The bytes in front of the motion, uint8."""
+        return self._prelude
+
     @staticmethod
     def _check(result: int, fault: Fault | None = None) -> int:
         if result not in (OK, HELD):

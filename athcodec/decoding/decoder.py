@@ -5,12 +5,11 @@ The `AthFile` behind a `Decoder` holds what all clips share, and reads and decod
 
 from __future__ import annotations
 
-import math
 import threading
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from operator import itemgetter
 from typing import Any
 
@@ -19,27 +18,33 @@ import numpy.typing as npt
 
 from athcodec.decoding import core_file
 from athcodec.decoding.affines import Affines, affines_of, residual_of
+from athcodec.decoding.array_like import ArrayLike
 from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.blending import Blending, Share
-from athcodec.decoding.endless_play import EndlessPlay
-from athcodec.decoding.facts import facts_of, print_facts
-from athcodec.decoding.file_tables import Clip, Level, median_rate
+from athcodec.decoding.facts import facts_of, parts_of
+from athcodec.decoding.file_tables import Clip, Level
 from athcodec.decoding.indexing import Frames, split_index
 from athcodec.errors import LevelUnavailable
+from athcodec.files.shown import Report
+from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import metadata_of, wind_of
-from athcodec.motion.transitions import transitions_of
+from athcodec.motion.units import LengthLike, length_of, scene_unit
 from athcodec.options import real
 
+WITHIN = '; level_within("5cm") returns the level for a length'
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
 
-class Decoder:
-    """One clip of an .ath file, an array-like of shape (frames, vertices, 3); a context manager.
+class Decoder(ArrayLike):
+    """One clip of an .ath file, a read-only array of shape (frames, vertices, 3); a context manager.
 
-    Indices, `len`, iteration and `np.asarray` mean what they mean for a NumPy array, and decode only the segments of
-    frames that they need. Positions come in the source's vertex order, in scene units. Frames, segments, times and
-    errors are those of the clip, counted from its first frame. `file` has what all clips share, such as vertices,
-    levels and the rest pose. Threads may share a decoder.
+    Indices, `len` and iteration mean what they mean for a NumPy array, and decode only the segments of frames that they
+    need. Operators, NumPy's functions and the methods of its arrays (`tree * 2`, `np.mean(tree, axis=0)`, `tree.max()`)
+    decode all of it, `nbytes` bytes, each time, and return plain arrays: keep `np.asarray(tree)` where that is done
+    often. `clip` is the clip and no method. Positions come in the source's vertex order, in scene units. Frames,
+    segments, times and errors are those of the clip, counted from its first frame. `file` has what all clips share,
+    such as vertices, levels and the rest pose. Threads may share a decoder. One of a path, a URL or bytes can be
+    pickled; it opens the same file again, at the same clip and level.
 
     Parameters
     ----------
@@ -73,6 +78,9 @@ class Decoder:
     >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
     ...     grass.shape, grass[10:20].shape, grass[-1, :100].shape, grass.at_level(1)[::30].dtype
     ((150, 1400, 3), (10, 1400, 3), (100, 3), dtype('float32'))
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     (grass - grass[0]).shape, grass.T.shape, np.mean(grass, axis=(0, 1)).shape
+    ((150, 1400, 3), (3, 1400, 150), (3,))
     """
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False, level: int | None = None):
@@ -131,6 +139,9 @@ class Decoder:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), closes_file=self._closes_file, level=self._level), (self.file, self.clip.name)
+
     def __repr__(self) -> str:
         name = f" {self.clip.name!r}" if self.clip.name else ""
         last = self.file.level_count - 1
@@ -142,22 +153,15 @@ class Decoder:
             f"{shown.max_error:.3g}{f' {unit}' if unit else ''}>"
         )
 
+    def _repr_html_(self) -> str:
+        return Report(parts_of(facts_of(self.file.name, self)))._repr_html_()
+
     # ---- the array ----
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Frames, vertices and 3."""
         return self.frame_count, self.file.vertex_count, 3
-
-    @property
-    def ndim(self) -> int:
-        """Number of dimensions, 3."""
-        return 3
-
-    @property
-    def size(self) -> int:
-        """Number of coordinates."""
-        return math.prod(self.shape)
 
     @property
     def dtype(self) -> np.dtype:
@@ -218,13 +222,15 @@ class Decoder:
         """The stored levels, coarse to fine, with their errors in this clip."""
         return self.file.levels_in(self.clip.segments)
 
-    def level_for(self, distance: float, fov: float, height: float, pixels: float = 1.0, measure: str = "max") -> int:
+    def level_for(
+        self, distance: LengthLike, fov: float, height: float, pixels: float = 1.0, measure: str = "max"
+    ) -> int:
         """Return the level to show at a distance.
 
         Parameters
         ----------
-        distance : float
-            Distance from the eye, in scene units.
+        distance : float or str
+            Distance from the eye, in scene units or text such as "40m".
         fov : float
             Vertical field of view, radians.
         height : float
@@ -239,15 +245,16 @@ class Decoder:
         int
             The coarsest stored level whose error is at most `pixels`; the deepest if none is.
         """
-        return self.file.core.level_for(self.clip.segments, measure, distance, fov, height, pixels)
+        length = length_of(distance, "distance").in_scene_units(scene_unit(self.metadata))
+        return self.file.core.level_for(self.clip.segments, measure, length, fov, height, pixels)
 
-    def level_within(self, max_error: float) -> int:
+    def level_within(self, max_error: LengthLike) -> int:
         """Return the coarsest stored level whose largest error in this clip is at most a length.
 
         Parameters
         ----------
-        max_error : float
-            Scene units.
+        max_error : float or str
+            Scene units, or text such as "5cm".
 
         Returns
         -------
@@ -258,12 +265,21 @@ class Decoder:
         ------
         LevelUnavailable
             If the error of the deepest level is larger.
+        BoundError
+            If it is text that is no length, or has a unit and the file states none.
         """
-        return self.file.level_within(max_error, self.clip.segments)
+        length = length_of(max_error, "max_error").in_scene_units(scene_unit(self.metadata))
+        return self.file.level_within(length, self.clip.segments)
 
-    def summary(self) -> None:
-        """Print the levels of the file with their bytes and errors, as `athcodec info` does."""
-        print_facts(facts_of(str(getattr(self.file.source, "name", None) or "file"), self))
+    def summary(self) -> str:
+        """Return what `athcodec info` prints: the levels of the file with their bytes and errors.
+
+        Returns
+        -------
+        str
+            Lines of text, which a Python prompt shows as they are printed, and a notebook as tables.
+        """
+        return Report(parts_of(facts_of(self.file.name, self)))
 
     # ---- motion ----
 
@@ -410,29 +426,6 @@ class Decoder:
             ]
         )
 
-    def endless(self, seed: int = 1) -> EndlessPlay:
-        """Play the clip without an end, over transitions that `athcodec.endless` stored between its like frames.
-
-        Parameters
-        ----------
-        seed : int, optional
-            Another seed gives another order of transitions.
-
-        Returns
-        -------
-        EndlessPlay
-            An object whose `positions(seconds)` returns the plant at any time.
-
-        Raises
-        ------
-        ValueError
-            If the clip names no transitions.
-        """
-        stored = transitions_of(self.metadata, self.frame_count)
-        if not stored:
-            raise ValueError(f"clip {self.clip.name!r}: got no transitions, expected some, of encode --endless")
-        return EndlessPlay(self.time, stored, self.blended_places, seed)
-
     def blended_places(self, places: Sequence[tuple[float, float]], level: int | None = None) -> np.ndarray:
         """Return the clip at several times at once, blended along the branches as `blended` blends clips.
 
@@ -507,7 +500,7 @@ class Decoder:
         return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
 
     def _checked_level(self, level: int | None) -> int:
-        return self.level if level is None else self.file.checked_level(level)
+        return self.level if level is None else self.file.checked_level(level, WITHIN)
 
     def _indexed(self, index: Any, level: int, dtype: np.dtype) -> np.ndarray:
         """Return what a NumPy index picks of all positions, after decoding the frames that it reads."""

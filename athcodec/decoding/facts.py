@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from athcodec.files.shown import counted, echo, print_table
+from athcodec.files.shown import Table, counted
 
 if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
@@ -49,11 +49,11 @@ def facts_of(
     return facts
 
 
-def print_facts(facts: dict[str, Any]) -> None:
-    """Print the facts of a file as `athcodec info` does."""
+def parts_of(facts: dict[str, Any]) -> Iterator[str | Table]:
+    """Yield the lines and tables that `athcodec info` prints of the facts of a file."""
     ath = facts["ath"]
     rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
-    echo(
+    yield (
         f"{facts['file']}: {counted(facts['vertices'], 'vertex', 'vertices')} on "
         f"{counted(facts['branches'], 'branch', 'branches')}, {counted(facts['frames'], 'frame')}{rate} in "
         f"{counted(facts['segments'], 'segment')}, format {facts['format']}"
@@ -61,40 +61,35 @@ def print_facts(facts: dict[str, Any]) -> None:
     thresholds = ""
     if "epsilon" in ath:
         thresholds = f"; epsilon {ath['epsilon']:.2g}, eta {ath['eta']}, xi {ath['xi']:.2g}, lambda {ath['lam']}"
-    echo(
-        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, "
-        f"{counted(ath['leaves'], 'leaf', 'leaves')} among them{thresholds}"
+    yield (
+        f"ATH: depth {ath['depth']}, {counted(ath['nodes'], 'node')}, {ath['leaves']:,} without children{thresholds}"
     )
     unit = f" {facts['unit']}" if facts["unit"] else ""
     share = facts["predicted_error_share"]
     held = "" if share is None else f", errors of predicted motion held to {share:.2g} of it"
-    echo(f"Error bound: {facts['max_error_bound']:.4g}{unit}{held}. {size_of(facts)}")
-    echo(f"Rest pose: {_rest(facts)}.")
+    yield (f"Error bound: {facts['max_error_bound']:.4g}{unit}{held}. {size_of(facts)}")
+    yield f"Rest pose: {_rest(facts)}."
     if len(facts["levels"]) < facts["full_level_count"]:
-        echo(f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
+        yield (f"Holds levels 0 to {len(facts['levels']) - 1} of 0 to {facts['full_level_count'] - 1}.")
     if facts["missing"]:
-        echo(f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}.")
-    if (
-        len(facts["clips"]) > 1
-        or facts["clips"][0]["name"]
-        or any(facts["clips"][0][key] for key in ("loop", "wind", "transitions"))
-    ):
-        _print_clips(facts)
-    for clip in facts["clips"]:
-        _print_presence(clip)
-    _print_levels(facts)
+        yield f"{facts['available_bytes']:,} bytes are there; missing {facts['missing']}."
+    if len(facts["clips"]) > 1 or facts["clips"][0]["name"] or any(facts["clips"][0][key] for key in ("loop", "wind")):
+        yield _clips(facts)
+    yield from filter(None, map(_presence, facts["clips"]))
+    yield _levels(facts)
 
 
-def _print_presence(clip: dict[str, Any]) -> None:
-    """The objects that some frame does not show, the first `NAMED_OBJECTS` of them, and the frames that do."""
+def _presence(clip: dict[str, Any]) -> str:
+    """Return the objects that some frame does not show, the first `NAMED_OBJECTS` of them, and the frames that do."""
     named = [
         f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
         for name, runs in list(clip["presence"].items())[:NAMED_OBJECTS]
     ]
-    if named:
-        more = len(clip["presence"]) - len(named)
-        of_clip = f" of {clip['name']}" if clip["name"] else ""
-        echo(f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}.")
+    if not named:
+        return ""
+    more = len(clip["presence"]) - len(named)
+    of_clip = f" of {clip['name']}" if clip["name"] else ""
+    return f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}."
 
 
 def _rest(facts: dict[str, Any]) -> str:
@@ -105,7 +100,7 @@ def _rest(facts: dict[str, Any]) -> str:
     return f"{facts['rest_bytes']:,} bytes of these"
 
 
-def _print_clips(facts: dict[str, Any]) -> None:
+def _clips(facts: dict[str, Any]) -> Table:
     """Errors at the seam are those of the deepest stored level."""
     rows = [
         [
@@ -114,7 +109,6 @@ def _print_clips(facts: dict[str, Any]) -> None:
             f"{clip['seconds']:.4g}",
             f"{clip['segments']:,}",
             f"{clip['wind']['strength']:g} to {clip['wind']['heading']:g}°" if clip["wind"] else "",
-            f"{clip['transitions']:,}" if clip["transitions"] else "",
             f"{clip['seam_errors'][len(facts['levels']) - 1]:.3g}" if clip["loop"] else "",
             *(f"{error:.3g}" for error in clip["max_errors"]),
         ]
@@ -122,10 +116,10 @@ def _print_clips(facts: dict[str, Any]) -> None:
     ]
     levels = [f"max at {level}" for level in range(len(facts["levels"]))]
     seam = head("loop's seam", facts["unit"])
-    print_table(["clip", "frames", "seconds", "segments", "wind", "transitions", seam, *levels], rows)
+    return Table(["clip", "frames", "seconds", "segments", "wind", seam, *levels], rows)
 
 
-def _print_levels(facts: dict[str, Any]) -> None:
+def _levels(facts: dict[str, Any]) -> Table:
     measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
     columns = ["bytes so far", *(head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [
@@ -135,7 +129,7 @@ def _print_levels(facts: dict[str, Any]) -> None:
         columns.append(TICK_RATIO.head)
         for row, level in zip(cells, facts["levels"], strict=True):
             row.append(TICK_RATIO.cell(level["tick_ratio"]))
-    print_table([*LEVEL_COLUMNS, *columns], level_rows(facts, cells))
+    return Table([*LEVEL_COLUMNS, *columns], level_rows(facts, cells))
 
 
 def level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:

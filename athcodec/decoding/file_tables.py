@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from athcodec.decoding import container as ct
 from athcodec.decoding.chunk_file import ChunkFile
 from athcodec.errors import ClipUnavailable, LevelUnavailable, Truncated
-from athcodec.options import real, whole
+from athcodec.options import whole
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Clip:
     segment_count: int
     loop: bool
     duration: float
-    seam_errors: tuple[float, ...]
+    seam_errors: tuple[float, ...] = field(repr=False)
 
     @property
     def segments(self) -> range:
@@ -144,9 +144,10 @@ class FileTables(ChunkFile):
         late = () if self.complete else self._table["level"][self._is_late].tolist()
         return min([self._damaged_from, *late])
 
-    def checked_level(self, level: int) -> int:
-        """Return the number of a stored level as an int. Raises LevelUnavailable if the file has no such level."""
-        if not 0 <= (level := whole("level", level)) < self.level_count:
+    def checked_level(self, level: int, hint: str = "") -> int:
+        """Return the number of a stored level as an int. hint: the end of the message for what is no whole number.
+        Raises LevelUnavailable if the file has no such level."""
+        if not 0 <= (level := whole("level", level, hint)) < self.level_count:
             raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
         return level
 
@@ -223,27 +224,6 @@ class FileTables(ChunkFile):
             for level in range(self.level_count)
         ]
 
-    def level_within(self, max_error: float, segments: range | None = None) -> int:
-        """Return the coarsest stored level whose largest error is at most `max_error`.
-
-        Parameters
-        ----------
-        max_error : float
-            Scene units.
-        segments : range, optional
-            Numbers of segments in the whole file; by default all.
-
-        Raises
-        ------
-        LevelUnavailable
-            If the deepest level's largest error is above it.
-        """
-        max_error, segments = real("max_error", max_error), segments or range(self.segment_count)
-        largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
-        if not (within := np.flatnonzero(largest <= max_error)).size:
-            raise LevelUnavailable(f"max_error: got {max_error:.4g}; expected at least {largest.min():.4g}")
-        return int(within[0])
-
     @cached_property
     def errors(self) -> np.ndarray:
         """Errors of each level in each segment, (levels, segments, 3) float64, scene units: largest, 99th percentile,
@@ -254,8 +234,3 @@ class FileTables(ChunkFile):
     def joins(self) -> np.ndarray:
         """How each segment goes on from the end of the one before it, (levels, segments) uint8; 0: it does not."""
         return self.core.joins()
-
-
-def median_rate(time: np.ndarray) -> float:
-    """Return the median frame rate of times in seconds, frames per second; 0 for a single frame."""
-    return float(1 / np.median(np.diff(time))) if len(time) > 1 else 0.0

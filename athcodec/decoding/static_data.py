@@ -13,23 +13,55 @@ from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
 from athcodec.decoding.file_tables import FileTables
 from athcodec.decoding.host_mesh import HostMesh, mesh_positions
-from athcodec.errors import BadChunk, LimitExceeded, Truncated
+from athcodec.errors import BadChunk, LevelUnavailable, LimitExceeded, Truncated
 from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
+from athcodec.motion.units import LengthLike, length_of, scene_unit
 
 
 class StaticData(FileTables):
     """A file whose static data can be read."""
 
     _rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
+    host_mesh: np.ndarray | None = None  # Positions of the host's mesh that was set, (N, 3) float32.
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
         """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
         chunk = self.find(ct.METADATA)
         return ct.parse_metadata(self.payload(chunk), self.limits) if chunk else {}
+
+    def level_within(self, max_error: LengthLike, segments: range | None = None) -> int:
+        """Return the coarsest stored level whose largest error is at most `max_error`.
+
+        Parameters
+        ----------
+        max_error : float or str
+            Scene units, or text such as "5cm".
+        segments : range, optional
+            Numbers of segments in the whole file; by default all.
+
+        Returns
+        -------
+        int
+            Number of the level.
+
+        Raises
+        ------
+        LevelUnavailable
+            If the deepest level's largest error is above it.
+        BoundError
+            If it is text that is no length, or has a unit and the file states none.
+        """
+        segments = segments or range(self.segment_count)
+        wanted = length_of(max_error, "max_error")
+        length = wanted.in_scene_units(scene_unit(self.metadata))
+        largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
+        if not (within := np.flatnonzero(largest <= length)).size:
+            raise LevelUnavailable(f"max_error: got {wanted}; expected at least {largest.min():.4g} scene units")
+        return int(within[0])
 
     # ---- branches ----
 
@@ -47,11 +79,7 @@ class StaticData(FileTables):
         number = np.empty(self.places.count, np.int32)
         number[self.core.vertex_places()[self.places.first]] = np.arange(self.places.count)
         return Hierarchy.from_parts(
-            self.branches["parent"],
-            self.branches["count"],
-            self.branches["attach"],
-            number,
-            self.core.branch_source(),
+            self.branches["parent"], self.branches["count"], self.branches["attach"], number, self.core.branch_source()
         )
 
     @cached_property
@@ -244,5 +272,6 @@ class StaticData(FileTables):
             try:
                 with self._lock:
                     self.core.set_host_mesh(positions)
+                    self.host_mesh = positions
             except core_file.CoreError as error:
                 raise self._refusal(error) from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
 from athcodec.motion.algebra import length
 from athcodec.motion.clip import MotionClip
-from athcodec.options import DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR, set_numbers
+from athcodec.options import COARSE_SHARE, DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR, set_numbers
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
 SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
@@ -61,6 +62,18 @@ class BoundOption:
         fraction = self.rel_error or DEFAULT_REL_ERROR
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
 
+    def objection(self, bound: float, diagonal: float, unit: Any) -> str:
+        """Return what speaks against a bound for a clip of this diagonal and unit, empty if nothing does. A caller who
+        has passed a fraction knows it."""
+        if self.max_error is None and self.target_size is None or not bound > COARSE_SHARE * diagonal > 0:
+            return ""
+        of_unit, share = f" {unit}" if isinstance(unit, str) else "", bound / diagonal
+        words = f"{100 * share:.2g} % of" if share < 1 else f"{share:.2g} times"
+        of_plant = f"{words} the diagonal of all frames, {diagonal:.3g}{of_unit}"
+        expected = f"expected at most {100 * COARSE_SHARE:g} %, beyond which little may be left of the motion"
+        if self.target_size is not None:
+            return f"target_size: got {self.target_size} bytes, whose error is {of_plant}; {expected}: allow more bytes"
+        return f"max_error: got {bound:g}{of_unit}, {of_plant}; {expected}: a length may have a unit, such as 1mm"
 
     def least(self, clip: MotionClip) -> float:
         """Return what the bound for a clip is at least, as far as some of its frames tell; 0: they do not."""
@@ -69,7 +82,9 @@ class BoundOption:
         if self.target_size is not None or self.lossless:
             return 0.0
         frames = {0, clip.frame_count // 2, clip.frame_count - 1}
-        corners = [getattr(clip.block(frame, frame + 1)[0], name)(axis=0) for frame in frames for name in ("min", "max")]
+        corners = [
+            getattr(clip.block(frame, frame + 1)[0], name)(axis=0) for frame in frames for name in ("min", "max")
+        ]
         return (self.rel_error or DEFAULT_REL_ERROR) * length(np.ptp(np.array(corners, float), axis=0))
 
 

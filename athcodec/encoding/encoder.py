@@ -10,6 +10,7 @@ import io
 import itertools
 import shutil
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator
 from os import PathLike
 from typing import Any, BinaryIO, cast
@@ -25,12 +26,15 @@ from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress,
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
+from athcodec.errors import CoarseWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.result import Found
-from athcodec.motion.clip import MotionClip
+from athcodec.motion.clip import ClipRange, MotionClip
+from athcodec.motion.joining import metadata_of
+from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, stated_scene
 from athcodec.options import DEFAULT_REL_ERROR
-
 
 JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
 FEWER_PLACES = 0.9  # Largest share of the places that are left then, if joining is to be tried.
@@ -40,15 +44,14 @@ def encode_clip(
     clip: MotionClip,
     target: str | PathLike[str] | BinaryIO,
     *,
-    max_error: float | None = None,
+    max_error: LengthLike | None = None,
     rel_error: float | None = None,
-    target_size: int | None = None,
+    target_size: int | str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Summary:
     """Compress a clip into an .ath file: `athcodec.encode`, which documents the options, of a clip."""
-    checked = EncodingOptions.of(**options)
-    option = BoundOption(max_error, rel_error, target_size, checked.lossless)
+    option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with keeping(clip.inputs):
         _check(target)  # Refused targets cost no work.
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked))
@@ -62,7 +65,28 @@ def encode_clip(
             if path is None:
                 out.seek(0)
                 shutil.copyfileobj(out, cast(BinaryIO, target))
-            return summary
+        _object(job, option, bound)
+        return summary
+
+
+def _checked(
+    clip: MotionClip,
+    max_error: LengthLike | None,
+    rel_error: float | None,
+    target_size: int | str | None,
+    *,
+    tam: Thresholds | None = None,
+    **options: Any,
+) -> tuple[BoundOption, EncodingOptions]:
+    """Return the options with lengths in the units of the clip. Raises ClipError for a clip whose unit or up axis is
+    unknown, and the errors of the options."""
+    for clip_range in clip.clip_ranges or (ClipRange("", clip.frame_count),):
+        stated_scene(metadata_of(clip.metadata, clip_range.name))
+    unit = scene_unit(clip.metadata)
+    checked = EncodingOptions.of(tam=None if tam is None else tam.in_scene_units(unit), **options)
+    length = None if max_error is None else length_of(max_error, "max_error").in_scene_units(unit)
+    size = None if target_size is None else size_of(target_size, "target_size")
+    return BoundOption(length, rel_error, size, checked.lossless), checked
 
 
 def _check(target: Any) -> None:
@@ -78,9 +102,9 @@ def _check(target: Any) -> None:
 def draft(
     clip: MotionClip,
     *,
-    max_error: float | None = None,
+    max_error: LengthLike | None = None,
     rel_error: float | None = None,
-    target_size: int | None = None,
+    target_size: int | str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Draft:
@@ -91,12 +115,13 @@ def draft(
     ClipError, BoundError, ValueError
         As `encode`.
     """
-    checked = EncodingOptions.of(**options)
-    option = BoundOption(max_error, rel_error, target_size, checked.lossless)
+    option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with clip.watched():
         job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
         with job.refusing(bound):
-            return job.draft(job.decide(bound))
+            made = job.draft(job.decide(bound))
+    _object(job, option, bound)
+    return made
 
 
 def code_segments(
@@ -191,7 +216,14 @@ def _begin(
         report("size", attempt / (attempt + 4))
         return size
 
-    return job, option.in_scene_units(job.source, file_size)
+    bound = option.in_scene_units(job.source, file_size)
+    return job, bound
+
+
+def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
+    """Warn the caller of `encode` of a bound that was kept and is coarse."""
+    if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
+        warnings.warn(objection, CoarseWarning, stacklevel=4)
 
 
 def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
@@ -211,7 +243,10 @@ def _best_places(
     branches, size = best_branches(_grown(first, options), option, work, options.host_rest, is_compared)
     best, least = (first, branches), size + _table_bytes(first)
     if regular is not None:
-        moved, trial = first.moved_to(branches, regular), Trial(_grown(regular, options), option, options.host_rest, work)
+        moved, trial = (
+            first.moved_to(branches, regular),
+            Trial(_grown(regular, options), option, options.host_rest, work),
+        )
         size = trial.size(moved)[0] + _table_bytes(regular)
         best, least = ((regular, moved), size) if size < least else (best, least)
     if is_joined_tried and work.fits(work.done):

@@ -79,7 +79,7 @@ from athcodec.motion.places import Places
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
-from athcodec.motion.units import Length
+from athcodec.motion.units import METRES_PER_UNIT, LengthLike, stated_scene
 from athcodec.options import (
     DEFAULT_LADDER,
     EFFORTS,
@@ -100,7 +100,7 @@ PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another th
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
-STATIC_METADATA = ("unit", "up_axis")
+STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class EncodingOptions:
         *,
         segment_frames: int | None = None,
         ladder: str | Sequence[float] = DEFAULT_LADDER,
-        rest_error: float | str | Length | None = None,
+        rest_error: LengthLike | None = None,
         **options,
     ) -> EncodingOptions:
         """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them."""
@@ -757,6 +757,7 @@ class EncodingJob:
             store.add(ct.PLACES, polygons.pack_places(places))
         kept = source.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
         metadata = {key: value for key, value in source.metadata.items() if key in kept}
+        metadata |= stated_scene(metadata)
         if self.options.tam is not None:
             metadata[THRESHOLDS] = self.options.tam.in_metadata
         if metadata:

@@ -61,7 +61,6 @@ class PlacedClip:
         places = _alike_in_copies(self.source, places)
         return None if places.count == self.places.count else PlacedClip.of(self.source, places, self.weights)
 
-
     def regular(self) -> PlacedClip | None:
         """Return the clip with objects of as many vertices joined alike, where vertices coincide in some of them and
         differ by roundings in others; None: they are alike."""

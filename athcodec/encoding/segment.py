@@ -236,7 +236,9 @@ class Source:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.replaced_error])
+        return np.array(
+            [qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.replaced_error]
+        )
 
     def unweighted_limit(self, bound: float) -> float:
         """Return what decoded positions of any vertex are held to if weights do not count."""
@@ -412,7 +414,11 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
     """Return REST, and the rest pose as decoded."""
     head = writing.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.host_rest:
-        head.is_host, head.step, head.stream = True, 1.0, writing.mesh_checksum(source.clip.source_rest if source.host_mesh is None else source.host_mesh)
+        head.is_host, head.step, head.stream = (
+            True,
+            1.0,
+            writing.mesh_checksum(source.clip.source_rest if source.host_mesh is None else source.host_mesh),
+        )
         return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]

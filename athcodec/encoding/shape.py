@@ -15,8 +15,7 @@ from athcodec.encoding.quantise import half_octaves
 from athcodec.errors import BoundError
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
-from athcodec.motion.units import Length, parse_length
-from athcodec.options import real
+from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
 
 OF_BOUND = "bound"
 EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # Largest step of a branch, over the lengths of edges and heights of faces.
@@ -36,25 +35,21 @@ class RestPrecision:
     of_bound: bool = False
 
     @classmethod
-    def of(cls, option: float | str | Length | None) -> RestPrecision:
+    def of(cls, option: LengthLike | None) -> RestPrecision:
         if option is None:
             return cls()
         if isinstance(option, str) and option == OF_BOUND:
             return cls(of_bound=True)
-        length = parse_length(option) if isinstance(option, str) else option if isinstance(option, Length) else None
-        if length is not None and length.unit:
-            value, precision = length.value, cls(length=length)
-        else:
-            value = real("rest_error", option if length is None else length.value)
-            precision = cls(fraction=value)
-        if not (math.isfinite(value) and value > 0):
+        length = length_of(option, "rest_error")
+        precision = cls(length=length) if length.unit else cls(fraction=length.value)
+        if not (math.isfinite(length.value) and length.value > 0):
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
         return precision
 
     def error(self, clip: MotionClip, diagonal: float) -> float:
         """Return the largest error that is asked for, in scene units; infinite: none is."""
         if self.length is not None:
-            return self.length.in_scene_units(clip.metadata.get("unit"))
+            return self.length.in_scene_units(scene_unit(clip.metadata))
         return math.inf if self.fraction is None else self.fraction * diagonal
 
     def details(self, clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from athcodec.decoding.file_tables import Level
+from athcodec.files.shown import Report, Table, counted
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Seam:
     error: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Summary:
     """The result of `encode`.
 
@@ -95,6 +96,18 @@ class Summary:
     def ratio(self) -> float:
         """Bytes of the raw positions over those of the whole file."""
         return self.raw_bytes / self.bytes
+
+    def __repr__(self) -> str:
+        return f"<Summary: {self}; {counted(len(self.levels), 'level')}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [f"{level.level}", level.name, f"{level.nodes:,}", f"{level.bytes:,}"]
+            + [f"{error:.3g}" for error in (level.max_error, level.p99_error, level.rms_error)]
+            for level in self.levels
+        ]
+        columns = ["level", "", "nodes", "bytes so far", "max error", "99 % error", "RMS error"]
+        return Report([str(self), Table(columns, rows)])._repr_html_()
 
     def __str__(self) -> str:
         words = f"{self.path or 'file'}: {self.bytes:,} bytes, {self.ratio:.1f} to 1, error at most "

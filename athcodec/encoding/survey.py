@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from athcodec.files.shown import counted
 from athcodec.files.threads import SERIAL, ThreadPool
 from athcodec.motion.affine_fit import Differences, Pieces, seen_from
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.motion.thresholds import Thresholds
+from athcodec.motion.units import LengthLike, scene_unit
 from athcodec.options import whole
 
 if TYPE_CHECKING:
@@ -45,7 +47,7 @@ class Gaps(NamedTuple):
     rms: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Ath:
     """An affine transform hierarchy; `build_ath` makes it (Song, Yang and Peng 2011, section 3).
 
@@ -74,6 +76,10 @@ class Ath:
     node_parent: np.ndarray
     node_depth: np.ndarray
     whole: np.ndarray
+
+    def __repr__(self) -> str:
+        leaves = int((~self.is_inner).sum())
+        return f"<Ath: depth {self.height + 1}, {counted(self.node_count, 'node')}, {leaves:,} without children>"
 
     @property
     def node_count(self) -> int:
@@ -112,15 +118,15 @@ class Ath:
         dict of str to float or int
             "depth", "nodes", "leaves", "epsilon", "eta", "xi", "lam".
         """
-        thresholds = self.thresholds
+        epsilon, xi = self.thresholds.distances
         return {
             "depth": self.height + 1,
             "nodes": self.node_count,
             "leaves": int((~self.is_inner).sum()),
-            "epsilon": thresholds.epsilon,
-            "eta": thresholds.eta,
-            "xi": thresholds.xi,
-            "lam": thresholds.lam,
+            "epsilon": epsilon,
+            "eta": self.thresholds.eta,
+            "xi": xi,
+            "lam": self.thresholds.lam,
         }
 
     def cut(self, level: int) -> list[CutPiece]:
@@ -406,11 +412,11 @@ class Survey:
             return True
         if eta > surveyed:
             raise ValueError(f"thresholds: got eta {eta}, expected at most the surveyed {surveyed}")
-        return self.largest_gads[eta] <= thresholds.epsilon
+        return self.largest_gads[eta] <= thresholds.distances[0]
 
     def _keeps_xi(self, thresholds: Thresholds) -> np.ndarray:
         """TAM's second condition: in every frame at most lam vertices are beyond xi."""
-        lam, xi = thresholds.lam, thresholds.xi
+        lam, (_, xi) = thresholds.lam, thresholds.distances
         if lam == 0:
             return self.largest_distance <= xi
         if self.most_beyond_xi is None:
@@ -473,7 +479,7 @@ def survey(
     rest = np.asarray(clip.rest, float)[hierarchy.vertex_source]
     branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
     pieces = _tested_pieces(hierarchy, rest, branches)
-    xi = limits.xi if limits.lam else None
+    xi = limits.distances[1] if limits.lam else None
 
     def measured(portion: np.ndarray) -> tuple[_Extent, Differences]:
         frames = _in_file_order(portion, hierarchy)
@@ -507,14 +513,14 @@ def survey(
 
 def build_ath(
     clip: MotionClip,
-    epsilon: float | None = None,
+    epsilon: LengthLike | None = None,
     eta: int = 0,
-    xi: float | None = None,
+    xi: LengthLike | None = None,
     lam: int = 0,
     hierarchy: Hierarchy | None = None,
     max_depth: int = MAX_DEPTH,
     *,
-    max_error: float | None = None,
+    max_error: LengthLike | None = None,
 ) -> Ath:
     """The ATH of a clip (Song, Yang and Peng 2011, section 3), in one pass over its frames.
 
@@ -525,20 +531,22 @@ def build_ath(
     ----------
     clip : MotionClip
         Read block by block.
-    epsilon : float, optional
-        Scene units: a frame whose mean residual distance (GAD, eq. 5) exceeds it counts against `eta`.
+    epsilon : float or str, optional
+        Scene units, or text such as "1mm": a frame whose mean residual distance (GAD, eq. 5) exceeds it counts against
+        `eta`.
     eta : int
         At most this number of frames may exceed epsilon.
-    xi : float, optional
-        Scene units: a vertex further than this from its base position counts against `lam` (LAD).
+    xi : float or str, optional
+        Scene units, or text such as "1mm": a vertex further than this from its base position counts against `lam`
+        (LAD).
     lam : int
         At most this number of vertices may exceed xi in any frame.
     hierarchy : Hierarchy, optional
         The clip's, where it is known already.
     max_depth : int
         Nodes at this depth are accepted whatever their errors are.
-    max_error : float, optional
-        In place of epsilon and xi: both are this, in scene units.
+    max_error : float or str, optional
+        In place of epsilon and xi: both are this, in scene units or text such as "1mm".
 
     Returns
     -------
@@ -551,12 +559,14 @@ def build_ath(
     ClipError
         For positions that are NaN or infinite.
     """
-    thresholds = _thresholds(epsilon, eta, xi, lam, max_error)
-    surveyed = survey(clip, hierarchy, thresholds.lam, thresholds.xi, max_depth, eta=thresholds.eta)
+    thresholds = _thresholds(epsilon, eta, xi, lam, max_error).in_scene_units(scene_unit(clip.metadata))
+    surveyed = survey(clip, hierarchy, thresholds.lam, thresholds.distances[1], max_depth, eta=thresholds.eta)
     return surveyed.ath(thresholds)
 
 
-def _thresholds(epsilon: float | None, eta: int, xi: float | None, lam: int, max_error: float | None) -> Thresholds:
+def _thresholds(
+    epsilon: LengthLike | None, eta: int, xi: LengthLike | None, lam: int, max_error: LengthLike | None
+) -> Thresholds:
     if max_error is not None:
         if epsilon is not None or xi is not None:
             raise ValueError("ATH thresholds: got max_error beside epsilon or xi, expected one or the other")

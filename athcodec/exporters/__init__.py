@@ -2,13 +2,14 @@
 
 `write` imports the module of the wanted format and no other. A module has one function,
 `write_clip(motion, path, options, report)`, where `motion` is a MotionClip or a ClipView of an .ath file. It returns
-None, or what there is to know of the files: see Written.
+None, or what there is to know of the files: see Written. Other packages add formats by entry points, as in sources/.
 """
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
+import os
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -18,12 +19,14 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, CoarseWarning
 from athcodec.exporters.placing import in_singles
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
-from athcodec.options import set_numbers
-from athcodec.sources import Format, format_by_suffix, format_named
+from athcodec.files.kinds import add_kind, kind_by_suffix
+from athcodec.options import COARSE_SHARE, set_numbers
+from athcodec.sources import ATH, Format, format_by_suffix, format_named
+from athcodec.sources.registry import registered
 
 Report = Callable[[str, float], None]
 Progress = Callable[[float], None]
@@ -52,10 +55,11 @@ class WriteOptions:
         mesh, where transforms are off by no more than the level is; else, and by default, as vertices.
     rig : int, optional
         For USD and glTF: a skeleton for engines, with so many joints at most besides its root, in place of vertices. It
-        is as close as that many allow; `Written` says how close.
+        is as close as that many allow; `Written` says how close, and a CoarseWarning where that is above 1 % of the
+        rest pose's diagonal.
     nanite : bool, optional
         For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
-        the joints, and the JSON of Dynamic Wind beside it.
+        the joints, and the JSON of Dynamic Wind beside it. This was not run in Unreal.
 
     Raises
     ------
@@ -96,7 +100,7 @@ FORMATS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Written:
     """The result of `write`.
 
@@ -113,6 +117,19 @@ class Written:
     files: tuple[Path, ...]
     facts: dict[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        first, *others = map(os.fspath, self.files)
+        names = f"{1 + len(others):,} files, {first!r} to {others[-1]!r}" if others else repr(first)
+        facts = "".join(f", {name} {value:.3g}" for name, value in self.facts.items() if isinstance(value, float))
+        return f"<Written: {names}{facts}>"
+
+
+def formats() -> Iterator[Format]:
+    """Yield the formats that can be written: athcodec's own, and then those of other packages, which are searched for
+    only if somebody asks for more."""
+    yield from FORMATS
+    yield from registered(__name__)[len(FORMATS) :]
+
 
 def write(
     motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None, **options: Any
@@ -127,7 +144,7 @@ def write(
         The file to write; formats of one file per frame number their files by it. An older file of the same kind, or
         an empty one, is replaced, unless `motion` reads it.
     format : str, optional
-        Name of one of `athcodec.exporters.FORMATS`; known by the suffix by default.
+        Name of one of `athcodec.exporters.formats()`; known by the suffix by default.
     progress : callable, optional
         Called with "export" and the fraction that is done.
     **options
@@ -153,7 +170,7 @@ def write(
     """
     wanted = WriteOptions(**options)
     motion = ClipView(motion) if isinstance(motion, Decoder) else motion
-    kind = format_by_suffix(path, FORMATS) if format is None else format_named(format, FORMATS)
+    kind = format_to_write(path, format)
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
         raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
@@ -163,23 +180,73 @@ def write(
         _check_clips(motion, kind)
     report = progress or (lambda stage, fraction: None)
     with keeping(getattr(motion, "inputs", ())):
+        if kind.package:
+            add_kind(kind.title, kind.suffixes, kind.magic)
         check_target(path, kind.suffixes[0])
-        module = importlib.import_module(f"{__name__}.{kind.name}")
+        write_clip = kind.function("write_clip", __name__)
         is_rounded = kind.name in SINGLES and motion.dtype == np.float64
         shown = in_singles(motion, kind.name in HAVE_TRANSFORMS) if is_rounded else motion
-        facts = dict(module.write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
+        facts = dict(write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
         facts |= {"rounding": shown.rounding} if is_rounded else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
+    if wanted.rig is not None:
+        _object_to_rig(motion, path, wanted.rig, facts)
     names = facts.pop(FILES, [Path(path).name])
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
+
+
+def _object_to_rig(motion: Any, path: str | PathLike[str], most: int, facts: dict[str, Any]) -> None:
+    """Warn the caller of `write` of a skeleton that is far off the motion."""
+    diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
+    if not error > COARSE_SHARE * diagonal > 0:
+        return
+    unit = f" {motion.metadata['unit']}" if motion.metadata.get("unit") else ""
+    advice = "more joints come no closer to this motion"
+    if facts["joints"] >= most < MOST_RIGGED:
+        more = min(4 * most, MOST_RIGGED)
+        advice = f"more joints come closer, such as --rig {more} (rig={more})"
+    warnings.warn(
+        f"{os.fspath(path)}: the skeleton is off by {error:.3g}{unit}, {100 * error / diagonal:.2g} % of the diagonal "
+        f"of the rest pose; expected at most {100 * COARSE_SHARE:g} %: {advice}; without a skeleton the vertices "
+        "themselves are written",
+        CoarseWarning,
+        stacklevel=3,
+    )
+
+
+def format_to_write(path: str | PathLike[str], format: str | None = None) -> Format:
+    """Return the format of `formats` with a name, or else with the suffix of a path. Raises ClipError, ValueError."""
+    if format is not None:
+        return format_named(format, formats())
+    if Path(path).suffix.lower() == ATH:
+        raise ClipError(
+            f"{os.fspath(path)}: is the name of an .ath file, expected that of another format",
+            python="athcodec.encode writes .ath files, athcodec.truncate shortens them",
+            shell="`athcodec encode` writes .ath files, `athcodec truncate` shortens them",
+        )
+    return format_by_suffix(path, formats())
+
+
+def check_ath_name(path: str | PathLike[str]) -> None:
+    """Raise ClipError for a path whose suffix promises another format than that of .ath files; others are left to their
+    users."""
+    suffix = Path(path).suffix.lower()
+    title = next((kind.title for kind in FORMATS if suffix in kind.suffixes), None)
+    promised = kind_by_suffix(suffix) or title
+    if promised not in (None, ATH):
+        raise ClipError(
+            f"{os.fspath(path)}: is a name for {promised}, expected one that ends in {ATH}",
+            python="athcodec.write writes other formats, of a clip or a decoder",
+            shell="`athcodec decode` writes other formats, of an .ath file",
+        )
 
 
 def _check_clips(motion: Any, kind: Format) -> None:
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
-        suffixes = " ".join(suffix for other in FORMATS if other.holds_several for suffix in other.suffixes)
+        suffixes = " ".join(suffix for other in formats() if other.holds_several for suffix in other.suffixes)
         raise ClipError(
             f"{kind.name}: got several clips, {names}; expected one of them with --clip (in Python by "
             f"athcodec.open or athcodec.split), or {suffixes}, which holds all"

@@ -25,9 +25,9 @@ from athcodec.exporters.looks import Look, Looks, line_look
 from athcodec.exporters.placing import origin_of
 from athcodec.exporters.scene_objects import face_materials
 from athcodec.exporters.timing import start_frame_of
-from athcodec.motion.clip import ClipRange, stated_fps
+from athcodec.motion.clip import ClipRange, median_rate, stated_fps
 from athcodec.motion.joining import metadata_of
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import metres_of
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN
 from athcodec.sources.timing import whole
 
@@ -258,7 +258,7 @@ def material_of(look: Look, has_colours: bool) -> dict[str, Any]:
 def root_transform(motion: Any) -> dict[str, Any]:
     """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
     metadata = motion.metadata
-    metres = METRES.get(unit_symbol(metadata.get("unit") or "m"), 1.0)
+    metres = metres_of(metadata) or 1.0
     axis = str(metadata.get("up_axis", "y")).lower()
     turn = TURNS.get(axis)
     transform = ({"rotation": turn} if turn else {}) | ({"scale": [metres] * 3} if metres != 1.0 else {})
@@ -302,8 +302,8 @@ def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
     is_loop = clip_range.loop and len(times) > 1
     extras = {"loop": True} if clip_range.loop else {}
     if len(motion.clip_ranges) > 1:
-        own_fps = 1 / np.median(np.diff(times)) if len(times) > 1 else motion.fps
-        extras |= _clock(metadata_of(motion.metadata, clip_range.name), times, own_fps)
+        fps = median_rate(times) or motion.fps
+        extras |= _clock(metadata_of(motion.metadata, clip_range.name), times, fps)
     times = times - times[0]
     if is_loop:
         times = np.append(times, times[-1] + times[-1] / (len(times) - 1))

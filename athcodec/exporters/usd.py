@@ -47,7 +47,7 @@ from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
 from athcodec.files.plain import FilePath
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import METRES, metres_of, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN, SCHEME
 
 SAVE_BYTES = 16 << 20
@@ -247,8 +247,8 @@ def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: floa
     stage.SetFramesPerSecond(rate)
     stage.SetStartTimeCode(float(codes[0]))
     stage.SetEndTimeCode(float(codes[-1]))
-    metres = METRES.get(unit_symbol(metadata.get("unit", "")), metadata.get("meters_per_unit"))
-    if isinstance(metres, float) and metres > 0:
+    metres = metres_of(metadata)
+    if metres is not None:
         UsdGeom.SetStageMetersPerUnit(stage, metres)
     up_axis = str(metadata.get("up_axis", "")).upper()
     if up_axis in ("Y", "Z"):

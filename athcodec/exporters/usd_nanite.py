@@ -7,6 +7,7 @@ of the USDCore plugin of Unreal Engine 5.7. A copy moves as its joint does and d
 measured.
 
 Joints are grouped by the order of their branches for Unreal's plugin Dynamic Wind, whose JSON lies beside the stage.
+Nothing of this was run in Unreal.
 """
 
 from __future__ import annotations

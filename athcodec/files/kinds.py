@@ -14,15 +14,20 @@ TEXT, UNKNOWN = "text", "something else"
 # Words of a message, with suffixes and a pattern of the first bytes; the first pattern that fits is the kind.
 _KINDS = {
     ".ath": ((".ath",), rb"\x89ATH\r\n\x1a\n"),
-    "HDF5": ((".h5", ".hdf5", ".hdf"), rb"\x89HDF\r\n\x1a\n"),
+    "HDF5": ((".h5", ".hdf5", ".hdf", ".vtkhdf"), rb"\x89HDF\r\n\x1a\n"),
     "NumPy archive": ((".npz",), rb"PK\x03\x04.{26}[^\0]{1,200}?\.npy"),
+    "NumPy array": ((".npy",), rb"\x93NUMPY"),
+    "MATLAB": ((".mat",), rb"MATLAB 5\.0 MAT-file"),
     "USD": ((".usd", ".usdc", ".usda", ".usdz"), rb"PXR-USDC|#usda|PK\x03\x04.{26}[^\0]{1,200}?\.usd"),
     "ZIP": ((".zip",), rb"PK\x03\x04"),
     "glTF": ((".glb", ".gltf"), rb'glTF|\s*\{[^\0]*"asset"\s*:'),
     "Alembic": ((".abc",), rb"Ogawa"),
     "PC2": ((".pc2",), rb"POINTCACHE2\0"),
     "XDMF": ((".xdmf", ".xmf"), rb"[^\0]*<Xdmf"),
-    "VTK": ((".vtu", ".vtp", ".vtk", ".pvd"), rb"[^\0]*<VTKFile|# vtk DataFile"),
+    "VTK": (
+        (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc", ".pvd"),
+        rb"[^\0]*<VTKFile|# vtk DataFile",
+    ),
     "HTML": ((".html", ".htm"), rb"(\xef\xbb\xbf)?\s*<(?i:!doctype html|html)"),
     "PNG": ((".png",), rb"\x89PNG\r\n\x1a\n"),
     "GIF": ((".gif",), rb"GIF8"),
@@ -30,9 +35,33 @@ _KINDS = {
     "JSON": ((".json",), rb"\s*[{\[]"),
     "OBJ or PLY": ((".obj", ".ply"), rb"ply\r?\n|[^\0]*?(?m:^v[ \t]+[-+.\d])"),
     "MDD": ((".mdd",), rb"(?!)"),  # The length of the file tells this kind.
+    "MTG": ((".mtg",), rb"(?!)"),  # Its text is that of any table.
 }
+SOURCES = (
+    "HDF5",
+    "NumPy archive",
+    "NumPy array",
+    "MATLAB",
+    "USD",
+    "glTF",
+    "Alembic",
+    "PC2",
+    "XDMF",
+    "VTK",
+    "OBJ or PLY",
+    "MDD",
+)
+"""Kinds of files that `athcodec.encode` reads."""
+
 _PATTERNS = {kind: re.compile(pattern, re.DOTALL) for kind, (_, pattern) in _KINDS.items()}
 _MDD_HEADER = struct.Struct(">ii")
+
+
+def add_kind(kind: str, suffixes: tuple[str, ...], magic: tuple[bytes, ...]) -> None:
+    """Let files of a further kind, which begin with one of `magic`, replace each other."""
+    if magic and kind not in _KINDS:
+        pattern = b"|".join(map(re.escape, magic))
+        _KINDS[kind], _PATTERNS[kind] = (suffixes, pattern), re.compile(pattern, re.DOTALL)
 
 
 def kind_by_suffix(suffix: str) -> str | None:
@@ -46,9 +75,13 @@ def kind_of(path: FilePath) -> str:
     OSError."""
     try:
         with open_plain(path) as file:
-            head, length = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
+            return kind_of_bytes(file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size)
     except OSError as error:
         raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def kind_of_bytes(head: bytes, length: int) -> str:
+    """Return the kind of a file, as `kind_of`, by its first HEAD_BYTES and its length."""
     match = next((kind for kind, pattern in _PATTERNS.items() if pattern.match(head)), None)
     if match is None and len(head) >= _MDD_HEADER.size:
         frames, vertices = _MDD_HEADER.unpack_from(head)

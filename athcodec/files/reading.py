@@ -131,7 +131,7 @@ def naming(path: FilePath, *errors: type[Exception]) -> Iterator[None]:
     except ClipError as error:
         if str(error).startswith(f"{fspath(path)}: "):
             raise
-        raise ClipError(f"{fspath(path)}: {error}") from error
+        raise error.about(fspath(path)) from error
     except errors as error:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         raise ClipError(f"{fspath(path)}: cannot be read: {text}") from error

@@ -3,10 +3,12 @@ heavy is imported, because the command line needs it to explain itself."""
 
 from __future__ import annotations
 
+import html
+import io
 import re
 import sys
-from collections.abc import Sequence
-from typing import TextIO
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple, TextIO
 from urllib.parse import urlsplit
 
 _TABLE_WIDTH = 250  # Characters, more than any table takes: a narrow terminal wraps lines, and nothing is left out.
@@ -48,15 +50,71 @@ def counted(number: int, one: str, many: str = "") -> str:
     return f"{number:,} {one if number == 1 else many or one + 's'}"
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
-    from rich.box import SIMPLE_HEAD  # The package takes long to import.
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
+class Table(NamedTuple):
+    """Names of columns and rows of cells; justify: "right" or "left", of all columns but the first, which is left."""
 
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
-    for index, name in enumerate(columns):
-        table.add_column(Text(shown(name)), justify=justify if index else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*(Text(shown(cell)) for cell in row))
-    Console(file=sys.stdout, width=_TABLE_WIDTH).print(table)
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    justify: str = "right"
+
+    def print(self, file: TextIO) -> None:
+        from rich import box, console, table, text  # The package takes long to import.
+
+        drawn = table.Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
+        for index, name in enumerate(self.columns):
+            drawn.add_column(text.Text(shown(name)), justify=self.justify if index else "left", no_wrap=True)
+        for row in self.rows:
+            drawn.add_row(*(text.Text(shown(cell)) for cell in row))
+        console.Console(file=file, width=_TABLE_WIDTH).print(drawn)
+
+    def text(self) -> str:
+        """Return the lines of the table, as `shown`."""
+        out = io.StringIO()
+        self.print(out)
+        return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
+
+    def html(self) -> str:
+        """Return the table as HTML, with text that is escaped."""
+
+        def row(cells: Sequence[str], tag: str) -> str:
+            return f"<tr>{''.join(f'<{tag}>{html.escape(shown(cell))}</{tag}>' for cell in cells)}</tr>"
+
+        return f"<table>{row(self.columns, 'th')}{''.join(row(cells, 'td') for cells in self.rows)}</table>"
+
+
+class Report(str):
+    """Text of lines and tables; a Python prompt shows it as it is printed, a notebook as HTML."""
+
+    parts: tuple[str | Table, ...]
+
+    def __new__(cls, parts: Iterable[str | Table]) -> Report:
+        parts = tuple(parts)
+        report = super().__new__(
+            cls, "\n".join(part.text() if isinstance(part, Table) else shown(part) for part in parts)
+        )
+        report.parts = parts
+        return report
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Report, (self.parts,)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        return "".join(
+            part.html() if isinstance(part, Table) else f"<div>{html.escape(shown(part))}</div>" for part in self.parts
+        )
+
+
+def print_parts(parts: Iterable[str | Table]) -> None:
+    """Print lines of text and tables on standard output, as `shown`."""
+    for part in parts:
+        if isinstance(part, Table):
+            part.print(sys.stdout)
+        else:
+            echo(part)
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
+    print_parts([Table(columns, rows, justify)])

@@ -7,6 +7,7 @@ larger than memory works. It knows no file format and derives no hierarchy (see 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
+from athcodec.files.shown import counted
 from athcodec.options import real, set_numbers, whole
 
 LARGEST_COORDINATE = 1e18
@@ -23,6 +25,7 @@ BLOCK_BYTES = 32 << 20
 CLIP_RANGES, NAME_BYTES = 255, 255
 DEFAULT_FPS = 30.0
 PLAIN_TYPES = frozenset((str, int, float, bool, type(None)))
+LARGEST_RATE_SLACK = 2e-7  # Share of a rate; 29.97 and 30000 / 1001 are 1e-6 apart.
 NOT_KEPT = {
     "c": "complex array (store real and imaginary parts as two)",
     "V": "array of raw bytes (store unsigned integers)",
@@ -34,7 +37,7 @@ RESERVED_NAMES = frozenset(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Skin:
     """The joints that move a clip's vertices, as far as the source states them; only finding branches uses them.
 
@@ -51,6 +54,9 @@ class Skin:
     joint_parent: np.ndarray
     vertex_joint: np.ndarray
     names: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        return f"<Skin: {counted(len(self.joint_parent), 'joint')} of {len(self.vertex_joint):,} vertices>"
 
 
 @dataclass(frozen=True)
@@ -148,7 +154,7 @@ class MotionClip:
     >>> positions = np.zeros((60, 20, 3), np.float32)
     >>> positions[..., 1] = np.linspace(0, 2, 20)  # a stem that stands still
     >>> athcodec.MotionClip(positions, np.arange(60) / 30, vertex_branch=np.zeros(20, int), branch_parent=[-1])
-    MotionClip(60 frames, 20 vertices, 1 branches, float32)
+    MotionClip(60 frames, 20 vertices, 1 branch, float32)
     """
 
     positions: Any
@@ -178,8 +184,9 @@ class MotionClip:
         self.check()
 
     def __repr__(self) -> str:
-        branches = f"{self.branch_count} branches" if self.has_branches else "branches unknown"
-        return f"MotionClip({self.frame_count} frames, {self.vertex_count} vertices, {branches}, {self.dtype})"
+        branches = counted(self.branch_count, "branch", "branches") if self.has_branches else "branches unknown"
+        frames, vertices = counted(self.frame_count, "frame"), counted(self.vertex_count, "vertex", "vertices")
+        return f"MotionClip({frames}, {vertices}, {branches}, {self.dtype})"
 
     def __enter__(self) -> MotionClip:
         return self
@@ -257,8 +264,8 @@ class MotionClip:
     @property
     def fps(self) -> float:
         """Median frame rate in frames per second; metadata["fps"] of a single frame, else 30."""
-        steps = np.concatenate([np.diff(self.time[start:stop]) for start, stop in self.clip_range_frames])
-        return float(1.0 / np.median(steps)) if len(steps) else frame_rate(self.metadata)
+        runs = [self.time[start:stop] for start, stop in self.clip_range_frames]
+        return median_rate(*runs) or frame_rate(self.metadata)
 
     @property
     def clip_range_frames(self) -> list[tuple[int, int]]:
@@ -529,6 +536,25 @@ def frame_rate(metadata: Mapping[str, Any]) -> float:
     if fps is None:
         raise ClipError(f"fps: got {metadata['fps']!r}, expected a positive number")
     return fps
+
+
+def median_rate(*runs: np.ndarray) -> float:
+    """Return the frame rate of the median step in runs of times, (T,) seconds each; 0 if none has two frames.
+
+    A rate is the usual one (30, 23.976, 24000 / 1001) that the times were computed from, where it is as close as the
+    rounding of the times allows to tell.
+    """
+    steps = np.concatenate([np.diff(run) for run in runs])
+    if not len(steps):
+        return 0.0
+    step = float(np.median(steps))
+    rate = 1.0 / step if step > 1.0 / LARGEST_COORDINATE else math.inf
+    if rate == math.inf:
+        return rate
+    rounding = 4 * rate * float(np.spacing(max(np.abs(run).max(initial=0.0) for run in runs)))
+    slack = rate * min(1e-9 + rounding, LARGEST_RATE_SLACK)
+    usual = (float(round(rate)), round(rate, 3), round(rate * 1.001) * 1000 / 1001)
+    return next((number for number in usual if 0 < number and abs(number - rate) <= slack), rate)
 
 
 def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:

@@ -52,6 +52,9 @@ class Frames:
         self._kept = np.empty(self.shape, self.dtype) if keeps else None
         self._is_kept = np.zeros(frame_count, bool)
 
+    def __repr__(self) -> str:
+        return f"<Frames: {self.shape}, {self.dtype}, read when they are sliced>"
+
     def __len__(self) -> int:
         return self.shape[0]
 

@@ -1,15 +1,20 @@
-"""Lengths and file sizes as people write them: "1mm", "0.5 cm", "2e-3", "50kB", "1.5MiB". Based on the exact
-definitions of the inch (25.4 mm) and the foot (12 inches), and on IEC 80000-13 for sizes."""
+"""Units and axes of clips, and lengths and file sizes as people write them: "1mm", "0.5 cm", "2e-3", "50kB", "1.5MiB".
+Based on the exact definitions of the inch (25.4 mm) and the foot (12 inches), and on IEC 80000-13 for sizes."""
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
-from athcodec.errors import BoundError
-from athcodec.options import set_numbers
+from athcodec.errors import BoundError, ClipError
+from athcodec.options import real, set_numbers
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
+AXES = ("x", "y", "z")
+METRES_PER_UNIT = "meters_per_unit"  # Key of metadata: the unit of a clip that no symbol of METRES names.
 BYTES = {
     "": 1,
     "B": 1,
@@ -65,8 +70,8 @@ class Length:
 
         Parameters
         ----------
-        scene_unit : str or None
-            ``metadata["unit"]`` of the clip.
+        scene_unit : str, float or None
+            `scene_unit` of the clip's metadata: the name of its unit, or the unit in metres.
 
         Returns
         -------
@@ -81,8 +86,10 @@ class Length:
         if not self.unit:
             return self.value
         if scene_unit in (None, ""):
-            raise BoundError(f"length: got {self} for a clip without a unit, expected a plain number")
-        metres = METRES.get(unit_symbol(scene_unit))
+            raise BoundError(
+                f"length: got {self} for a clip without a unit, expected a plain number, or a clip that states its unit"
+            )
+        metres = scene_unit if isinstance(scene_unit, float) else METRES.get(unit_symbol(scene_unit))
         if metres is None:
             raise BoundError(
                 f"length: got {self} for a clip in {str(scene_unit)!r}, expected a clip in one of "
@@ -92,13 +99,19 @@ class Length:
         return self.value * (METRES[self.unit] / metres)
 
 
-def parse_length(text: str) -> Length:
+LengthLike: TypeAlias = float | str | Length
+"""A length as a caller passes it: a number in scene units, or text with or without a unit, such as "1mm"."""
+
+
+def parse_length(text: str, what: str = "length") -> Length:
     """Read a length.
 
     Parameters
     ----------
     text : str
         A number, with or without a unit: "2e-3", "1mm", "0.5 cm".
+    what : str, optional
+        The name that an error message begins with.
 
     Returns
     -------
@@ -110,20 +123,50 @@ def parse_length(text: str) -> Length:
         If it is none.
     """
     match = _QUANTITY.fullmatch(text)
-    if not match or match[2] not in ("", *METRES) or float(match[1]) == float("inf"):
+    if not match or match[2] not in ("", *METRES) or float(match[1]) == math.inf:
         raise BoundError(
-            f"length: got {text!r}, expected a number in scene units or one followed by {', '.join(METRES)}"
+            f"{what}: got {text!r}, expected a number in scene units or one followed by {', '.join(METRES)}"
         )
     return Length(float(match[1]), match[2])
 
 
-def parse_size(text: str) -> int:
+def length_of(length: Any, what: str = "length") -> Length:
+    """Return a length that a caller passes as LengthLike; numbers may be NaN, infinite or negative.
+
+    Parameters
+    ----------
+    length : float, str or Length
+        A number in scene units, or text as `parse_length` takes it.
+    what : str, optional
+        The name that an error message begins with.
+
+    Returns
+    -------
+    Length
+
+    Raises
+    ------
+    BoundError
+        If it is text that is no length.
+    TypeError
+        If it is neither text nor a number.
+    """
+    if isinstance(length, Length):
+        return length
+    if isinstance(length, str):
+        return parse_length(length, what)
+    return Length(real(what, length, 'such as 0.01, or text such as "1cm"'))
+
+
+def parse_size(text: str, what: str = "size") -> int:
     """Read a size in bytes.
 
     Parameters
     ----------
     text : str
         A number, with or without a unit: "50000", "50kB", "1.5MiB".
+    what : str, optional
+        The name that an error message begins with.
 
     Returns
     -------
@@ -138,11 +181,133 @@ def parse_size(text: str) -> int:
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0
     if not 1 <= size < 2**63:
-        raise BoundError(f"size: got {text!r}, expected bytes, at least one: 50000, 50kB, 1.5MB or 48KiB")
+        raise BoundError(f"{what}: got {text!r}, expected bytes, at least one: 50000, 50kB, 1.5MB or 48KiB")
     return int(size)
+
+
+def size_of(size: Any, what: str = "size") -> int:
+    """Return a size in bytes that a caller passes: a number, or text as `parse_size` takes it.
+
+    Parameters
+    ----------
+    size : int, float or str
+        Bytes.
+    what : str, optional
+        The name that an error message begins with.
+
+    Returns
+    -------
+    int
+        Bytes; a number is returned whatever it is.
+
+    Raises
+    ------
+    BoundError
+        If it is text that is no size, or not finite.
+    TypeError
+        If it is neither text nor a number.
+    """
+    if isinstance(size, str):
+        return parse_size(size, what)
+    number = real(what, size, 'of bytes, or text such as "50kB"')
+    if not math.isfinite(number):
+        raise BoundError(f"{what}: got {number}; expected a finite number of bytes")
+    return int(number)
 
 
 def unit_symbol(unit: object) -> str:
     """Return the symbol in METRES of a unit that metadata names in full ("Meters"), or the unit unchanged."""
     name = str(unit).strip()
     return _LONG_NAMES.get(name.lower().removesuffix("s"), name if name in METRES else name.lower())
+
+
+def scene_unit(metadata: Mapping[str, Any]) -> Any:
+    """Return the unit of a clip for `Length.in_scene_units`: its name, its length in metres, or None."""
+    return metadata.get("unit") or metres_of(metadata)
+
+
+def metres_of(metadata: Mapping[str, Any]) -> float | None:
+    """Return the length of a clip's unit in metres; None if its metadata state none that is known."""
+    metres = METRES.get(unit_symbol(metadata.get("unit") or ""), metadata.get(METRES_PER_UNIT))
+    if isinstance(metres, (int, float)) and not isinstance(metres, bool) and 0 < metres < math.inf:
+        return float(metres)
+    return None
+
+
+def checked_unit(unit: Any, what: str = "unit") -> str:
+    """Return a unit that an option names, a symbol of METRES.
+
+    Parameters
+    ----------
+    unit : str
+        "m", "cm", "mm", "km", "in" or "ft".
+    what : str, optional
+        The name that an error message begins with.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ClipError
+        For anything else; the message lists the units, and names the one that was probably meant.
+    """
+    if isinstance(unit, str) and unit in METRES:
+        return str(unit)
+    near = unit_symbol(unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit)
+    hint = f"; did you mean {near!r}?" if near in METRES else ""
+    raise ClipError(f"{what}: got {unit!r:.80}, expected one of {', '.join(METRES)}{hint}")
+
+
+def checked_axis(axis: Any, what: str = "up_axis") -> str:
+    """Return an axis that an option names.
+
+    Parameters
+    ----------
+    axis : str
+        "x", "y" or "z".
+    what : str, optional
+        The name that an error message begins with.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ClipError
+        For anything else; the message lists the axes, and names the one that was probably meant.
+    """
+    if isinstance(axis, str) and axis in AXES:
+        return str(axis)
+    near = re.fullmatch(r"\s*\+?([xyz])(?:[ _-]?(?:up|axis))?\s*", str(axis).lower())
+    hint = f"; did you mean {near[1]!r}?" if near else ""
+    raise ClipError(f"{what}: got {axis!r:.80}, expected one of {', '.join(AXES)}{hint}")
+
+
+def stated_scene(metadata: Mapping[str, Any]) -> dict[str, str]:
+    """Return the unit and the up axis that metadata state, as the options name them: "Meters" is "m", "Z" is "z".
+
+    Parameters
+    ----------
+    metadata : mapping
+        Metadata of a clip. A minus sign before the axis, which points down then, stays.
+
+    Returns
+    -------
+    dict of str to str
+        "unit" and "up_axis", where they are stated.
+
+    Raises
+    ------
+    ClipError
+        If one of them is none that athcodec knows.
+    """
+    stated = {name: metadata[name] for name in ("unit", "up_axis") if metadata.get(name) not in (None, "")}
+    if "unit" in stated:
+        stated["unit"] = checked_unit(symbol if (symbol := unit_symbol(stated["unit"])) in METRES else stated["unit"])
+    if "up_axis" in stated:
+        name = str(stated["up_axis"]).strip().lower()
+        stated["up_axis"] = name if name.removeprefix("-") in AXES else checked_axis(stated["up_axis"])
+    return stated

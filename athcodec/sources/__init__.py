@@ -2,7 +2,7 @@
 
 `read` finds the format by what a file begins with, then by its suffix, and imports the module of that format and no
 other. A module has one function, `read_clip(path, options) -> MotionClip`. Most formats name no branches: the clip has
-none then (see motion/branches).
+none then (see motion/branches). Other packages add formats by entry points (registry.py), which are asked last.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import importlib
 import os
 import re
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
-from athcodec.files.kinds import HEAD_BYTES
+from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.positions import Order, parse_order
-from athcodec.motion.units import METRES, unit_symbol
+from athcodec.motion.units import METRES, METRES_PER_UNIT, checked_axis, checked_unit, metres_of, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
@@ -64,13 +64,23 @@ MEANINGS = {
 }
 ATH, ATH_MAGIC = ".ath", b"\x89ATH\r\n\x1a\n"
 NO_SOURCES = {
-    ATH: "is an .ath file already; `athcodec decode` writes other formats, `athcodec truncate` fewer levels",
-    ".nc": "is netCDF 3, expected netCDF 4, which is HDF5; `nccopy -k nc4` makes it",
-    **dict.fromkeys(
-        (".vti", ".vtr"), "is a grid without points of its own; in ParaView, Append Datasets makes it a .vtu"
+    ATH: (
+        "is an .ath file already",
+        "athcodec.open opens it, athcodec.write writes other formats of that, athcodec.truncate leaves levels out",
+        "`athcodec decode` writes other formats, `athcodec truncate` fewer levels",
     ),
-    ".mtg": "holds branches and no motion (MTG); encode the clip of the same plant, with --hierarchy and this file",
+    ".nc": ("is netCDF 3, expected netCDF 4, which is HDF5", *2 * ("`nccopy -k nc4` makes it",)),
+    **dict.fromkeys(
+        (".vti", ".vtr"),
+        ("is a grid without points of its own", *2 * ("in ParaView, Append Datasets makes it a .vtu",)),
+    ),
+    ".mtg": (
+        "holds branches and no motion (MTG)",
+        "encode the clip of the same plant by `athcodec encode`, with --hierarchy and this file",
+        "encode the clip of the same plant, with --hierarchy and this file",
+    ),
 }
+"""What is no source, by its suffix: what it is, and what to do with it in Python and on the command line."""
 _MESHES = (".obj", ".ply")
 _VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
 FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
@@ -109,9 +119,9 @@ class ReadOptions:
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
         refused.
-    max_memory : int, optional
-        Bytes of memory that reading the source may take, 4 GiB by default: what of it is held, and what one frame or
-        one file of it takes besides.
+    max_memory : int or str, optional
+        Bytes of memory that reading the source may take, or text such as "500MB"; 4 GiB by default: what of it is
+        held, and what one frame or one file of it takes besides.
 
     Raises
     ------
@@ -135,9 +145,10 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
-        set_numbers(self, reals=("fps",), wholes=("max_memory",))
+        set_numbers(self, reals=("fps",))
         if self.fps is not None and not 0 < self.fps < float("inf"):
             raise ValueError(f"fps: got {self.fps!r}, expected a positive number")
+        object.__setattr__(self, "max_memory", size_of(self.max_memory, "max_memory"))
         if self.max_memory < 1:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
         if self.axes is not None:
@@ -173,6 +184,10 @@ class Format:
         Where in its files `magic` may stand.
     has_series : bool, optional
         Whether the times of its files may be in an index with the suffix .series behind theirs.
+    module : str, optional
+        The module with its `read_clip` or `write_clip`, if another package adds it.
+    package : str
+        The package that adds it; empty for athcodec's own. Its entry point sets it.
     """
 
     name: str
@@ -185,10 +200,16 @@ class Format:
     keeps: tuple[str, ...] = ()
     has_series: bool = False
     magic_places: tuple[int, ...] = (0,)
+    module: str = ""
+    package: str = ""
 
     def begins(self, head: bytes) -> bool:
         """Whether the first bytes of a file are those of this format."""
         return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
+
+    def ends(self, name: str) -> bool:
+        """Whether the suffix of a file's name, in lower case, is one of this format's."""
+        return Path(name.removesuffix(SERIES) if self.has_series else name).suffix in self.suffixes
 
     @property
     def is_installed(self) -> bool:
@@ -208,7 +229,22 @@ class Format:
         """
         missing = self._missing()
         if missing:
-            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "athcodec[{self.extra}]"')
+            package = (self.package or "athcodec") + (f"[{self.extra}]" if self.extra else "")
+            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "{package}"')
+
+    def function(self, name: str, home: str) -> Callable[..., Any]:
+        """Return a function of the format's module, which is in the package `home` if it is one of athcodec's own.
+
+        Raises ClipError if the module of another package cannot be imported or has no such function.
+        """
+        if not self.package:
+            return getattr(importlib.import_module(f"{home}.{self.name}"), name)
+        try:
+            return getattr(importlib.import_module(self.module), name)
+        except (ImportError, AttributeError) as error:
+            raise ClipError(
+                f"{self.title}: {name} of {self.module} cannot be imported: {error}; update or uninstall {self.package}"
+            ) from error
 
 
 FORMATS = (
@@ -240,6 +276,19 @@ FORMATS = (
 )
 
 
+def formats() -> Iterator[Format]:
+    """Yield the formats that can be read: athcodec's own, and then those of other packages, which are searched for only
+    if somebody asks for more."""
+    yield from FORMATS
+    yield from _others()
+
+
+def _others() -> tuple[Format, ...]:
+    from athcodec.sources.registry import registered  # It imports this module.
+
+    return registered(__name__)[len(FORMATS) :]
+
+
 def read(
     path: str | PathLike[str],
     format: str | None = None,
@@ -255,11 +304,11 @@ def read(
     path : str or path
         The file; of numbered files any one of them, or a name with # or %04d in place of the number.
     format : str, optional
-        Name of one of `athcodec.sources.FORMATS`. By default the format is found by what the file begins with, then
+        Name of one of `athcodec.sources.formats()`. By default the format is found by what the file begins with, then
         by its suffix.
     unit : str, optional
         A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
-        is taken to be in it.
+        is taken to be in it, and so is, with a GuessWarning, one that states a unit which is none of these.
     up_axis : {"x", "y", "z"}, optional
         Likewise: a clip with another up axis is turned.
     **options
@@ -275,7 +324,8 @@ def read(
     Raises
     ------
     ClipError
-        Where the file holds no usable clip.
+        Where the file holds no usable clip, or states a unit or an up axis that is unknown; for a `unit` or `up_axis`
+        that is none of those above.
     MissingExtra
         Where a package is missing that the format needs.
     OSError
@@ -286,16 +336,19 @@ def read(
         For options that do not exist.
     """
     wanted = ReadOptions(**options)
+    unit = None if unit is None else checked_unit(unit)
+    up_axis = None if up_axis is None else checked_axis(up_axis)
     with naming_file(path):
-        kind = find_format(path) if format is None else format_named(format, FORMATS)
+        kind = find_format(path) if format is None else format_named(format, formats())
         kind.check()
-        clip: MotionClip = importlib.import_module(f"{__name__}.{kind.name}").read_clip(path, wanted)
+        clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
         if clip.frame_count == 1 and not kind.has_series:
             _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
+        clip.metadata |= _stated(clip.metadata, path, unit=unit, up_axis=up_axis)
         return _in_axes(_in_units(clip, unit), up_axis)
 
 
@@ -334,23 +387,42 @@ def is_pattern(path: str | PathLike[str]) -> bool:
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
-def format_named(name: str, formats: Sequence[Format]) -> Format:
+def format_named(name: str, formats: Iterable[Format]) -> Format:
     """The one of `formats` with this name. Raises ValueError."""
+    known = []
     for candidate in formats:
         if candidate.name == name:
             return candidate
-    raise ValueError(f"format: got {name!r}, expected one of {', '.join(candidate.name for candidate in formats)}")
+        known.append(candidate.name)
+    raise ValueError(f"format: got {name!r}, expected one of {', '.join(known)}")
 
 
-def format_by_suffix(path: str | PathLike[str], formats: Sequence[Format]) -> Format:
-    """The first of `formats` that has the suffix of a path. Raises ClipError."""
-    name = Path(path).name.lower()
-    for candidate in formats:
-        if Path(name.removesuffix(SERIES) if candidate.has_series else name).suffix in candidate.suffixes:
+def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], content: str = UNKNOWN) -> Format:
+    """The first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
+    ClipError."""
+    name, candidates = Path(path).name.lower(), iter(formats)
+    known: list[str] = []
+    for candidate in candidates:
+        if candidate.ends(name):
+            _warn_of_others(path, candidate, candidates)
             return candidate
-    known = " ".join(suffix for candidate in formats for suffix in candidate.suffixes)
+        known += candidate.suffixes
+    looks = "" if content == UNKNOWN else f" (it looks like {content})"
     hint = f"; an index has the suffix of its files, too: NAME.vtu{SERIES}" if name.endswith(SERIES) else ""
-    raise ClipError(f"{os.fspath(path)}: got an unknown format, expected one of {known}{hint}")
+    raise ClipError(f"{os.fspath(path)}: got an unknown format{looks}, expected one of {' '.join(known)}{hint}")
+
+
+def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
+    """Warn if the suffix of a format of another package is that of further ones, too."""
+    name = Path(path).name.lower()
+    if chosen.package and (same := [other for other in others if other.ends(name)]):
+        names = " and ".join(f"{other.name} of {other.package}" for other in same)
+        warnings.warn(
+            f"{os.fspath(path)}: {Path(name).suffix} is taken for {chosen.name} of {chosen.package}, not for {names}; "
+            "--source-format or --format (format=) names another",
+            GuessWarning,
+            stacklevel=4,
+        )
 
 
 def find_format(path: str | PathLike[str]) -> Format:
@@ -372,24 +444,54 @@ def find_format(path: str | PathLike[str]) -> Format:
             head = file.read(HEAD_BYTES)
     if not head:
         raise ClipError(f"{os.fspath(path)}: got an empty file, expected a clip")
-    for candidate in FORMATS:
-        if candidate.begins(head):
-            return candidate
-    if hint := NO_SOURCES.get(ATH if head.startswith(ATH_MAGIC) else Path(path).suffix.lower()):
-        raise ClipError(f"{os.fspath(path)}: {hint}")
-    return format_by_suffix(path, FORMATS)
+    if head.startswith(ATH_MAGIC):
+        raise _no_source(path, ATH)
+    for candidates in (lambda: FORMATS, _others):  # Others are searched for only if it is none of athcodec's own.
+        known = candidates()
+        if kind := _by_first_bytes(head, known):
+            return kind
+        with suppress(ClipError):
+            return format_by_suffix(path, known)
+    if (suffix := Path(path).suffix.lower()) in NO_SOURCES:
+        raise _no_source(path, suffix)
+    return format_by_suffix(path, formats(), "" if is_pattern(path) else kind_of(path))
+
+
+def _no_source(path: str | PathLike[str], suffix: str) -> ClipError:
+    message, python, shell = NO_SOURCES[suffix]
+    return ClipError(f"{os.fspath(path)}: {message}", python=python, shell=shell)
+
+
+def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
+    return next((candidate for candidate in formats if candidate.begins(head)), None)
+
+
+def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: str | None) -> dict[str, Any]:
+    """Return the unit and the up axis that a file states, None in place of one that is unknown and stated otherwise.
+
+    Raises ClipError for one that is unknown and not in `wanted`.
+    """
+    scene: dict[str, Any] = {}
+    for name, option in wanted.items():
+        try:
+            scene |= stated_scene({name: metadata.get(name)})
+        except ClipError as error:
+            words = f"--{name.replace('_', '-')} ({name}=)"
+            if option is None:
+                raise ClipError(f"{os.fspath(path)}: {error}; {words} says which one is meant") from None
+            warnings.warn(
+                f"{os.fspath(path)}: {error}; taken for {option!r}, as {words} says", GuessWarning, stacklevel=3
+            )
+            scene[name] = None
+    return scene
 
 
 def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
     if unit is None:
         return clip
-    unit = unit_symbol(unit)
-    before = unit_symbol(clip.metadata.get("unit") or unit)
-    if before != unit and not (before in METRES and unit in METRES):
-        raise ClipError(
-            f"unit: got a clip in {before!r}, expected one of {', '.join(METRES)} to convert it to {unit!r}"
-        )
-    factor = 1.0 if before == unit else METRES[before] / METRES[unit]
+    metres = metres_of(clip.metadata)
+    factor = 1.0 if metres is None or clip.metadata.get("unit") == unit else metres / METRES[unit]
+    clip.metadata.pop(METRES_PER_UNIT, None)
     return _mapped(clip, np.eye(3) * factor, unit=unit)
 
 
@@ -397,12 +499,10 @@ def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
     """Turned by the right angle that takes its up axis to the wanted one."""
     if up_axis is None:
         return clip
-    up_axis = up_axis.lower()
-    if up_axis not in ("x", "y", "z"):
-        raise ClipError(f'up_axis: got {up_axis!r}, expected "x", "y" or "z"')
-    before, after = ("xyz".find(str(name).lower()) for name in (clip.metadata.get("up_axis", up_axis), up_axis))
+    stated = clip.metadata.get("up_axis") or up_axis
+    before, after = "xyz".find(stated), "xyz".find(up_axis)
     if before < 0:
-        raise ClipError(f'up_axis: got a clip with {clip.metadata["up_axis"]!r}, expected "x", "y" or "z"')
+        raise ClipError(f"up_axis: got a clip with {stated!r}, expected x, y or z to turn it to {up_axis!r}")
     turn = np.eye(3)
     if before != after:
         third = 3 - before - after

@@ -18,6 +18,7 @@ from athcodec.errors import ClipError
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip
 from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
+from athcodec.motion.units import METRES_PER_UNIT
 from athcodec.sources import ReadOptions
 
 MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
@@ -34,7 +35,7 @@ SCHEME = "subdivisionScheme"  # The key of USD's word in the details of a mesh; 
 SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
 OWN = "athcodec"  # the namespace of what our writers add to files of other formats
 SCENE_KEYS = {"unit": str, "up_axis": str, "fps": float}  # Members of the metadata that some formats have no place for.
-KNOWN_METADATA = ("fps", "start_frame", "meters_per_unit", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
+KNOWN_METADATA = ("fps", "start_frame", METRES_PER_UNIT, "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
 
 
 @dataclass

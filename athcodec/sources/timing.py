@@ -13,7 +13,6 @@ import numpy as np
 from athcodec.errors import GuessWarning
 from athcodec.motion.clip import DEFAULT_FPS
 
-DROP_FRAME = 1000 / 1001
 SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
 MOST_FPS = 1000.0  # Highest rate that is advised.
 MOST_FRAMES = 100_000  # Most frames of a rate that is advised.
@@ -101,6 +100,8 @@ def _usual_rates(times: np.ndarray) -> list[float]:
     if len(times) < 2 or not np.isfinite(times).all() or not times[1] > times[0]:
         return []
     step = np.median(np.diff(times))
-    nearest = np.round(1 / step) if step > 0 else 0
-    drop = np.round(1 / step / DROP_FRAME) if step > 0 else 0
-    return [float(nearest), *([float(drop) * DROP_FRAME] if drop in (24, 30, 60, 120) else [])] if nearest > 0 else []
+    if step <= 0:
+        return []
+    nearest, drop, short = np.round(1 / step), np.round(1.001 / step), np.round(1 / step, 3)
+    rates = (nearest, drop * 1000 / 1001 if drop in (24, 30, 60, 120) else 0, short)
+    return [float(rate) for rate in rates if rate > 0]

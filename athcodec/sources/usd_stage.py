@@ -35,7 +35,7 @@ from athcodec.files.plain import open_plain
 from athcodec.files.reading import FileWatch, check_inside
 from athcodec.motion.clip import MotionClip, Skin
 from athcodec.motion.frames import is_far
-from athcodec.motion.units import METRES
+from athcodec.motion.units import METRES, METRES_PER_UNIT
 from athcodec.sources import LISTED, ReadOptions, besides
 from athcodec.sources.crate import check_crates
 from athcodec.sources.scene_objects import (
@@ -787,10 +787,10 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any
     metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         metres = stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)  # float32 in files of Blender 2.8
-        if not isinstance(metres, (int, float)):
-            raise ClipError(f"metersPerUnit: got {str(metres)[:60]!r}, expected a number")
+        if not isinstance(metres, (int, float)) or not 0 < metres < math.inf:
+            raise ClipError(f"metersPerUnit: got {str(metres)[:60]!r}, expected a number above 0")
         symbols = [symbol for symbol, value in METRES.items() if math.isclose(value, metres, rel_tol=1e-6)]
-        metadata |= {"unit": symbols[0]} if symbols else {"meters_per_unit": float(metres)}
+        metadata |= {"unit": symbols[0]} if symbols else {METRES_PER_UNIT: float(metres)}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.upAxis):
         metadata["up_axis"] = str(UsdGeom.GetStageUpAxis(stage)).lower()
     return metadata

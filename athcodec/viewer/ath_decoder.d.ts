@@ -33,9 +33,10 @@ export const ready: Promise<void>;
 /** The fault of a file, or what it lacks; `message` says where, what was found and what is allowed, in the words
  * of C and Python. */
 export class AthError extends Error {
-  /** Number in FORMAT.md, "Errors", if below 64; 66: bytes are missing; 68: the host has no memory left. */
+  /** Number in FORMAT.md, "Errors", if below 64; 66: bytes are missing; 67: no segment that was passed has the frame; 68: the
+   * host has no memory left. */
   readonly code: number;
-  /** Such as "BAD_CHECKSUM", "NOT_AN_ATH_FILE", "MISSING", "NO_MEMORY". */
+  /** Such as "BAD_CHECKSUM", "NOT_AN_ATH_FILE", "MISSING", "NOT_PREPARED", "NO_MEMORY". */
   readonly codeName: string;
   /** Index of the chunk at fault, see AthFile.chunks(); -1: none. */
   readonly chunk: number;
@@ -338,26 +339,28 @@ export class AthFile {
 
   /*
    * These methods return the pose at a frame number, which may be fractional (3.25). Pass any number of prepared
-   * segments; null and freed ones are skipped. The result goes to `out` if given, else to a new array. They return
-   * null, and leave `out` as it was, if no segment holds the frame. Pass segments of one level if you want matrices
-   * or exact vertices: of several levels, nothing tells which one is shown.
+   * segments; null and freed ones are skipped. The result goes to `out` if given, else to a new array. If no segment
+   * holds the frame, they leave `out` as it was and throw an AthError, "NOT_PREPARED", which names the segment to
+   * prepare: segmentOf(Math.floor(frame)). Pass segments of one level if you want matrices or exact vertices: of
+   * several levels, nothing tells which one is shown.
    *
    * With `fade`, the blend of its levels, segments of each of which are handed over; matrices and exact vertices are those
-   * of the cut of the deepest, of which one segment has to be there. Null: a level that has a weight lacks the frame.
+   * of the cut of the deepest, of which one segment has to be there. "NOT_PREPARED": a level that has a weight lacks the
+   * frame.
    */
 
   /** All vertices, 3 numbers each; order "source" by default. */
-  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null }): Float32Array | null;
-  positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array | null;
+  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null }): Float32Array;
+  positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                   options: { out: T; order?: Order }): T | null;
+                                                   options: { out: T; order?: Order }): T;
   /** Up to four clips blended along the branches, each at its own frame and level: branches stay attached, edges of stems
    * are as long as those of the clips in their weighted mean. Weights need not add up to 1; a share of none is passed over,
    * and one that is left alone has the bits of positions(). */
   blended(
     shares: readonly { segments: Iterable<Segment | null>; frame: number; weight: number }[],
     options?: { out?: Float32Array; order?: "source" | "file" },
-  ): Float32Array | null;
+  ): Float32Array;
   /** Weights of clips for a wanted wind, of which at most four are above 0, given the wind of each: its metadata "strength"
    * and "heading", in degrees. Bilinear in both, held beyond the calmest and the wildest. */
   windWeights(
@@ -369,11 +372,11 @@ export class AthFile {
   /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
    * positions.
    * Vertices of exact runs have none, exact() has them. */
-  matrices(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
+  matrices(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
   matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                  options: { out: T }): T | null;
+                                                  options: { out: T }): T;
   /** parts().exactCount positions of 3 numbers, in file order. */
-  exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array | null;
+  exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
 
   /** The GPU form of a level (core/include/ath_gpu.h, docs/gpu.md): a block of words that goes to the GPU as it is. */
   gpuLevel(level: number): Uint32Array;

@@ -208,9 +208,9 @@ return { needed, error: this.faultError(fault, code === MISSING ? { needed } : {
 });
 }
 }
-function whole(value, low, high, what) {
+function whole(value, low, high, what, hint = "") {
 if (Number.isInteger(value) && value >= low && value <= high) return value;
-throw new RangeError(`${what}: got ${value}, expected a whole number from ${low} to ${high}`);
+throw new RangeError(`${what}: got ${value}, expected a whole number from ${low} to ${high}${hint}`);
 }
 function number(value, what) {
 if (typeof value === "number") return value;
@@ -406,7 +406,7 @@ return this.#core.faultError(fault);
 });
 }
 #level(level) {
-return whole(level, 0, this.info.levelCount - 1, "level");
+return whole(level, 0, this.info.levelCount - 1, "level", level === undefined ? "; levelFor() and readyLevel() return one" : "");
 }
 #segment(segment) {
 return whole(segment, 0, this.info.segmentCount - 1, "segment");
@@ -684,22 +684,37 @@ this.#scratch = { at: this.#core.take(bytes), size: bytes };
 }
 return this.#scratch.at;
 }
-#fill(out, length, call) {
+// lacking: says which segment `call` lacks, where it does.
+#fill(out, length, call, lacking) {
 const at = this.#passage(length * out.BYTES_PER_ELEMENT), code = call(at);
 this.held = code === HELD;
-if (code === NOT_PREPARED) return null;
+if (code === NOT_PREPARED) throw this.#core.error(NOT_PREPARED, lacking());
 if (code !== HELD) this.#check(code, "playing");
 out.set(this.#core.view(out.constructor, at, length));
 return out;
 }
-// Returns what `call` shows of segments, given the address of an array of pointers to them, and their number.
-#show(segments, frame, out, length, call) {
+// Returns what `call` shows of segments, given the address of an array of pointers to them, and their number. levels: those
+// of a fade.
+#show(segments, frame, out, length, call, levels) {
 number(frame, "frame");
 const pointers = Array.from(segments, (segment) => this.#pointer(segment));
 return this.#core.with(4 * pointers.length, (array) => {
 this.#core.view(Uint32Array, array, pointers.length).set(pointers);
-return this.#fill(out, length, (at) => call(array, pointers.length, at));
+return this.#fill(out, length, (at) => call(array, pointers.length, at), () => this.#lacking(segments, frame, levels));
 });
+}
+// What is wrong where none of the segments has a frame, and what prepares one that has. levels: those that are needed.
+#lacking(segments, frame, levels = []) {
+const there = Array.from(segments).filter((segment) => segment && !segment.freed), own = this.#segmentAt(frame);
+const got = there.map(({ index, level }) => `segment ${index} at level ${level}`).join(", ") || "no segment";
+const wanted = levels.length > 0 ? levels : [there[0]?.level ?? Math.max(this.readyLevel(own), 0)];
+const calls = [...new Set(wanted)].map((level) => `prepare(${own}, ${level})`).join(" and ");
+return `frame ${frame}: got ${got}, expected segment ${own}, the one of ${this.info.segmentCount} that has this frame: pass `
++ `what ${calls} returns; segmentOf(Math.floor(frame)) is its number`;
+}
+// The segment that has a frame, which may be fractional or beyond the file's.
+#segmentAt(frame) {
+return this.segmentOf(Math.min(Math.max(Math.floor(frame) || 0, 0), this.info.frameCount - 1));
 }
 #pointer(segment) {
 const at = segment ? this.#pointers.get(segment)?.at : 0;
@@ -713,7 +728,8 @@ whole(fade.levels.length, 1, FADE_LEVELS, "levels of fade");
 if (!(out instanceof Float32Array)) throw new TypeError("out: got something else, expected a Float32Array of a fade");
 return this.#core.with(FADE_SIZE, (at) => {
 this.#core.putFade(at, fade);
-return this.#show(segments, frame, out, length, (array, count, to) => call(array, count, at, to));
+const deepest = Math.max(...fade.levels), levels = fade.levels.filter((level, i) => fade.weights[i] > 0 || level === deepest);
+return this.#show(segments, frame, out, length, (array, count, to) => call(array, count, at, to), levels);
 });
 }
 // The largest of column `k` of #cutSize over the levels: of a fade, of segments where there is none.
@@ -748,7 +764,12 @@ core.view(Float64Array, at + i * SHARE_SIZE + 8, 2).set([number(frame, "frame"),
 next += 4 * own.length;
 }
 return this.#fill(result, length, (to) =>
-c.ath_blended_positions(this.#at, at, count, which, to, 12, at + start, scratch));
+c.ath_blended_positions(this.#at, at, count, which, to, 12, at + start, scratch), () => {
+const has = ({ segments, frame }) => Array.from(segments).some((segment) => segment && !segment.freed
+&& [frame, Math.ceil(frame)].some((each) => segment.index === this.#segmentAt(each)));
+const { segments, frame } = shares.find((share) => share.weight > 0 && !has(share)) ?? shares[0];
+return this.#lacking(segments, frame);
+});
 });
 }
 // Weights of clips, given { strength, heading } of each, null for one without.

@@ -42,7 +42,9 @@ def with_places(content: bytes) -> Callable[[], Draft]:
 
 def jumps(data: bytes) -> None:
     """The second vertex has place 2, and the first 0."""
-    rules.decode_polygons(data, rules.Record(index_type=2, count_type=None, face_count=9, columns=1, corner_count=9), range(5))
+    rules.decode_polygons(
+        data, rules.Record(index_type=2, count_type=None, face_count=9, columns=1, corner_count=9), range(5)
+    )
 
 
 def rows_by_chance(seed: int, rows: int, columns: int, vertices: int) -> np.ndarray:
@@ -80,9 +82,7 @@ for title, make in {
     ),
     "faces-of-places: triangles and quadrangles of vertices that share places": lambda: split(
         BY_VERTEX, MANY, 710, frames=1
-    ).add(
-        Entry(FACES, mixed_polygons([[(5 * i + k * k) % 260 for k in range(3 + i % 2)] for i in range(90)], MANY))
-    ),
+    ).add(Entry(FACES, mixed_polygons([[(5 * i + k * k) % 260 for k in range(3 + i % 2)] for i in range(90)], MANY))),
     "faces-of-places-by-chance: corners anywhere": lambda: split(BY_VERTEX, MANY, 711, frames=1).add(
         Entry(FACES, polygons(rows_by_chance(711, 120, 3, 260), MANY))
     ),
@@ -114,7 +114,9 @@ for title, make in {
         places=MANY,
     ),
     "rest-connected-places-leaves: shapes and copies by faces": lambda: meshed(
-        LEAVES, [[LEAF_PLACES.index(v) for v in face] for face in leaves()], Chance(720, large=3, begin=[1]),
+        LEAVES,
+        [[LEAF_PLACES.index(v) for v in face] for face in leaves()],
+        Chance(720, large=3, begin=[1]),
         places=LEAF_PLACES,
     ),
     "rest-connected-places-most: four faces and eight corners for each place": lambda: meshed(
@@ -135,7 +137,13 @@ valid(
     lambda: of_five(mesh=TWINS_DIFFER, vertex_source=[3, 0, 4, 1, 2]),
     mesh=TWINS_DIFFER,
 )
-invalid("places-host-mesh-short: a mesh with one vertex for each place", lambda: of_five(mesh=MESH_OF_FIVE), "WRONG_HOST_MESH", 0, MESH_OF_FIVE[:5])
+invalid(
+    "places-host-mesh-short: a mesh with one vertex for each place",
+    lambda: of_five(mesh=MESH_OF_FIVE),
+    "WRONG_HOST_MESH",
+    0,
+    MESH_OF_FIVE[:5],
+)
 for title, content in {
     "places-empty: PLACES without bytes": b"",
     "places-no-columns: no columns": b"\0" + places_chunk(FIVE, 5)[1:],

@@ -325,7 +325,7 @@ void fuzz_prepare_to(fuzz_file *opened, int32_t segment, int32_t level, uint64_t
     if (alone) REQUIRE(fuzz_same(file, alone, memory), "where positions go changes nothing");
     for (int32_t t = start; alone && gone && t < stop; t++) {
         if (file->info.is_float64)
-            ath_positions_float64(file, (const ath_segment **)&alone, 1, t, ATH_SOURCE_ORDER, wanted, 24);
+            ath_positions_float64(file, (const ath_segment **)&alone, 1, t, ATH_SOURCE_ORDER, (void *)wanted, 24);
         else
             ath_positions(file, (const ath_segment **)&alone, 1, t, ATH_SOURCE_ORDER, (void *)wanted, 12);
         REQUIRE(memcmp(wanted, positions + frame * (size_t)(t - start), frame) == 0, "positions are the caller's");

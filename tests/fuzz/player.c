@@ -4,7 +4,7 @@
 #include "ath_player.h"
 #include "harness.h"
 
-enum { MOST_MEMORY = 8 << 20, CALLS = 9, JOBS = 2 };
+enum { MOST_MEMORY = 8 << 20, CALLS = 8, JOBS = 2 };
 
 /* Who hands out memory: none beyond MOST_MEMORY, nor every `scarce`-th time, 0: always. */
 typedef struct {
@@ -221,31 +221,6 @@ static float *in_wind(user *u, int32_t argument, const uint8_t *options)
     return NULL;
 }
 
-/* A play without an end over any transitions, those that are none included: forth in time and back. */
-static float *without_end(user *u, int32_t argument, const uint8_t *options)
-{
-    ath_player_transition transitions[3];
-    ath_player_endless play;
-    for (int32_t i = 0; i < 3; i++) {
-        transitions[i].leave = options[i] / (1 + argument % 4);
-        transitions[i].enter = options[i + 1] % 16 - 1;
-        transitions[i].frames = options[i + 2] % 8;
-    }
-    if (ath_player_endless_begin(u->player, &play, options[5] % (u->info.clip_count + 1), transitions, 1 + argument % 3,
-                                 options[4])
-        != ATH_OK)
-        return NULL;
-    float *xyz = fuzz_memory(12 * (size_t)u->info.vertex_count, 0);
-    int result = ATH_OK;
-    for (int32_t step = 0; step < 4 && (result == ATH_OK || result == ATH_HELD); step++)
-        result = ath_player_endless_positions(u->player, &play, step == 3 ? 0.5 : step * (options[3] / 4.0),
-                                              argument % (u->info.level_count + 1) - 1, ATH_SOURCE_ORDER, xyz, 12);
-    if (result == ATH_OK || result == ATH_HELD) return xyz;
-    REQUIRE(is_error(result), "a play without an end gives its codes");
-    free(xyz);
-    return NULL;
-}
-
 static void show_alike(user users[2], float *(*of)(user *, int32_t, const uint8_t *), int32_t argument,
                        const uint8_t *options)
 {
@@ -257,7 +232,6 @@ static void call(user users[2], int32_t which, int32_t argument, const uint8_t *
 {
     if (which == 0 || which == 1) show(users, argument, options);
     if (which == 7) show_alike(users, in_wind, argument, options);
-    if (which == 8) show_alike(users, without_end, argument, options);
     for (int32_t i = 0; i < 2; i++) {
         if (which == 2) show_matrices(users + i, argument);
         if (which == 3 || which == 4) go_ahead(users + i, argument);

@@ -67,7 +67,7 @@ static void build_plan(ath_branch *branches, int32_t branch_count, int32_t verti
         double *work = fuzz_memory(ATH_BASIS_WORK * sizeof *work, 0xa5);
         int32_t next = 0;
         ath_basis_fill(pieces, &next, plan.piece_count, 0, INT32_MAX, rest, 0, work, bases, 0);
-        ath_plan_nodes(&plan, nodes);
+        ath_plan_nodes(&plan, nodes, 0, INT32_MAX);
         free(work);
         free(bases);
     }

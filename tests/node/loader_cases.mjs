@@ -1,6 +1,5 @@
 // What test_loader.py asks of the loader: node loader_cases.mjs NAME FILE prints, as JSON, what came of it.
 
-import { createHash } from "node:crypto";
 
 import { AthFile, ATHLoader, Line, pause, read, three, thrown, until } from "./loading.mjs";
 
@@ -186,31 +185,6 @@ cases.winds = async () => {
   const largest = Math.max(...seen.slice(1).map((picture, i) => far(picture, seen[i]))) / far(seen[0], last());
   return ({ off, eased: seen.length > 4 && largest < 0.9,
     refused: [refusalOf(() => motion.wind(NaN)), refusalOf(() => motion.wind(1, Infinity))] });
-};
-
-// A clip without an end, at the times of `words`: checksums of what positions() gives, and whether setTime() shows it.
-cases.endless = async () => {
-  const found = {};
-  for (const mode of ["matrices", "positions"]) {
-    const { ath, motion, loader } = await load(Infinity, { mode });
-    ath.geometry ?? ath.lines;
-    motion.fade = 0;
-    motion.endless(7);
-    found.duration = motion.duration === Infinity;
-    found.positions = [];
-    found.shown = [];
-    for (const seconds of words.map(Number)) {
-      const wanted = await motion.positions(seconds), apart = () => Math.max(...wanted.map((number, i) => Math.abs(number - motion.uploaded()[i])));
-      motion.setTime(seconds);
-      if (!(await until(() => motion.level === motion.levelCount - 1 && apart() < 1e-4))) found.shown.push([mode, seconds, apart()]);
-      found.positions.push(createHash("sha256").update(wanted).digest("hex"));
-    }
-    found.refused = refusalOf(() => motion.endless(0.5));
-    motion.play(0);
-    if (motion.duration === Infinity) found.shown.push([mode, "play"]);
-    loader.dispose();
-  }
-  return found;
 };
 
 // Buffers and views of all kinds.

@@ -216,13 +216,13 @@ def _positions(mesh, matrix) -> np.ndarray:
 
 
 def _unit(scene, world: bool) -> dict:
-    from athcodec.motion.units import METRES
+    from athcodec.motion.units import METRES, METRES_PER_UNIT
 
     if scene.unit_settings.system == "NONE" or not world:
         return {}
     scale = scene.unit_settings.scale_length
     symbols = [symbol for symbol, metres in METRES.items() if math.isclose(metres, scale, rel_tol=1e-5)]
-    return {"unit": symbols[-1]} if symbols else {}
+    return {"unit": symbols[-1]} if symbols else {METRES_PER_UNIT: float(scale)}
 
 
 def _static(mesh, obj) -> dict:

@@ -153,11 +153,11 @@ def _set_scene(scene, decoder, first: float, rate: float) -> None:
 
 
 def _place(obj, decoder, scene) -> None:
-    from athcodec.motion.units import METRES, unit_symbol
+    from athcodec.motion.units import metres_of
 
     up_axis = str(decoder.metadata.get("up_axis", "z")).lower()
     obj.rotation_euler = {"y": (math.pi / 2, 0, 0), "x": (0, -math.pi / 2, 0)}.get(up_axis, (0, 0, 0))
-    metres = METRES.get(unit_symbol(decoder.metadata.get("unit", "m")), 1.0)
+    metres = metres_of(decoder.metadata) or 1.0
     obj.scale = (metres / scene.unit_settings.scale_length,) * 3
 
 

@@ -10,7 +10,6 @@
  *     ath_player_blended_positions           blend several clips by weights
  *     ath_player_wind_positions              blend several clips by the wind
  *     ath_player_show                        get the segments of a moment, for any other function of ath.h
- *     ath_player_endless_positions           play a clip endlessly, over transitions between similar frames
  *     ath_player_set_budget                  choose between short calls and exact levels
  *     ath_player_ahead                       prepare the next segment, a bounded piece of work per drawn frame
  *     ath_player_begin, _run, _end           prepare segments as jobs of your own job system, on any thread
@@ -118,32 +117,6 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
 /* Blends the clips that ath_wind_weights chooses for a wind, all at one time. winds: one for each clip of the file. */
 int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double strength, double heading,
                               double seconds, ath_wrap wrap, int32_t level, ath_order order, float *xyz, size_t stride);
-
-/* A transition from the frames of a clip that begin at `leave` to those that begin at `enter`, over `frames` frames, as
- * the metadata's "transitions" name them. Frames are numbered from the clip's first. */
-typedef struct ath_player_transition {
-    int32_t leave, enter, frames;
-} ath_player_transition;
-
-/* The state of endless play. Whenever the clip comes to transitions, chance decides whether one is taken. Equal seeds
- * give equal plays, also in Decoder.endless of the Python package. */
-typedef struct ath_player_endless {
-    const ath_player_transition *transitions; /* leave them in place while the play lasts */
-    int32_t transition_count, clip;
-    uint32_t seed, state;
-    int32_t run, next; /* the last transition that was taken (-1: none) and the next one */
-    double begins;     /* seconds from the start of the play to the last transition */
-} ath_player_endless;
-
-/* Begins a play at the clip's first frame. Returns ATH_OK or ATH_BAD_ARGUMENT: there is no such clip, there are no
- * transitions, one goes beyond the clip, or one is not over before the last of them leaves. */
-int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
-                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed);
-/* Writes the positions at a time of 0 to 1e7 seconds since the play began, during transitions a blend along the
- * branches. If time goes back beyond the last transition, the play is replayed from its beginning. Returns the codes of
- * ath_player_blended_positions; ATH_BAD_ARGUMENT also for other times. */
-int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
-                                 ath_order order, float *xyz, size_t stride);
 
 /* Prepares what was asked for last and then what comes after it, in its direction and with its wrap, for a budget.
  * Returns ATH_MORE; ATH_OK: nothing is left to do until time goes on; or an error. */
@@ -769,152 +742,6 @@ int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double 
         shares[count++] = share;
     }
     return ath_player_blended_positions(player, shares, count, order, xyz, stride);
-}
-
-/* ---- without an end ---- */
-
-static const double ATH_PLAYER_LONGEST = 1e7; /* seconds, or 115 days */
-
-enum { ATH_PLAYER_NONE = -1 };
-
-/* Returns the seconds from a clip's first frame to another. */
-static double ath_player_since(const ath_player *p, int32_t clip, int32_t frame)
-{
-    const double *times = ath_times(p->file) + ath_clips(p->file)[clip].first_frame;
-    return times[frame] - times[0];
-}
-
-static double ath_player_lasts(const ath_player *p, int32_t clip, const ath_player_transition *way)
-{
-    double old = ath_player_since(p, clip, way->leave + way->frames) - ath_player_since(p, clip, way->leave);
-    double now = ath_player_since(p, clip, way->enter + way->frames) - ath_player_since(p, clip, way->enter);
-    return now < old ? now : old;
-}
-
-/* Returns a random number below 1 from a 32-bit xorshift (Marsaglia 2003). */
-static double ath_player_chance(ath_player_endless *play)
-{
-    play->state ^= play->state << 13;
-    play->state ^= play->state >> 17;
-    play->state ^= play->state << 5;
-    return (double)play->state / 4294967296.0;
-}
-
-/* Returns the first frame from `from` on that a transition leaves at; `last` if there is none. */
-static int32_t ath_player_leave(const ath_player_endless *play, int32_t from, int32_t last)
-{
-    int32_t found = last;
-    for (int32_t i = 0; i < play->transition_count; i++) {
-        int32_t leave = play->transitions[i].leave;
-        if (leave >= from && leave < found) found = leave;
-    }
-    return found;
-}
-
-static int32_t ath_player_last_leave(const ath_player_transition *ways, int32_t count)
-{
-    int32_t last = 0;
-    for (int32_t i = 0; i < count; i++)
-        if (ways[i].leave > last) last = ways[i].leave;
-    return last;
-}
-
-/* Orders the transitions that leave at one frame. */
-static int ath_player_in_front(const ath_player_transition *a, const ath_player_transition *b)
-{
-    return a->enter != b->enter ? a->enter < b->enter : a->frames < b->frames;
-}
-
-/* Returns the transition that leaves at a frame and has `place` others in front of it. */
-static int32_t ath_player_way(const ath_player_endless *play, int32_t leave, int32_t place)
-{
-    const ath_player_transition *ways = play->transitions;
-    for (int32_t i = 0; i < play->transition_count; i++) {
-        int32_t in_front = 0;
-        if (ways[i].leave != leave) continue;
-        for (int32_t k = 0; k < play->transition_count; k++)
-            if (ways[k].leave == leave
-                && (ath_player_in_front(ways + k, ways + i) || (k < i && !ath_player_in_front(ways + i, ways + k))))
-                in_front++;
-        if (in_front == place) return i;
-    }
-    return 0;
-}
-
-/* Returns the next transition that is taken from a frame on. */
-static int32_t ath_player_draw(ath_player_endless *play, int32_t from)
-{
-    int32_t last = ath_player_last_leave(play->transitions, play->transition_count), same = 0;
-    int32_t leave = ath_player_leave(play, from, last);
-    while (leave < last && !(ath_player_chance(play) < 0.5)) leave = ath_player_leave(play, leave + 1, last);
-    for (int32_t i = 0; i < play->transition_count; i++) same += play->transitions[i].leave == leave;
-    return ath_player_way(play, leave, (int32_t)(ath_player_chance(play) * same));
-}
-
-static void ath_player_restart(ath_player_endless *play)
-{
-    play->state = play->seed * 2654435761u + 1u;
-    if (play->state == 0) play->state = 1;
-    play->run = ATH_PLAYER_NONE;
-    play->begins = 0.0;
-    play->next = ath_player_draw(play, 0);
-}
-
-int ath_player_endless_begin(const ath_player *player, ath_player_endless *play, int32_t clip,
-                             const ath_player_transition *transitions, int32_t transition_count, uint32_t seed)
-{
-    if (clip < 0 || clip >= player->info.clip_count || transition_count < 1) return ATH_BAD_ARGUMENT;
-    int32_t frames = ath_clips(player->file)[clip].frame_count;
-    int32_t last = ath_player_last_leave(transitions, transition_count);
-    for (int32_t i = 0; i < transition_count; i++) {
-        const ath_player_transition *way = transitions + i;
-        if (way->leave < 0 || way->enter < 0 || way->frames < 1 || way->frames >= frames) return ATH_BAD_ARGUMENT;
-        if (way->leave >= frames - way->frames || way->enter > last - way->frames) return ATH_BAD_ARGUMENT;
-    }
-    play->transitions = transitions;
-    play->transition_count = transition_count;
-    play->clip = clip;
-    play->seed = seed;
-    ath_player_restart(play);
-    return ATH_OK;
-}
-
-/* Returns where in the clip the last transition has entered, in seconds. */
-static double ath_player_enters(const ath_player *p, const ath_player_endless *play)
-{
-    return play->run < 0 ? 0.0 : ath_player_since(p, play->clip, play->transitions[play->run].enter);
-}
-
-/* Takes all transitions up to a time. */
-static void ath_player_go(const ath_player *p, ath_player_endless *play, double seconds)
-{
-    if (seconds < play->begins) ath_player_restart(play);
-    for (;;) {
-        const ath_player_transition *way = play->transitions + play->next;
-        double begins = play->begins + ath_player_since(p, play->clip, way->leave) - ath_player_enters(p, play);
-        if (!(begins <= seconds)) return;
-        play->begins = begins;
-        play->run = play->next;
-        play->next = ath_player_draw(play, way->enter + way->frames);
-    }
-}
-
-int ath_player_endless_positions(ath_player *player, ath_player_endless *play, double seconds, int32_t level,
-                                 ath_order order, float *xyz, size_t stride)
-{
-    if (!(seconds >= 0.0 && seconds <= ATH_PLAYER_LONGEST)) return ATH_BAD_ARGUMENT;
-    ath_player_go(player, play, seconds);
-    double passed = seconds - play->begins, weight = 1.0, entered = ath_player_enters(player, play) + passed;
-    double left = entered;
-    if (play->run >= 0) {
-        const ath_player_transition *way = play->transitions + play->run;
-        double lasts = ath_player_lasts(player, play->clip, way), share = passed / lasts;
-        left = ath_player_since(player, play->clip, way->leave) + passed;
-        if (passed < lasts) weight = share * share * (3.0 - 2.0 * share);
-    }
-    ath_player_share shares[2] = {{play->clip, level, ATH_AS_MARKED, left, 1.0 - weight},
-                                  {play->clip, level, ATH_AS_MARKED, entered, weight}};
-    return ath_player_blended_positions(player, shares, 2, order, xyz, stride);
 }
 
 /* ---- preparing ahead ---- */

@@ -22,6 +22,7 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.gltf.json import brief, entries, entry, integer, looked_up
 from athcodec.files.gltf.meshopt import unpack, unpacked_size
+from athcodec.files.kinds import HEAD_BYTES, TEXT, kind_of_bytes
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure
 from athcodec.options import MAX_MEMORY
@@ -90,7 +91,11 @@ class GltfFile:
         self.budget.need(self.size, "file")
         head = file.read(_GLB_HEADER.size)
         if head[:4] != b"glTF":
-            return head + file.read()
+            text = head + file.read()
+            kind = kind_of_bytes(text[:HEAD_BYTES], self.size)
+            if kind not in ("glTF", "JSON", TEXT):
+                raise ClipError(f"got {kind}, expected glTF: a GLB or JSON")
+            return text
         if len(head) < _GLB_HEADER.size:
             raise ClipError(f"GLB: got {len(head)} bytes, expected a header of {_GLB_HEADER.size}")
         _, version, length = _GLB_HEADER.unpack(head)

@@ -70,7 +70,11 @@ class GltfMotion:
     def _chosen(self, name: str | None) -> int:
         names = motion_names(self._gltf.json)
         if not names:
-            raise ClipError(f"{EXTENSION}: got no motion, expected one at least")
+            raise ClipError(
+                f"{EXTENSION}: got a GLB without a motion, expected one at least",
+                python="athcodec.encode makes an .ath file of its animation",
+                shell="`athcodec encode` makes an .ath file of its animation, with --into a GLB that holds the motion",
+            )
         if name is None and len(names) > 1:
             raise ClipError(
                 f"{EXTENSION}: got {len(names)} motions, expected the name of one (gltf_motion): {brief(names)}"

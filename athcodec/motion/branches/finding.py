@@ -37,41 +37,8 @@ FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
-    """Find branches for a clip; those that it has are ignored.
-
-    Parameters
-    ----------
-    clip : MotionClip
-    method : str, optional
-        "attributes": arrays named like branch numbers, per vertex or face. "skeleton": the joints that moved the
-        vertices. "edges": a graph of centre lines. "objects": the objects of a scene, each of which moves by one
-        affine map; those whose names share more words are the more likely to hang on each other. "components": the
-        connected components of a mesh. "runs": points without faces or edges, linked to those that keep their distance:
-        blades, needles, strands, centre lines. "motion": patches that move rigidly. "auto": the first of these that the
-        clip has the data for.
-    root : int, optional
-        A vertex of the branch that all others hang on, directly or not; by default the largest branch is that.
-
-    Returns
-    -------
-    Found
-        The branches; a clip gets them by ``clip.replace(vertex_branch=..., branch_parent=..., stem_index=...)``.
-
-    Raises
-    ------
-    ClipError
-        If the clip does not have the data that the method needs.
-    MissingExtra
-        If scipy is missing.
-    ValueError
-        For a method that does not exist.
-
-    Examples
-    --------
-    >>> with athcodec.read(athcodec.sample_path()) as tree:
-    ...     len(athcodec.find_branches(tree, "edges").branch_parent)
-    99
-    """
+    """Find branches for a clip: `athcodec.find_branches`, which documents the methods, of a clip. Raises ClipError,
+    MissingExtra, ValueError."""
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
     root = None if root is None else whole("root", root)

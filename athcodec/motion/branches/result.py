@@ -10,7 +10,7 @@ from athcodec.motion.clip import MotionClip, check_branches, check_stem_index
 from athcodec.motion.hierarchy import branch_orders
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Found:
     """Branches that were found for a clip; `str` describes them in one line.
 
@@ -39,6 +39,9 @@ class Found:
     stem_index: np.ndarray | None
     method: str
     taken: str = ""
+
+    def __repr__(self) -> str:
+        return f"<Found: {self}>"
 
     def __str__(self) -> str:
         orders = branch_orders(self.branch_parent)

@@ -4,7 +4,6 @@
 import { Box3, DataTexture, EventDispatcher, FloatType, MathUtils, NearestFilter, RGBAFormat, Sphere,
   Vector3 } from "three";
 
-import { EndlessPlay, transitionsOf } from "./endless.js";
 import { Followed, setRest, setValues } from "./geometry.js";
 import { injectMotion, motionUniforms, shadowMaterials } from "./shader.js";
 import { WIDTH } from "./texels.js";
@@ -75,7 +74,6 @@ export class ATHMotion extends EventDispatcher {
   #timer = 0;
   #old = null;            // the clip before, as long as it is shown: {clip, seconds, wrap, at, fade, passed, begun}
   #wind = null;           // [strength, heading] of the clips that are blended
-  #endless = null;        // Endless play of the clip that plays.
   #answers = new Map();
   #next = 1;
 
@@ -111,7 +109,6 @@ export class ATHMotion extends EventDispatcher {
 
   /** Seconds until the clip repeats or, where it does not, ends. */
   get duration() {
-    if (this.#endless) return Infinity;
     if (this.loops) return roundOf(this.clip);
     return this.clip.duration * (this.wrap === "pingpong" ? 2 : 1);
   }
@@ -220,7 +217,6 @@ export class ATHMotion extends EventDispatcher {
     if (!next) throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
     this.#wind = null;
     if (this.level >= 0) this.#old = { ...this.#mostlyShown(), at, fade, passed: 0, begun: false };
-    this.#endless = null;
     Object.assign(this, { clip: next, start: this.time - at });
     this.#ask();
     return this;
@@ -230,19 +226,7 @@ export class ATHMotion extends EventDispatcher {
   wind(strength, heading = 0) {
     if (![strength, heading].every(Number.isFinite)) throw new RangeError(`wind: got ${strength} and ${heading}, expected two finite numbers`);
     this.#wind = [strength, heading];
-    this.#old = this.#endless = null;
-    this.#ask();
-    return this;
-  }
-
-  /** Plays the clip without an end. See index.d.ts. */
-  endless(seed = 1) {
-    if (!Number.isInteger(seed)) throw new RangeError(`endless: got the seed ${seed}, expected an integer`);
-    const { firstFrame, frameCount, name } = this.clip, { metadata } = this.#channel.statics;
-    const found = transitionsOf({ ...metadata, ...metadata.clips?.[name] }, frameCount);
-    if (!found.length) throw new RangeError(`endless: got the clip ${name} without transitions, expected some, of encode --endless`);
-    this.#endless = new EndlessPlay(found, this.#channel.times.subarray(firstFrame, firstFrame + frameCount), seed);
-    this.#wind = this.#old = null;
+    this.#old = null;
     this.#ask();
     return this;
   }
@@ -327,19 +311,16 @@ export class ATHMotion extends EventDispatcher {
   }
 
   #place(seconds) {
-    const clip = this.clip.index, since = seconds - this.start;
-    if (!this.#endless) return { clip, seconds: since, wrap: this.wrap };
-    const { places, ahead } = this.#endless.at(since);
-    return { clip, seconds: places.at(-1).seconds, wrap: "clamp", places, ahead };
+    return { clip: this.clip.index, seconds: seconds - this.start, wrap: this.wrap };
   }
 
   // One request at a time; the newest wishes go with the next.
   #ask() {
     const old = this.#old, waits = this.switching === "waiting";
-    const { clip, seconds, wrap, places, ahead } = this.#place(waits ? this.start + old.at : this.time);
+    const { clip, seconds, wrap } = this.#place(waits ? this.start + old.at : this.time);
     const fading = old && { clip: old.clip, seconds: old.seconds, wrap: old.wrap, begun: old.begun,
       share: old.fade > 0 ? 1 - old.passed / old.fade : 0 };
-    const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify([fading, this.#wind, places])}`;
+    const wish = `${clip} ${seconds} ${wrap} ${this.target} ${this.heat} ${JSON.stringify([fading, this.#wind])}`;
     if (this.#pending) {
       this.#stale = wish !== this.#asked;
       return;
@@ -351,7 +332,7 @@ export class ATHMotion extends EventDispatcher {
     const buffer = this.#spare;
     this.#spare = null;
     this.#channel.send({
-      type: "picture", view: this.#id, id: 0, clip, seconds, wrap, places, ahead, old: fading, wind: this.#wind, level: this.target, heat: this.heat,
+      type: "picture", view: this.#id, id: 0, clip, seconds, wrap, old: fading, wind: this.#wind, level: this.target, heat: this.heat,
       positions: this.mode === "positions", buffer, now: performance.now(), fade: this.fade,
       coarsely: this.#channel.easing,
     }, buffer ? [buffer] : []);

@@ -1,6 +1,5 @@
 // A plant of a forest shows at any time: frames of clips, each with a weight, which add up to 1.
 
-import { EndlessPlay, transitionsOf } from "./endless.js";
 import { roundOf } from "./ATHMotion.js";
 
 const OWN = null; // in place of a clip: that which a plant itself plays
@@ -42,55 +41,26 @@ export class Mixture {
   }
 }
 
-/** Clips as forests play them: around, or without an end. */
-export class Play {
-  #channel;
-  #endless = new Map(); // By "clip plant".
-  seed = null;          // Seed of endless play; null: clips go around.
+/** Returns the frames of a clip that goes around, `seconds` after it began: [{frame, weight}]. times: seconds of the file's frames. */
+export function framesAt(times, clip, seconds) {
+  const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
+  if (frameCount === 1 || !(round > 0)) return [{ frame: firstFrame, weight: 1 }];
+  const passed = ((seconds % round) + round) % round;
+  if (passed < duration) return within(times, clip, passed);
+  return mixed(firstFrame + frameCount - 1, firstFrame, Math.min((passed - duration) / (round - duration), 1));
+}
 
-  constructor(channel) {
-    this.#channel = channel;
+// seconds: 0 to the clip's duration.
+function within(times, { firstFrame, frameCount }, seconds) {
+  const at = times[firstFrame] + seconds;
+  let low = firstFrame, high = firstFrame + frameCount - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= at) low = middle;
+    else high = middle;
   }
-
-  /** [{frame, weight}] of a clip `seconds` after it began; of the plant with that number. */
-  at(clip, seconds, plant) {
-    const endless = this.seed === null ? null : this.#endlessOf(clip, plant);
-    if (!endless) return this.#around(clip, seconds);
-    return endless.at(seconds).places.flatMap((place) =>
-      this.#within(clip, place.seconds).map(({ frame, weight }) => ({ frame, weight: weight * place.weight })));
-  }
-
-  // Null where the clip has no transitions.
-  #endlessOf(clip, plant) {
-    const key = `${this.seed} ${clip.index} ${plant}`, { metadata } = this.#channel.statics, { firstFrame, frameCount, name } = clip;
-    if (!this.#endless.has(key)) {
-      const found = transitionsOf({ ...metadata, ...metadata.clips?.[name] }, frameCount);
-      this.#endless.set(key, found.length
-        ? new EndlessPlay(found, this.#channel.times.subarray(firstFrame, firstFrame + frameCount), this.seed + plant) : null);
-    }
-    return this.#endless.get(key);
-  }
-
-  #around(clip, seconds) {
-    const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
-    if (frameCount === 1 || !(round > 0)) return [{ frame: firstFrame, weight: 1 }];
-    const passed = ((seconds % round) + round) % round;
-    if (passed < duration) return this.#within(clip, passed);
-    return mixed(firstFrame + frameCount - 1, firstFrame, Math.min((passed - duration) / (round - duration), 1));
-  }
-
-  // Seconds from 0 to the clip's duration.
-  #within({ firstFrame, frameCount }, seconds) {
-    const { times } = this.#channel, at = times[firstFrame] + seconds;
-    let low = firstFrame, high = firstFrame + frameCount - 1;
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (times[middle] <= at) low = middle;
-      else high = middle;
-    }
-    return high === low ? [{ frame: low, weight: 1 }]
-      : mixed(low, high, Math.min(Math.max((at - times[low]) / (times[high] - times[low]), 0), 1));
-  }
+  return high === low ? [{ frame: low, weight: 1 }]
+    : mixed(low, high, Math.min(Math.max((at - times[low]) / (times[high] - times[low]), 0), 1));
 }
 
 const mixed = (a, b, weight) => [{ frame: a, weight: 1 - weight }, { frame: b, weight }];

@@ -14,7 +14,7 @@ import vertices from "../../gpu/vertices.wgsl";
 import { Kernels, Passes } from "../../gpu/passes.mjs";
 import { roundOf } from "./ATHMotion.js";
 import { clustered, upright } from "./geometry.js";
-import { Mixture, Play } from "./gpu_blend.js";
+import { framesAt, Mixture } from "./gpu_blend.js";
 
 const MOST_SHAPES = 32;
 const SLOTS = 4;          // frames that a plant keeps: two that are shown, and two that were before
@@ -48,7 +48,6 @@ export class ATHForest extends Group {
   #plants = [];         // {clip, phase}: what instances show, one of each clip and phase in use; phase: 0 to 1
   #times = [];          // For each plant at this frame: [{frame, weight}].
   #mixture = new Mixture();
-  #play;
   #eased = 0;           // when weights were advanced, milliseconds
   #instances = null;    // StorageBufferAttribute
   #draws = null;
@@ -76,7 +75,6 @@ export class ATHForest extends Group {
     this.#renderer = renderer;
     this.#ath = ath;
     upright(this, ath.metadata);
-    this.#play = new Play(ath.channel);
     this.#geometry = geometry;
     this.#material = material;
     this.#shape = shape;
@@ -179,13 +177,6 @@ export class ATHForest extends Group {
     if (![strength, heading].every(Number.isFinite)) throw new RangeError(`wind: got ${strength} and ${heading}, expected two finite numbers`);
     const asked = this.#asked = {}, { weights } = await this.#ath.channel.windWeights(strength, heading), { clips } = this.#ath.motion;
     if (asked === this.#asked) this.blend(Object.fromEntries(clips.map(({ name }, i) => [name, weights[i]])));
-    return this;
-  }
-
-  /** Plays clips without an end from now on, where they can; null: around again. See webgpu.d.ts. */
-  endless(seed = 1) {
-    if (seed !== null && !Number.isInteger(seed)) throw new RangeError(`endless: got the seed ${seed}, expected an integer`);
-    this.#play.seed = seed;
     return this;
   }
 
@@ -375,8 +366,9 @@ export class ATHForest extends Group {
     const now = performance.now(), share = this.ease > 0 ? 1 - Math.exp((this.#eased - now) / (1000 * this.ease)) : 1;
     this.#eased = now;
     this.#mixture.advance(share, (clip) => this.levels.every((own) => own.clips.has(clip)));
-    this.#times = this.#plants.map(({ clip: own, phase }, plant) => [...this.#mixture.of(own)].flatMap(([clip, part]) =>
-      this.#play.at(clip, seconds + phase * roundOf(clip), plant).map(({ frame, weight }) => ({ frame, weight: part * weight }))));
+    const { times } = this.#ath.channel;
+    this.#times = this.#plants.map(({ clip: own, phase }) => [...this.#mixture.of(own)].flatMap(([clip, part]) =>
+      framesAt(times, clip, seconds + phase * roundOf(clip)).map(({ frame, weight }) => ({ frame, weight: part * weight }))));
   }
 
   // A level at that time: what is not there yet is placed, and all plants shown.

@@ -165,10 +165,6 @@ export class ATHMotion extends EventDispatcher<ATHMotionEvents> {
    * stems as long as in the clips. Bytes of all of these clips are fetched; those that are not here yet are left out. Weights
    * and levels change over `fade` seconds. Where no clip names a wind, the first is shown. Throws RangeError where a number is not finite. */
   wind(strength: number, heading?: number): this;
-  /** Plays the clip without an end from now on, until play() or wind(): over the transitions between its like frames that
-   * `encode --endless` has found, in an order that the seed decides, the same as in Python and C. It begins with the clip's first
-   * frame, at the time `start`; `duration` is Infinity. Throws RangeError where the clip has no transitions. */
-  endless(seed?: number): this;
   /** Whether the clip before is still shown: "waiting" for the one that plays, "fading" into it; else null. */
   readonly switching: "waiting" | "fading" | null;
   /** Seconds until the clip repeats (in a loop the last frame blends into the first) or, where it does not, ends. */

@@ -57,8 +57,6 @@ export class Jobs {
       const next = firstSegment + (segment - firstSegment + 1) % segmentCount;
       yield [next, this.readyLevel(next, most)];
     }
-    for (const { level, ahead } of this.#views.values())
-      for (const segment of ahead.map((frame) => segmentAt(this.#file, frame))) yield [segment, this.readyLevel(segment, level)];
   }
 
   async #prepareInSteps(segment, level) {

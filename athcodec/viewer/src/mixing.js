@@ -7,12 +7,10 @@ const MOST_BLENDED = 4; // Largest number of shares of a picture.
 const GONE = 1e-3; // Weight below which a share is seen no more.
 const LOOKED_AWAY = 1; // Seconds without a picture, after which weights are at once what they are wanted to be.
 
-/** Returns the frames to blend, [{frame, weight}], for a wind or for a clip that plays without an end; null: there is one alone. */
-export function sharesOf(file, winds, { wind, places, clip, seconds, wrap }) {
-  if (wind)
-    return file.windWeights(winds, ...wind).flatMap((weight, index) =>
-      (weight > 0 ? { weight, clip: index, frame: file.frameAt(seconds, wrap, index) } : []));
-  return places?.length > 1 ? places.map((place) => ({ weight: place.weight, frame: file.frameAt(place.seconds, wrap, clip) })) : null;
+/** Returns the frames to blend for a wind, [{weight, clip, frame}]. */
+export function sharesOf(file, winds, { wind, seconds, wrap }) {
+  return file.windWeights(winds, ...wind).flatMap((weight, index) =>
+    (weight > 0 ? { weight, clip: index, frame: file.frameAt(seconds, wrap, index) } : []));
 }
 
 /** Returns the numbers of a picture that is a sum. terms: see Mixing's faded(); numbersOf: the numbers of a term. */

@@ -14,7 +14,7 @@ const STATE_MS = 50; // Least time between two messages about the state.
 export class Session {
   #post; #clip; #download;
   #file; #texels; #jobs;  // These are there once the file's front is.
-  #views = new Map();     // {id: {level, frames, wanted, ahead, mixing}}: #view explains them.
+  #views = new Map();     // {id: {level, frames, wanted, mixing}}: #view explains them.
   #winds;                 // {strength, heading} for each clip; null: it has none.
   #known = new Set();     // The page knows the parts of these levels.
   #stateAt = 0; #stateTimer = 0;
@@ -107,9 +107,9 @@ export class Session {
     this.#post({ type: "state", ...this.#download.progress(), ready });
   }
 
-  // A view shows `frames` from now on. Bytes of the clips of `wanted` are fetched; `ahead` are decoded as well.
-  #view({ view, level }, frames, wanted, ahead = []) {
-    this.#views.set(view, { level, frames, wanted, ahead, mixing: this.#mixing(view) });
+  // A view shows `frames` from now on. Bytes of the clips of `wanted` are fetched.
+  #view({ view, level }, frames, wanted) {
+    this.#views.set(view, { level, frames, wanted, mixing: this.#mixing(view) });
     this.#download.look();
     this.#jobs.run();
   }
@@ -154,9 +154,8 @@ export class Session {
 
   #answer(message) {
     const { view, clip, seconds, wrap, level, exactly, aside, heat, positions = false, buffer, now, fade } = message;
-    const file = this.#file, shares = sharesOf(file, this.#winds, message);
-    if (shares) return this.#ofShares(message, shares);
-    const mixing = aside ? new Mixing(file, this.#jobs) : this.#mixing(view), frame = file.frameAt(seconds, wrap, clip);
+    if (message.wind) return this.#inWind(message);
+    const file = this.#file, mixing = aside ? new Mixing(file, this.#jobs) : this.#mixing(view), frame = file.frameAt(seconds, wrap, clip);
     mixing.last = null;
     const shown = exactly ? this.#jobs.exactly(frame, level) : this.#viewed(message, frame, mixing);
     if (!shown) return { frame };
@@ -169,27 +168,28 @@ export class Session {
   }
 
   // Each share is shown at the deepest level that is decoded of it; those of which nothing is are left out.
-  #ofShares(message, used) {
+  #inWind(message) {
     const { view, clip, seconds, wrap, level, exactly, aside, positions = false, buffer, coarsely } = message;
-    const file = this.#file, jobs = this.#jobs, frame = file.frameAt(seconds, wrap, clip), frames = used.map((share) => share.frame);
+    const file = this.#file, jobs = this.#jobs, frame = file.frameAt(seconds, wrap, clip);
+    const used = sharesOf(file, this.#winds, message), frames = used.map((share) => share.frame);
     if (!aside) this.#view(message, frames, frames);
     const shares = used.flatMap((share) => {
       const shown = exactly ? jobs.exactly(share.frame, level) : jobs.show(share.frame, coarsely ? 0 : level);
       return shown ? { ...share, ...shown } : [];
     });
     if (shares.length === 0) return { frame };
-    const mixing = this.#mixing(view), eases = message.wind && !exactly && !aside, shown = Math.min(...shares.map((share) => share.level));
+    const mixing = this.#mixing(view), eases = !exactly && !aside, shown = Math.min(...shares.map((share) => share.level));
     const mixed = eases ? mixing.eased(message, shares) : { shares, fading: false }, xyz = file.blended(mixed.shares);
     if (!aside) mixing.fading.goTo(shown);
     return { shown, cut: BLENDED, frame, fading: mixed.fading, clip, held: file.held, whole: positions,
       data: positions ? xyz : this.#texels.packExact(xyz, buffer) };
   }
 
-  // coarsely: level 0 for now, whatever is wanted; ahead: seconds of the place in the clip that it goes over into.
+  // coarsely: level 0 for now, whatever is wanted.
   #viewed(message, frame, mixing) {
-    const { clip, wrap, level, old, ahead = null, coarsely } = message, next = ahead === null ? [] : [this.#file.frameAt(ahead, wrap, clip)];
+    const { level, old, coarsely } = message;
     if (old) old.frame = this.#file.frameAt(old.seconds, old.wrap, old.clip);
-    this.#view(message, old ? [frame, old.frame] : [frame], [frame, ...next], next);
+    this.#view(message, old ? [frame, old.frame] : [frame], [frame]);
     return mixing.change(frame, coarsely ? 0 : level, old);
   }
 

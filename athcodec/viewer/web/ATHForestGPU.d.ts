@@ -67,8 +67,6 @@ export class ATHForest extends Group {
    * nearest, as ATHMotion.wind() does. Where no clip names a wind, the first is shown. Rejects with RangeError where a number is
    * not finite. */
   wind(strength: number, heading?: number): Promise<this>;
-  /** Plays clips that have transitions without an end, each plant in an order of its own that the seed decides; null: around. */
-  endless(seed?: number | null): this;
   /** strength: that motion is multiplied by, 1: as in the file. heading: how far about the axis that is up the motion is turned from
    * the file's own, radians, whatever the angle of an instance; null (default): each blows as it is turned itself. A turned motion
    * keeps no lengths where it is large. */
