@@ -79,8 +79,8 @@ def encode(
         same over the diagonal of all frames (default 1e-4, lossless 4e-7); or the bytes of the file, or "50kB".
     ladder : {"decades", "none"} or sequence of float
         Largest errors over the diagonal at which decoding can stop, each held by a layer; "none", a single layer, is a
-        few percent smaller, and taken for "decades" where it seems to be a fifth smaller. Errors below 4 bounds, or less
-        than 2.5 times apart, make no layer.
+        few percent smaller, and taken for "decades" where it seems to be a fifth smaller. Errors below 4 bounds, or
+        less than 2.5 times apart, make no layer.
     lossless, exact_rest, host_rest : bool
         Add a level that is the source bit for bit; keep the rest pose so; leave it out (`open`, host_mesh).
     rest_error : float, str or Length, optional
