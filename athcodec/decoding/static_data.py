@@ -117,9 +117,14 @@ class StaticData(FileTables):
 
     @property
     def stem_index(self) -> np.ndarray | None:
-        """Place of each vertex on its stem, (N,) int32; None if the source's numbering already says it."""
-        vertex_branch, _, places = self._source_branches
-        return check_stem_index(places, vertex_branch)
+        """Number of each vertex along its stem, (N,) int32; None if the source's numbering already says it of the first
+        vertices of places."""
+        if self.places.are_shared:
+            place_branch, _, along = self.place_hierarchy.source_branches()
+            if check_stem_index(along, place_branch) is None:
+                return None
+        vertex_branch, _, along = self._source_branches
+        return check_stem_index(along, vertex_branch)
 
     # ---- polygons and attributes ----
 

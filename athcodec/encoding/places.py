@@ -112,7 +112,20 @@ def find_places(
     if most_error > 0:
         near = _join_near(clip, leader, joined, most_error)
         places = near if near.count <= NEAR_SHARE * places.count else places
-    return places if not places.are_shared else _alike_in_copies(clip, places)
+    return places if not places.are_shared else _in_order_of_stems(clip, _alike_in_copies(clip, places))
+
+
+def _in_order_of_stems(clip: MotionClip, places: Places) -> Places:
+    """Return places that keep the order along stems that a source states: vertices share one only where they follow
+    each other there as they do in the source."""
+    if clip.stem_index is None or clip.vertex_branch is None:
+        return places
+    order = np.lexsort((clip.stem_index, clip.vertex_branch))
+    place = places.of_vertex[order]
+    begins = np.append(True, (place[1:] != place[:-1]) | (order[1:] < order[:-1]))
+    run = np.empty(len(order), np.int64)
+    run[order] = np.cumsum(begins)
+    return Places.of_labels(run, places.of_vertex, error=places.error)
 
 
 def clip_of_places(clip: MotionClip, places: Places) -> MotionClip:

@@ -146,7 +146,7 @@ invalid(
 )
 for title, content in {
     "places-empty: PLACES without bytes": b"",
-    "places-no-columns: no columns": b"\0" + places_chunk(FIVE, 5)[1:],
+    "places-no-columns: Columns 0": b"\0" + places_chunk(FIVE, 5)[1:],
     "places-jump: a place that is not the next one": b"\1" + write(jumps, [0, 2, 1, 3, 4, 0, 1, 2, 3]),
     "places-missing-last: no vertex at the last place": b"\1" + write(jumps, [0, 1, 2, 3, 0, 1, 2, 3, 3]),
     "places-bytes-behind: bytes behind the stream": places_chunk(FIVE, 5) + b"\1" * 12,

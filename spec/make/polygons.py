@@ -29,7 +29,7 @@ def polygon_shape(index_type: int, count_type: int | None, face_count: int, colu
 
 
 def polygons(rows: np.ndarray, places: int | list = 5, script: Script | None = None) -> bytes:
-    """FACES or EDGES with as many corners each. places: of each vertex, or how many vertices with places of their own."""
+    """FACES or EDGES with as many corners each. places: of each vertex, or how many that share none."""
     shape = polygon_shape(polygon_type(rows.dtype.str), None, *rows.shape, rows.size)
     places = range(places) if isinstance(places, int) else places
     stream = write(rules.decode_polygons, script or rows.reshape(-1).tolist(), shape, places)

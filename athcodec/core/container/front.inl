@@ -8,11 +8,10 @@
 
 enum { KNOWN_KINDS = 17, KIND_BITS = 5, SIZE_BITS = 30 };
 
-static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,         ATH_TIME,        ATH_METADATA,
-                                                  ATH_FACES,     ATH_EDGES,        ATH_CLIPS,       ATH_SOURCE_REST,
-                                                  ATH_STEMS,     ATH_AFFINES,      ATH_CORRECTIONS, ATH_SHAPES,
-                                                  ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED,   ATH_ATTRIBUTE,
-                                                  ATH_PLACES};
+static const uint16_t known_kinds[KNOWN_KINDS] = {
+    ATH_HIERARCHY, ATH_REST,         ATH_TIME,      ATH_METADATA,  ATH_FACES,       ATH_EDGES,
+    ATH_CLIPS,     ATH_SOURCE_REST,  ATH_STEMS,     ATH_AFFINES,   ATH_CORRECTIONS, ATH_SHAPES,
+    ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED, ATH_ATTRIBUTE, ATH_PLACES};
 
 typedef struct {
     ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind of the chunk before */
@@ -73,8 +72,8 @@ static void code_counts(ath_coder *coder, ath_header *header)
     header->layer_count = (int32_t)code_from(coder, &counts, 1, 16, (uint32_t)header->layer_count);
     context_init(&split, 6000);
     if (coder_bit(coder, &split, header->vertex_count > header->place_count))
-        header->vertex_count = header->place_count
-                               + code_from(coder, &counts, 1, 1 << 16, header->vertex_count - header->place_count);
+        header->vertex_count =
+            header->place_count + code_from(coder, &counts, 1, 1 << 16, header->vertex_count - header->place_count);
     else
         header->vertex_count = header->place_count;
     header->is_float64 = coder_raw_bit(coder, header->is_float64);

@@ -165,8 +165,8 @@ ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double
  * rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts
  * of distances, rounded up as in the error table, which are added to. */
 ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, const int32_t *shares,
-                               int is_float64, const void *positions, const double *source, const double origin[3], double rounding,
-                               double *max_error, double *sum_squares, uint32_t *histogram);
+                               int is_float64, const void *positions, const double *source, const double origin[3],
+                               double rounding, double *max_error, double *sum_squares, uint32_t *histogram);
 
 /* Mixes the positions of `count` vertices, in frames x vertex_count x 3 floats or (is_float64) doubles, into a hash of
  * each. zeros_differ: whether 0.0 and -0.0 are different numbers. */

@@ -98,8 +98,7 @@ void ath_find_near(int32_t count, int32_t poses, int32_t pose, const double *poi
     for (uint32_t h = 0; h < table; h++) first[h] = -1;
     for (int32_t i = 0; i < count; i++) {
         int64_t cell[3];
-        int32_t found =
-            leader_near(points, poses, pose, labels, tolerance, i, first, next, table - 1, cell);
+        int32_t found = leader_near(points, poses, pose, labels, tolerance, i, first, next, table - 1, cell);
         leaders[i] = found < 0 ? i : found;
         if (found >= 0) continue;
         int32_t *head = first + (cell_hash(cell) & (table - 1));

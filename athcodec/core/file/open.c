@@ -70,8 +70,7 @@ static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *ba
     file->model = ath_take(&arena, ath_prelude_model_size());
     file->scratch = ath_take(&arena, scratch_size(header));
     carve_layers(file, header, &arena);
-    if (header->has_faces)
-        ath_carve_mesh(&file->mesh, &arena, vertices, MESH_CORNERS * vertices, mesh_work(header));
+    if (header->has_faces) ath_carve_mesh(&file->mesh, &arena, vertices, MESH_CORNERS * vertices, mesh_work(header));
     return arena.used;
 }
 
@@ -215,7 +214,7 @@ static int read_hierarchy(ath_file *file, ath_fault_info *fault)
 }
 
 /* Begins to read which vertices share a place. */
-static int start_places(ath_file *file, ath_fault_info *fault)
+static int prepare_places(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
     ath_bytes chunk;
@@ -438,7 +437,7 @@ int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)
         int32_t part = file->opened; /* in the order of FORMAT.md, "Opening" */
         result = part == 0      ? read_clips(file, why)
                  : part == 1    ? read_hierarchy(file, why)
-                 : part == 2    ? start_places(file, why)
+                 : part == 2    ? prepare_places(file, why)
                  : part == 3    ? read_places(file, cost)
                  : part == 4    ? read_plan(file, why)
                  : part == last ? read_time(file, why)

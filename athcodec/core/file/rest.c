@@ -244,7 +244,8 @@ static int put_rest(const ath_file *file, ath_order order, void *xyz, size_t str
         for (size_t k = 0; k < 3; k++)
             ath_put_number((char *)xyz + place_of(file, order, v) * stride, k, is_float64,
                            rest_number(file, reference, 3 * v + k));
-    if (order == ATH_SOURCE_ORDER) ath_fill_places(file, xyz, stride, 3 * (is_float64 ? sizeof(double) : sizeof(float)));
+    if (order == ATH_SOURCE_ORDER)
+        ath_fill_places(file, xyz, stride, 3 * (is_float64 ? sizeof(double) : sizeof(float)));
     return ATH_OK;
 }
 

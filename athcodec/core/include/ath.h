@@ -262,8 +262,8 @@ typedef struct ath_info {
     uint64_t file_length, prelude_length;
     double max_error; /* error bound of the deepest stored level, scene units */
     double origin[3];
-    int32_t vertex_count;     /* vertices of the source, which ATH_SOURCE_ORDER has */
-    int32_t place_count;      /* places of vertices, which ATH_FILE_ORDER has; as many, or fewer where some coincide */
+    int32_t vertex_count; /* vertices of the source, which ATH_SOURCE_ORDER has */
+    int32_t place_count;  /* places of vertices, which ATH_FILE_ORDER has; as many, or fewer where some coincide */
     int32_t branch_count;
     int32_t frame_count, segment_count; /* sums over all clips */
     int32_t clip_count;

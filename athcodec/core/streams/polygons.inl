@@ -19,7 +19,7 @@ enum {
     FACE_FAR,
     FACE_WAYS,
     FACE_RUNS = 16,
-    FACE_PLACES = 5, /* first, second, third, later corners, and those where two open sides agree */
+    FACE_PLACES = 5,   /* first, second, third, later corners, and those where two open sides agree */
     FACE_MEMBERS = 16, /* vertices of a place that a guess of it may mean */
     FACE_MEMBER_CONTEXTS = 4,
     FACE_COUNTS_BITS = 6,
@@ -55,7 +55,8 @@ typedef struct {
     ath_context repeats[FACE_RUNS];                            /* by how long the repetition has held */
     ath_context guessed[FACE_GUESSES][FACE_PLACES][FACE_WAYS]; /* by how the corner before was coded */
     ath_context is_recent[FACE_PLACES], recent[FACE_PLACES][1 << FACE_RECENT_BITS];
-    ath_context is_member[2][2][FACE_MEMBER_CONTEXTS]; /* by whether the last corner's vertex, and this one, were used */
+    ath_context is_member[2][2]
+                         [FACE_MEMBER_CONTEXTS]; /* by whether the last corner's vertex, and this one, were used */
     ath_context same_count[1 << FACE_COUNTS_BITS];
     number_model count, far[3];
     uint32_t far_mean[3], count_mean, counts_seen;
@@ -208,8 +209,8 @@ static int32_t code_member(ath_coder *coder, faces_model *model, const face_memb
 {
     int32_t member = members->first[place];
     for (int32_t i = 0; i < FACE_MEMBERS - 1 && members->next[member] >= 0; i++) {
-        ath_context *context = &model->is_member[model->was_used][members->used[member]]
-                                                [ath_min(i, FACE_MEMBER_CONTEXTS - 1)];
+        ath_context *context =
+            &model->is_member[model->was_used][members->used[member]][ath_min(i, FACE_MEMBER_CONTEXTS - 1)];
         if (coder_bit(coder, context, vertex == member)) break;
         member = members->next[member];
     }
@@ -256,7 +257,8 @@ static int32_t code_corner(ath_coder *coder, faces_model *model, const faces_lis
     for (int32_t g = 0; g < FACE_GUESSES; g++) {
         ath_context *is_there = &model->guessed[g][place][model->way];
         int32_t guess = guesses[g], met;
-        if (guess < 0 || (g < 2 ? guess == expected || (g == 1 && guess == guesses[0]) : is_guessed(faces, guesses, g, expected)))
+        if (guess < 0
+            || (g < 2 ? guess == expected || (g == 1 && guess == guesses[0]) : is_guessed(faces, guesses, g, expected)))
             continue;
         met = g < 2 ? (coder_bit(coder, is_there, vertex == guess) ? guess : -1)
                     : code_at_place(coder, model, faces, is_there, guess, vertex);
