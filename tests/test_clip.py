@@ -66,8 +66,8 @@ def test_a_rate_that_times_are_made_of_comes_back_as_it_was(fps, tmp_path):
             with athcodec.open(data) as still:
                 assert (still.fps, still.file.info()["fps"], athcodec.ClipView(still).fps) == (fps,) * 3
                 for suffix in ("npz", "glb", "mdd") if frames == 61 else ():
-                    athcodec.write(still, tmp_path / f"a.{suffix}")
-                    with athcodec.read(tmp_path / f"a.{suffix}") as again:
+                    athcodec.write(still, tmp_path / f"of_{suffix}.{suffix}")
+                    with athcodec.read(tmp_path / f"of_{suffix}.{suffix}") as again:
                         assert again.fps == fps, suffix
         assert MotionClip(positions, start + np.arange(frames) / fps).fps == fps
 

@@ -438,7 +438,7 @@ REFUSED = {
     "no suffix of files": (
         "a.series",
         '{"files": []}',
-        "got an unknown format, .*; an index has the suffix of its files, too: NAME.vtu.series",
+        "got an unknown format.*; an index has the suffix of its files, too: NAME.vtu.series",
     ),
 }
 
