@@ -117,7 +117,7 @@ class Header(ctypes.Structure):
 
     _fields_ = fields(
         *(c_uint64, "file_length front_length", c_double, "max_error"),
-        *(c_uint32, "chunk_count vertex_count branch_count frame_count segment_count"),
+        *(c_uint32, "chunk_count vertex_count place_count branch_count frame_count segment_count"),
         *(c_int32, "level_count full_level_count clip_count layer_count is_float64 is_predicted has_faces stage_count"),
         *(c_uint8 * 32, "stages"),
     )
@@ -149,6 +149,7 @@ _PLAYING = {  # Functions of core/include/ath.h.
     "ath_get_info": (None, [c_void_p, c_void_p]),
     "ath_branches": (c_void_p, [c_void_p]),
     "ath_vertex_source": (c_void_p, [c_void_p]),
+    "ath_vertex_places": (c_void_p, [c_void_p]),
     "ath_branch_source": (c_void_p, [c_void_p]),
     "ath_times": (c_void_p, [c_void_p]),
     "ath_clips": (c_void_p, [c_void_p]),
@@ -224,7 +225,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_multiply": (None, [*[c_int64] * 4, c_void_p, c_int64, c_void_p, c_int64, c_void_p]),
     "ath_decompose": (None, [c_int64, *[c_void_p] * 4]),
     "ath_solve": (None, [c_int64, c_int32, c_int32, c_void_p, c_void_p]),
-    "ath_error": (None, [c_int32, c_int32, c_void_p, c_int, *[c_void_p] * 3, c_double, *[c_void_p] * 3]),
+    "ath_error": (None, [c_int32, c_int32, c_void_p, c_void_p, c_int, *[c_void_p] * 3, c_double, *[c_void_p] * 3]),
     "ath_find_corrections": (
         c_int64,
         [c_int32, c_int32, c_int, *[c_void_p] * 5, c_double, POINTER(CoreMetEnds), c_void_p, c_int64],
@@ -238,10 +239,14 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_encode_hierarchy": (c_int64, [*_WRITER, c_void_p, c_int32, c_int32, c_void_p, c_void_p]),
     "ath_mesh_size": (c_size_t, [c_int32, c_int32]),
     "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
-    "ath_weld_mesh": (None, [*[c_void_p] * 3]),
     "ath_build_mesh": (None, [c_void_p, c_int32, POINTER(CorePolygons), *[c_void_p] * 3]),
-    "ath_faces_memory": (c_size_t, [c_int32]),
-    "ath_encode_faces": (c_int64, [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_void_p]),
+    "ath_faces_memory": (c_uint64, [c_int32, c_int32]),
+    "ath_encode_faces": (c_int64, [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_int32, c_void_p, c_void_p]),
+    "ath_encode_places": (c_int64, [*_WRITER, c_uint32, c_int32, c_int32, c_void_p]),
+    "ath_hash_positions": (None, [c_int64, c_void_p, *[c_int32] * 2, *[c_int] * 2, c_void_p, c_void_p]),
+    "ath_find_near": (None, [*[c_int32] * 3, c_void_p, c_void_p, c_double, c_void_p, c_uint32, c_void_p]),
+    "ath_find_far": (None, [c_int64, *[c_void_p] * 2, *[c_int32] * 2, c_int, c_void_p, c_void_p]),
+    "ath_find_apart": (None, [c_int64, *[c_void_p] * 2, *[c_int32] * 2, *[c_int] * 2, c_void_p, c_void_p]),
     "ath_encode_rest": (c_int64, [*_WRITER, c_void_p, c_int32, c_double, c_double, *[c_void_p] * 8]),
     "ath_find_copies": (c_int32, [c_void_p, c_int32, c_void_p, c_double, c_double, c_void_p, c_void_p]),
     "ath_encode_refined_shapes": (c_int64, [*_WRITER, POINTER(CorePlan), *[c_void_p] * 6, c_int32]),

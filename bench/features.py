@@ -129,7 +129,7 @@ class _Files:
 
     def __init__(self, clip: athcodec.MotionClip, bound: float, ladder: tuple[float, ...], path: Path):
         if not clip.has_branches:
-            clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), Work()))
+            clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), Work())[0])
         self._clip, self._bound, self._ladder, self._path = clip, bound, ladder, path
         self._polygons = Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
         self._whole: dict[str, tuple[Draft, int]] = {}

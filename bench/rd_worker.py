@@ -68,7 +68,7 @@ def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) ->
     if clip.has_branches or codec.kind == OURS:
         return clip
     option = BoundOption(rel_error=rel_bound) if rel_bound else BoundOption(lossless=True)
-    return with_branches(clip, best_branches(clip, option, Work()))
+    return with_branches(clip, best_branches(clip, option, Work())[0])
 
 
 def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:

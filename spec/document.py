@@ -186,8 +186,7 @@ class File:
         self.rules, self.mesh, self.file = rules, mesh, rules.open_file(bytes(data), strict)
         self.header, self.chunks = self.file.header, self.file.chunks
         if mesh is not None and self.file.is_host:
-            given = self.file.rest.checksums, mesh, self.file.vertex_source, self.file.origin
-            self.file.rest.rest = rules.host_rest(*given)
+            self.file.rest.rest = rules.host_rest(self.file, mesh)
 
     def content(self, kind: int, level: int | None = None, segment: int = 0) -> bytes:
         return self.rules.content(self.chunks, kind, level, segment)
@@ -214,7 +213,8 @@ class File:
         number, origin = np.dtype("<f8" if file.rest_is_float64 else "<f4"), np.array(file.origin)
         rules.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
         if file.is_host:
-            return np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
+            points = np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
+            return points[file.vertex_source][file.vertex_of]
         level = self.header.shown[level]
         plans = rules.shown_plans(file, min(level, file.lossy - 1))
         method = self.content(rules.REST)[0]
@@ -227,8 +227,8 @@ class File:
         with np.errstate(all="ignore"):
             shown = np.array(points, float) if is_exact else np.array(points, float) + origin
             out = np.empty(shown.shape, number)
-            out[file.vertex_source] = shown.astype(number)
-        return out
+            out[:] = shown.astype(number)
+        return out[file.vertex_of]
 
     def arrays(self) -> list[bytes]:
         """Elements of FACES, of EDGES and of all attributes."""
@@ -240,7 +240,7 @@ class File:
             if shape.is_derived:
                 arrays.append(elements(rules.derived_edges(self.file, shape.index_type), shape.index_type))
                 continue
-            counts, corners = rules.decode_polygons(stream, shape, self.header.vertex_count)
+            counts, corners = rules.decode_polygons(stream, shape, self.file.places)
             if shape.count_type is None:
                 arrays.append(elements(corners, shape.index_type))
             else:

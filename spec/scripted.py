@@ -22,7 +22,7 @@ import numpy as np
 from spec.document import crc32c, rules
 
 LOOSE, SHEET, WHOLE = rules.LOOSE, rules.SHEET, rules.WHOLE
-REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED, REST_WELDED = 1, 2, 4, 8, 16  # Bits of REST's Method.
+REST_EXACT, REST_FLOAT64, IS_HOST, REST_CONNECTED = 1, 2, 4, 8  # Bits of REST's Method.
 NO_LEVEL = 255  # Level of a chunk that is not of motion.
 
 RECENT = 32  # corners that a vertex may be said by
@@ -140,7 +140,7 @@ def scripted_corner(original: Callable, coder, model, bound, corners, first, j, 
     """The script has the vertex. It is coded as the first thing that says it."""
     vertex, script = coder.script.answer("corner", bound - 1), coder.script
     seen = copy(model)
-    seen.places = [dict(table) for table in model.places]
+    seen.ways = [dict(table) for table in model.ways]
     coder.decisions.extend(corner_decisions(seen, bound, corners, first, j, previous, vertex))
     about = corners[-1 if j > 0 else previous] if corners else 0
     coder.script = Script(vertex - about)
@@ -153,12 +153,19 @@ def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[
     followed = [rules.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
     expected, bits = rules.repeated(corners, model.followed or followed[0], bound), []
     guesses = [rules.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
-    guesses += rules.guesses_of_sides(model, corners, first, j, previous)
-    for guess in dict.fromkeys([expected, *guesses]):
-        if guess is not None:
-            bits.append(int(guess == vertex))
-            if bits[-1]:
-                return bits
+    tried = dict.fromkeys(guess for guess in (expected, *guesses) if guess is not None)
+    for guess in tried:
+        bits.append(int(guess == vertex))
+        if bits[-1]:
+            return bits
+    for place in dict.fromkeys(rules.guesses_of_sides(model, corners, first, j, previous)):
+        members = model.members.get(place, [])[:16]
+        if place is None or (len(model.members[place]) == 1 and members[0] in tried):
+            continue
+        bits.append(int(vertex in members))
+        if bits[-1]:
+            at = members.index(vertex)
+            return bits + [0] * at + [1] * (at < len(members) - 1)
     recent = corners[: -RECENT - 1 : -1]
     if vertex in recent:
         return [*bits, 1, *_bits(recent.index(vertex), 5)]
@@ -273,17 +280,23 @@ class Entry:
         return (0, kind_id) if kind_id < 16 else (2, kind_id)
 
 
+def _more_vertices(count: int) -> list[int]:
+    """Values of how many vertices there are beside one for each place."""
+    return [1, count - 1] if count else [0]
+
+
 class FrontScript:
     """Values of the front stream. It follows the contexts of the chunk table as far as they decide what is read."""
 
     def __init__(self, counts: dict):
         self.counts = counts
         self.values = [
-            *(counts[f"{name}_count"] - 1 for name in ("vertex", "branch", "frame", "segment")),
+            *(counts[f"{name}_count"] - 1 for name in ("place", "branch", "frame", "segment")),
             counts["full_level_count"] - 1,
             counts["full_level_count"] - counts["level_count"],
             counts["clip_count"] - 1,
             counts["layer_count"] - 1,
+            *_more_vertices(counts["vertex_count"] - counts["place_count"]),
             int(counts["is_float64"]),
             int(counts["is_predicted"]),
             *_bits(rules.to_bits(counts["max_error"], 64), 63),
@@ -372,6 +385,7 @@ class Draft:
                 is_predicted=0,
                 max_error=1.0,
                 layer_count=1,
+                vertex_count=self.header["place_count"],
             )
             | self.header
         )
@@ -401,6 +415,8 @@ class Draft:
         return self.stream(stream) if self.stream else stream
 
     def with_header(self, **fields) -> Draft:
+        if "place_count" in fields:  # As many vertices, unless something else is said.
+            fields = {"vertex_count": fields["place_count"]} | fields
         return replace(self, header=self.header | fields)
 
     def index(self, kind: int, level: int = NO_LEVEL, segment: int = 0) -> int:
@@ -621,6 +637,20 @@ def _of_draft(name: str) -> Callable:
     return lambda plant, *arguments, **fields: getattr(plant.draft(), name)(*arguments, **fields)
 
 
+def mesh_of(faces: bytes, place_of: list, places: list | None = None):
+    """The mesh of FACES as a connected rest pose takes it."""
+    places = list(range(len(place_of))) if places is None else places
+    return rules.mesh_of_faces(faces, places, [place_of.index(place) for place in places])
+
+
+def places_chunk(places: list, place_count: int, columns: int = 3) -> bytes:
+    """PLACES, by the place of each vertex."""
+    stream = write(
+        lambda data, *counts: rules.decode_places(bytes([columns]) + data, *counts), places, len(places), place_count
+    )
+    return bytes([columns]) + stream
+
+
 @dataclass
 class Plant:
     """A file of scripts, or seeds of random ones, by (kind, level, segment) or (kind, level). Streams without a script
@@ -637,7 +667,9 @@ class Plant:
     mesh: np.ndarray | None = None  # The host's mesh, in source order, in place of a rest pose.
     time: bytes | None = None  # TIME
     branch_source: list | None = None
-    vertex_source: list | None = None
+    vertex_source: list | None = None  # The place of each vertex in file order.
+    places: list | None = None  # The place of each vertex in source order; none: each has its own.
+    columns: int = 3  # Columns of PLACES.
     is_float64: bool = False
     scripts: dict = field(default_factory=dict)
     heads: dict = field(default_factory=dict)  # Heads of STEMS.
@@ -659,10 +691,10 @@ class Plant:
             len(self.stems),
             vertices,
         )
-        branches, _, vertex_source = rules.decode_hierarchy(stream, len(self.stems), vertices)
+        branches, _, place_of = rules.decode_hierarchy(stream, len(self.stems), vertices)
         rest = self._rest(branches)
         self.branches, predicted = branches, self.predicted is not None
-        rests = [self._decoded_rest(branches, rest, vertex_source)]
+        rests = [self._decoded_rest(branches, rest, place_of)]
         self.plan = self.level_0 = rules.make_plan(branches, rests[-1].rest, predicted)
         clips = self.clips or (Clip(self.frames, self.segments),)
         entries = [
@@ -676,6 +708,8 @@ class Plant:
             entries.append(Entry(rules.SOURCE_REST, self.source_rest))
         if self.faces is not None:
             entries.append(Entry(rules.FACES, self.faces))
+        if self.places is not None:
+            entries.append(Entry(rules.PLACES, places_chunk(self.places, vertices, self.columns)))
         if (rules.REFINED_REST, 1, 0) in self.scripts:
             entries.append(self._refined_rest(branches, 1, self.step / 2, rests))
             self.plan = rules.make_plan(branches, rests[-1].rest)
@@ -693,7 +727,8 @@ class Plant:
         levels = self.plan.height + 1 + self.layers
         return Draft(
             dict(
-                vertex_count=vertices,
+                place_count=vertices,
+                vertex_count=vertices if self.places is None else len(self.places),
                 branch_count=len(self.stems),
                 frame_count=sum(clip.frames for clip in clips),
                 segment_count=len(segments),
@@ -725,15 +760,16 @@ class Plant:
         numbers = [x for point in self.points for x in point]
         return rest_chunk(write(rules.decode_exact_rest, numbers, branches, self.is_float64), exact=1, **fields)
 
-    def _decoded_rest(self, branches: list, chunk: bytes, vertex_source: list):
+    def _decoded_rest(self, branches: list, chunk: bytes, place_of: list):
         """The rest pose of REST; `rows` is None where it is exact or the host's."""
         origin, body, self.connectivity = struct.unpack_from("<3f", chunk, 1), chunk[17:], None
-        if self.faces is not None:
-            self.connectivity, body = rules.mesh_of_faces(self.faces, chunk[0], body, vertex_source)
+        if self.faces is not None and chunk[0] & REST_CONNECTED:
+            self.connectivity = mesh_of(self.faces, place_of, self.places)
         if self.mesh is None and not chunk[0] & REST_EXACT:
             return rules.decode_rest(body, branches, rules.f32(chunk, 13), None, self.connectivity)
         if self.mesh is not None:
-            points = (self.mesh[vertex_source] + np.float32(0)).tolist()
+            places = list(range(len(place_of))) if self.places is None else self.places
+            points = (self.mesh[[places.index(place) for place in place_of]] + np.float32(0)).tolist()
         else:
             points = rules.decode_exact_rest(body, branches, bool(chunk[0] & REST_FLOAT64), self.connectivity)
         return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], rows=None)

@@ -28,8 +28,8 @@ sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which 
 from spec.scripted import Draft, Entry, Join  # noqa: E402
 
 COUNTS = (
-    "vertex_count branch_count frame_count segment_count full_level_count level_count clip_count layer_count "
-    "is_float64 is_predicted max_error"
+    "vertex_count place_count branch_count frame_count segment_count full_level_count level_count clip_count "
+    "layer_count is_float64 is_predicted max_error"
 ).split()
 CHECKSUM_AT = 12
 
@@ -141,7 +141,7 @@ def still_file(
     levels, segments = plan.level_count, balanced_segments(frames, -(-frames // SEGMENT_FRAMES))
     for index, (start, stop) in enumerate(segments):
         add_still_segment(store, plan, index, stop - start, stems)
-    header = ct.Header(plan.vertex_count, len(branches), frames, len(segments), levels, levels, 1.0)
+    header = ct.Header(plan.vertex_count, plan.vertex_count, len(branches), frames, len(segments), levels, levels, 1.0)
     out = BytesIO()
     store.write(out, header, np.zeros((levels, len(segments), 3)))
     return out.getvalue()

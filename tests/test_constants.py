@@ -59,7 +59,7 @@ def test_the_version_of_the_format_is_the_same_everywhere():
 
 def test_chunks_have_the_same_kinds_and_names_everywhere():
     in_format = {name: int(kind, 16) for name, kind in re.findall(r"^\| ([A-Z_]+) \| (0x\w{4}) \|", FORMAT, flags=re.M)}
-    assert len(in_format) == 16 and in_format == {name: kind for kind, name in container.KIND_NAMES.items()}
+    assert len(in_format) == 17 and in_format == {name: kind for kind, name in container.KIND_NAMES.items()}
     for name, kind in in_format.items():
         assert C[name] == getattr(container, name) == kind and lib.ath_kind_name(kind) == name.encode()
     assert {kind for kind in range(1 << 16) if lib.ath_kind_name(kind)} == set(in_format.values())
@@ -89,7 +89,8 @@ def test_limits_are_the_same_everywhere():
 
 @pytest.mark.parametrize("vertices, frames", [(1, 1), (7, 256), (8000, 33)])
 def test_the_memory_of_a_segment_is_the_same_everywhere(vertices, frames):
-    assert f"Vertex_Count * ({C['BYTES_PER_FRAME']} * F + {C['BYTES_PER_VERTEX']})" in FORMAT
+    of_places = f"Place_Count * ({C['BYTES_PER_FRAME']} * F + {C['BYTES_PER_VERTEX']})"
+    assert f"{of_places} + {C['BYTES_PER_TWIN']} * (Vertex_Count - Place_Count)" in FORMAT
     assert decoding_bytes(vertices, frames) == vertices * (C["BYTES_PER_FRAME"] * frames + C["BYTES_PER_VERTEX"])
 
 

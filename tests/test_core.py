@@ -333,7 +333,7 @@ def parts(full_ath) -> Parts:
         ({"chunk_count": 0}, "BAD_HEADER header: got Chunk_Count 0; expected 1 to 1048576"),
         ({"front_length": 1}, "BAD_HEADER front: got 1 bytes; expected {least} to 16777216"),
         ({"frame_count": 2**30}, "LIMIT_EXCEEDED header: got Frame_Count 1073741824; the limit is 1048576"),
-        ({"branch_count": 9, "vertex_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
+        ({"branch_count": 9, "place_count": 8}, "BAD_HEADER header: got Branch_Count 9; expected 1 to 8"),
         ({"frame_count": 600, "segment_count": 2}, "BAD_HEADER header: got Segment_Count 2; expected 3 to 600"),
         ({"full_level_count": 33}, "BAD_HEADER header: got Full_Level_Count 33; expected 1 to 32"),
         ({"full_level_count": 3, "level_count": 0}, "BAD_HEADER header: got Level_Count 0; expected 1 to 3"),
@@ -354,10 +354,10 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     front = parts.chunks[0][0].offset
     assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
     assert refusal(data[:8] + b"\2\6\0\0" + data[12:]) == (
-        "UNSUPPORTED_VERSION file: got format version 2.6; expected 0.13"
+        "UNSUPPORTED_VERSION file: got format version 2.6; expected 0.14"
     )
-    assert refusal(data[:8] + b"\0\x0d\4\x80" + data[12:]) == (
-        "UNSUPPORTED_FEATURE file: got format 0.13 with feature 2, 15; expected features that this decoder has"
+    assert refusal(data[:8] + b"\0\x0e\4\x80" + data[12:]) == (
+        "UNSUPPORTED_FEATURE file: got format 0.14 with feature 2, 15; expected features that this decoder has"
     )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 24"
     assert refusal(data[:100]) == f"MISSING front: got 100 bytes; expected {front}"

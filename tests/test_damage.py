@@ -84,6 +84,13 @@ def lossless_parts(full_clip) -> Parts:
 
 
 @pytest.fixture(scope="module")
+def split_parts(full_clip) -> Parts:
+    """Every other vertex is split, as at the edges of a mesh with flat shading."""
+    split = np.append(np.arange(full_clip.vertex_count), np.arange(0, full_clip.vertex_count, 2))
+    return Parts.of(athcodec.encode(full_clip.block(0, 20)[:, split], rel_error=1e-4, effort="fast"))
+
+
+@pytest.fixture(scope="module")
 def predicted_parts(predicted_ath) -> Parts:
     return Parts.of(predicted_ath.read_bytes())
 
@@ -126,7 +133,7 @@ def use(data: bytes, **options) -> bool:
 
 def test_taking_a_file_to_pieces_and_putting_it_together_changes_nothing(parts, data):
     assert parts.file() == data and with_header(data) == data
-    others = {ct.CLIPS, ct.EXACT, ct.REFINED_REST, ct.PREDICTED}
+    others = {ct.CLIPS, ct.EXACT, ct.REFINED_REST, ct.PREDICTED, ct.PLACES}
     assert {c.kind for c, _ in parts.chunks} == set(ct.KIND_NAMES) - others, "of a lossy clip in modes"
     assert use(data)
 
@@ -211,7 +218,8 @@ def test_a_segment_that_was_refused_leaves_the_others_as_they_are(parts, data, p
 # ---- hostile headers and tables ----
 
 
-PLAYING = dict.fromkeys("vertex_count branch_count frame_count segment_count level_count chunk_count".split(), [])
+COUNTED = "vertex_count place_count branch_count frame_count segment_count level_count chunk_count".split()
+PLAYING: dict[str, list] = dict.fromkeys(COUNTED, [])
 PLAYING |= {"full_level_count": [5], "is_float64": [1]}
 
 
@@ -227,8 +235,8 @@ def test_counts_that_need_too_much_memory_are_refused_before_anything_is_allocat
     tracemalloc.start()
     try:
         for fields in (
-            {"vertex_count": 1 << 26},
-            {"vertex_count": 1 << 26, "branch_count": 1 << 20},
+            {"place_count": 1 << 26},
+            {"place_count": 1 << 26, "branch_count": 1 << 20},
             {"frame_count": 1 << 20, "segment_count": 1 << 20},
             {"chunk_count": 1 << 20},
         ):
@@ -261,7 +269,7 @@ def test_a_chunk_that_must_be_there_is_missed_by_name(fine_parts):
         shorter = fine_parts.with_chunks(chunks[:i] + chunks[i + 1 :])
         if chunk.kind == ct.SHAPES:  # nothing says that it was there: the stems mean something else, or nothing
             without_shapes.append(use(shorter))
-        elif chunk.kind & ct.OPTIONAL or chunk.kind in (ct.CORRECTIONS, ct.SOURCE_REST):
+        elif chunk.kind & ct.OPTIONAL or chunk.kind in (ct.CORRECTIONS, ct.SOURCE_REST, ct.FACES):
             assert opened(shorter, strict=True).positions().shape == shape
         else:
             with pytest.raises(BadChunkTable, match=f"got no {ct.KIND_NAMES[chunk.kind]}"):
@@ -480,7 +488,7 @@ STATIC = {"METADATA", "FACES", "EDGES", "ATTRIBUTE"}
 def parts_with(request, parts):
     """A function that gives a file with chunks of a kind, in parts."""
     others = {"CLIPS": "medley_parts", "EXACT": "lossless_parts", "REFINED_REST": "layered_parts"}
-    others["PREDICTED"] = "predicted_parts"
+    others |= {"PREDICTED": "predicted_parts", "PLACES": "split_parts"}
     return lambda name: request.getfixturevalue(others[name]) if name in others else parts
 
 

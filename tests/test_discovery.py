@@ -212,7 +212,8 @@ def test_many_points_in_few_frames_are_not_searched_beyond_the_work_allowed(monk
     clip = MotionClip(np.random.default_rng(2).normal(size=(3, 40_000, 3)).astype(np.float32), np.arange(3.0))
     monkeypatch.setitem(finding._FINDERS, "runs", lambda *_: pytest.fail("the points were searched"))
     work = Work(allowed_work(clip.vertex_count, clip.frame_count, "default") / 2)
-    assert best_branches(clip, BoundOption(rel_error=1e-4), work).branch_parent.tolist() == [-1]
+    found, _ = best_branches(clip, BoundOption(rel_error=1e-4), work)
+    assert found.branch_parent.tolist() == [-1]
 
 
 @pytest.fixture(scope="module")

@@ -92,7 +92,8 @@ def with_a_bit_changed(parts, random, kinds):
 
 
 MANY = [pytest.param(name, marks=pytest.mark.vectors) for name in ("layers-mixed", "layers-three", "clips-loops")]
-RESTS = "vertices copies-of-many copies-far connected-quads connected-order welded-apart welded-order".split()
+RESTS = "vertices copies-of-many copies-far".split()
+RESTS += "connected-quads connected-order connected-places connected-places-exact".split()
 FACES = ["mixed", "many-quads", "up-and-on"]
 
 

@@ -12,6 +12,7 @@ from test_rest import cards, simple_bytes, terrain, tubes
 import athcodec
 from athcodec.decoding import container as ct
 from athcodec.encoding import polygons
+from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
 from spec.document import File, rules
 
@@ -40,7 +41,7 @@ def apart(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def chunk_bytes(faces: np.ndarray, vertex_count: int) -> int:
-    return len(polygons.pack(Polygons.of_rows(faces), vertex_count))
+    return len(polygons.pack(Polygons.of_rows(faces), Places.apart(vertex_count)))
 
 
 def zstd_bytes(faces: np.ndarray) -> int:

@@ -50,8 +50,8 @@ class Checked:
         return self._prepared[segment, level]
 
     def decoded(self, frame: int, level: int) -> np.ndarray:
-        """(N, 3) float64."""
-        out = np.empty((self.info.vertex_count, 3))
+        """(P, 3) float64, of places."""
+        out = np.empty((self.info.place_count, 3))
         self.gpu.core.positions(self.prepared(self.segment_of(frame), level), float(frame), out, FILE_ORDER)
         return out - np.array(self.info.origin)
 
@@ -234,8 +234,8 @@ def winds(tmp_path_factory):
     athcodec.encode(simulated(leaves=40), path, rel_error=1e-4, segment_frames=16)
     file = Checked(path)
     with athcodec.open(path) as decoder:
-        order = file.gpu.core.vertex_source()
-        faces = np.argsort(order)[decoder.file.faces]
+        place = file.gpu.core.vertex_places()
+        order, faces = np.unique(place, return_index=True)[1], place[decoder.file.faces]
         file.edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
         names = [clip.name for clip in decoder.file.clips]
         blends = lambda weights, second: decoder.blended(dict(zip(names, weights)), second)  # noqa: E731

@@ -306,7 +306,7 @@ def test_no_call_prepares_more_than_its_budget_one_step_and_level_0(name, lib, s
     assert largest[0] <= most and largest[1] <= 2 * (shown + most * (blocks - shown) / frames)
 
 
-OPENED = ["shipped tree", "sample", "rest-welded-layers", "rest-of-level-1", "layers-mixed", "rest-copies"]
+OPENED = ["shipped tree", "sample", "places-layers", "rest-of-level-1", "layers-mixed", "rest-copies"]
 
 
 @pytest.mark.parametrize("name", OPENED)

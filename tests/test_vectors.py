@@ -94,7 +94,7 @@ def test_vectors_of_real_size_use_the_features_of_the_format_together():
     paths = {name: conformance.FOLDER / f"valid/real-size-{name}.ath" for name in real_size.OPTIONS}
     uses = {name: real_size.features(path.read_bytes()) for name, path in paths.items()}
     assert set().union(*uses.values()) >= real_size.FEATURES | set(document.KINDS)
-    others = {"joins", "sloped joins", "loose branches", "exact rest pose", "predicted motion"}
+    others = {"joins", "sloped joins", "loose branches", "learned bases", "exact rest pose", "predicted motion"}
     assert real_size.FEATURES - uses["all"] <= others
     assert 50_000 < paths["all"].stat().st_size < 160_000
 

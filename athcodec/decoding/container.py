@@ -23,15 +23,15 @@ from athcodec.errors import BadChunk, LimitExceeded
 from athcodec.options import set_numbers
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR, FEATURES = 0, 13, 0
+MAJOR, MINOR, FEATURES = 0, 14, 0
 NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 
 HIERARCHY, REST, TIME = 1, 2, 3
-METADATA, FACES, EDGES = OPTIONAL | 4, OPTIONAL | 5, OPTIONAL | 6
-CLIPS = 7
+METADATA, FACES, EDGES = OPTIONAL | 4, 5, OPTIONAL | 6
+CLIPS, PLACES = 7, 8
 STEMS, AFFINES, CORRECTIONS, SHAPES, EXACT, REFINED_REST, PREDICTED = 16, 17, 18, 19, 20, 21, 22
 ATTRIBUTE, SOURCE_REST = OPTIONAL | 32, 33
 KIND_NAMES = {
@@ -42,6 +42,7 @@ KIND_NAMES = {
     FACES: "FACES",
     EDGES: "EDGES",
     CLIPS: "CLIPS",
+    PLACES: "PLACES",
     SOURCE_REST: "SOURCE_REST",
     STEMS: "STEMS",
     AFFINES: "AFFINES",
@@ -106,6 +107,7 @@ class Header:
     segments are those of all clips."""
 
     vertex_count: int
+    place_count: int
     branch_count: int
     frame_count: int
     segment_count: int

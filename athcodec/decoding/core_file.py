@@ -66,7 +66,8 @@ class Info(Structure):
 
     _fields_ = fields(
         *(c_uint64, "file_length prelude_length", c_double, "max_error", c_double * 3, "origin"),
-        *(c_int32, "vertex_count branch_count frame_count segment_count clip_count level_count full_level_count"),
+        *(c_int32, "vertex_count place_count branch_count frame_count segment_count clip_count level_count"),
+        *(c_int32, "full_level_count"),
         *(c_int32, "layer_count depth_levels node_count chunk_count is_float64 rest_is_float64 rest_is_host"),
         *(c_uint32 * 2, "host_checksum", c_int32, "is_predicted"),
     )
@@ -270,8 +271,13 @@ class File:
     def branch_source(self) -> np.ndarray:
         return self._array(lib.ath_branch_source(self._file), "<i4", self.info.branch_count)
 
-    def vertex_source(self) -> np.ndarray:
-        return self._array(lib.ath_vertex_source(self._file), "<i4", self.info.vertex_count)
+    def vertex_places(self) -> np.ndarray:
+        """Return the vertex in file order at which each vertex of the source is, (N,) int32."""
+        return self._array(lib.ath_vertex_places(self._file), "<i4", self.info.vertex_count)
+
+    def rows(self, order: int) -> int:
+        """Return how many vertices an order has."""
+        return self.info.vertex_count if order == SOURCE_ORDER else self.info.place_count
 
     def times(self) -> np.ndarray:
         """Return the seconds of the frames of all clips, (T,) float64."""
@@ -285,16 +291,16 @@ class File:
         return lib.ath_seam_error(self._file, clip, level)
 
     def level_rest(self, level: int, order: int = FILE_ORDER) -> np.ndarray:
-        """Return the reference pose of the level, (N, 3) float64, after reading it unless that is done."""
+        """Return the reference pose of the level, (rows(order), 3) float64, after reading it unless that is done."""
         with self._building:
             self._refine_size(level)
-        out = np.empty((self.info.vertex_count, 3))
+        out = np.empty((self.rows(order), 3))
         self._check(lib.ath_level_rest(self._file, level, order, out.ctypes.data, out.strides[0]))
         return out
 
     def rest(self, level: int, order: int = SOURCE_ORDER) -> np.ndarray:
         """Return the source's rest pose, (N, 3) float64, as decoded with the reference poses up to a level."""
-        out, fault = np.empty((self.info.vertex_count, 3)), Fault()
+        out, fault = np.empty((self.rows(order), 3)), Fault()
         with self._building:
             self._refine_size(level)
             self._check(lib.ath_read_rest(self._file, byref(fault)), fault)
@@ -450,7 +456,7 @@ class File:
         return aligned(max(most, ALIGNMENT)) if most else Segment.kept
 
     def positions(self, segment: Segment, frame: float, out: np.ndarray, order: int = SOURCE_ORDER) -> None:
-        """Fill `out`, contiguous (N, 3) float32 or float64, with the positions of a frame of the segment."""
+        """Fill `out`, contiguous (rows(order), 3) float32 or float64, with the positions of a frame of the segment."""
         show = lib.ath_positions_float64 if out.dtype == np.float64 else lib.ath_positions
         self._check(
             show(self._file, byref(ctypes.c_void_p(segment.pointer)), 1, frame, order, out.ctypes.data, out.strides[0])
@@ -461,7 +467,7 @@ class File:
         return lib.ath_frame_at(self._file, clip, seconds, AS_MARKED)
 
     def blended(self, shares: list[tuple[list[Segment], float, float]], order: int = SOURCE_ORDER) -> np.ndarray:
-        """Return several clips at once, (N, 3) float32, from the segments, frame and weight of each."""
+        """Return several clips at once, (rows(order), 3) float32, from the segments, frame and weight of each."""
         arrays = [(c_void_p * len(segments))(*(segment.pointer for segment in segments)) for segments, _, _ in shares]
         records = (Share * len(shares))(
             *(
@@ -469,7 +475,7 @@ class File:
                 for array, (_, frame, weight) in zip(arrays, shares)
             )
         )
-        out, scratch = np.empty((self.info.vertex_count, 3), np.float32), aligned(lib.ath_blend_size(self._file))
+        out, scratch = np.empty((self.rows(order), 3), np.float32), aligned(lib.ath_blend_size(self._file))
         self._check(
             lib.ath_blended_positions(
                 self._file, records, len(records), order, out.ctypes.data, 12, scratch.ctypes.data, len(scratch)

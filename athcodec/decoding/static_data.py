@@ -16,6 +16,7 @@ from athcodec.decoding.host_mesh import HostMesh, mesh_positions
 from athcodec.errors import BadChunk, LevelUnavailable, LimitExceeded, Truncated
 from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
+from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
 from athcodec.motion.units import LengthLike, length_of, scene_unit
 
@@ -65,15 +66,40 @@ class StaticData(FileTables):
     # ---- branches ----
 
     @cached_property
+    def places(self) -> Places:
+        """Which vertices are at one place."""
+        info = self.core.info
+        if info.place_count == info.vertex_count:
+            return Places.apart(info.vertex_count)
+        return Places.of_labels(self.core.vertex_places())
+
+    @cached_property
+    def place_hierarchy(self) -> Hierarchy:
+        """The branches in file order with a vertex for each place, which is what the file codes."""
+        number = np.empty(self.places.count, np.int32)
+        number[self.core.vertex_places()[self.places.first]] = np.arange(self.places.count)
+        return Hierarchy.from_parts(
+            self.branches["parent"], self.branches["count"], self.branches["attach"], number, self.core.branch_source()
+        )
+
+    @cached_property
     def hierarchy(self) -> Hierarchy:
-        """The branches in file order, with their parents and attachments."""
+        """The branches in file order with all vertices, of which those at one place follow each other."""
+        if not self.places.are_shared:
+            return self.place_hierarchy
+        starts, attach = self.place_starts, self.branches["attach"]
         return Hierarchy.from_parts(
             self.branches["parent"],
-            self.branches["count"],
-            self.branches["attach"],
-            self.core.vertex_source(),
+            np.diff(starts[np.append(self.branches["first"], self.places.count)]),
+            np.where(attach < 0, -1, starts[attach]),
+            np.argsort(self.core.vertex_places(), kind="stable"),
             self.core.branch_source(),
         )
+
+    @cached_property
+    def place_starts(self) -> np.ndarray:
+        """The number in `hierarchy` of the first vertex of each place in file order, and of all vertices, (P + 1,)."""
+        return np.append(0, np.cumsum(np.bincount(self.core.vertex_places())))
 
     @cached_property
     def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,9 +117,14 @@ class StaticData(FileTables):
 
     @property
     def stem_index(self) -> np.ndarray | None:
-        """Place of each vertex on its stem, (N,) int32; None if the source's numbering already says it."""
-        vertex_branch, _, places = self._source_branches
-        return check_stem_index(places, vertex_branch)
+        """Number of each vertex along its stem, (N,) int32; None if the source's numbering already says it of the first
+        vertices of places."""
+        if self.places.are_shared:
+            place_branch, _, along = self.place_hierarchy.source_branches()
+            if check_stem_index(along, place_branch) is None:
+                return None
+        vertex_branch, _, along = self._source_branches
+        return check_stem_index(along, vertex_branch)
 
     # ---- polygons and attributes ----
 
@@ -111,7 +142,7 @@ class StaticData(FileTables):
         stored = self._indices(ct.EDGES)
         if stored is None or not stored.derived:
             return None if stored is None else stored.rows
-        return derived_edges(self.hierarchy).astype(stored.index_type)
+        return self.places.first[derived_edges(self.place_hierarchy)].astype(stored.index_type)
 
     @cached_property
     def _polygons(self) -> Polygons | None:

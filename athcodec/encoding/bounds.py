@@ -7,9 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.segment import Source
 from athcodec.errors import BoundError
+from athcodec.motion.algebra import length
+from athcodec.motion.clip import MotionClip
 from athcodec.options import COARSE_SHARE, DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR, set_numbers
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
@@ -70,6 +74,18 @@ class BoundOption:
         if self.target_size is not None:
             return f"target_size: got {self.target_size} bytes, whose error is {of_plant}; {expected}: allow more bytes"
         return f"max_error: got {bound:g}{of_unit}, {of_plant}; {expected}: a length may have a unit, such as 1mm"
+
+    def least(self, clip: MotionClip) -> float:
+        """Return what the bound for a clip is at least, as far as some of its frames tell; 0: they do not."""
+        if self.max_error is not None:
+            return self.max_error
+        if self.target_size is not None or self.lossless:
+            return 0.0
+        frames = {0, clip.frame_count // 2, clip.frame_count - 1}
+        corners = [
+            getattr(clip.block(frame, frame + 1)[0], name)(axis=0) for frame in frames for name in ("min", "max")
+        ]
+        return (self.rel_error or DEFAULT_REL_ERROR) * length(np.ptp(np.array(corners, float), axis=0))
 
 
 def least_bound(source: Source) -> float:

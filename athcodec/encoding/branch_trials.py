@@ -10,6 +10,7 @@ import numpy as np
 
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.job import EncodingJob, EncodingOptions
+from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
 from athcodec.encoding.survey import survey
@@ -26,17 +27,20 @@ TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candid
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
-def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False) -> Found:
-    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work.
-    Predicted motion hardly depends on branches: if two candidates have it, no others are tried."""
+def best_branches(
+    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False, is_compared: bool = False
+) -> tuple[Found, float]:
+    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
+    about its bytes, infinite where nothing had to be tried. Predicted motion hardly depends on branches: if two
+    candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
     by_points = work.fits(FINDING * clip.vertex_count)
-    proposals, trial = candidates(clip, by_points), _Trial(clip, option, host_rest, work)
+    proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
     finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
     work.add(finding)
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:
-        return best
+        return best, trial.size(best)[0] if is_compared else least
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         size, is_predicted = trial.size(branches)
         predicted += is_predicted
@@ -47,12 +51,13 @@ def best_branches(clip: MotionClip, option: BoundOption, work: Work, host_rest: 
             if predicted == number or not work.fits(finding + trial.least_work):
                 break
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
-        return best
+        return best, least
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
-    return unordered if trial.size(unordered)[0] < least else best
+    size = trial.size(unordered)[0]
+    return (unordered, size) if size < least else (best, least)
 
 
-class _Trial:
+class Trial:
     """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
 
     def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):
@@ -78,7 +83,8 @@ class _Trial:
             exact_rest=lossless or host_rest,
             host_rest=host_rest,
         )
-        job = EncodingJob(source, EncodingOptions(attributes="none", lossless=lossless), predicts_as_usual=True)
+        options = EncodingOptions(attributes="none", lossless=lossless)
+        job = EncodingJob(source, PlacedClip.of(clip), options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):

@@ -17,9 +17,11 @@ from typing import Any, BinaryIO, cast
 
 from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions
+from athcodec.encoding.branch_trials import Trial, best_branches
+from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions, placed_clip
 from athcodec.encoding.layers import layer_ratios
+from athcodec.encoding.places import PlacedClip
+from athcodec.encoding.polygons import pack_places
 from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress, Work, allowed_work, stage_weights
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
@@ -27,11 +29,15 @@ from athcodec.encoding.summary import Summary
 from athcodec.errors import CoarseWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
+from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.motion.joining import metadata_of
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, stated_scene
 from athcodec.options import DEFAULT_REL_ERROR
+
+JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
+FEWER_PLACES = 0.9  # Largest share of the places that are left then, if joining is to be tried.
 
 
 def encode_clip(
@@ -193,16 +199,14 @@ def _begin(
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
     clip.check()
-    grown = clip if options.keeps_rest else with_grown_pose(clip)
-    branches = None
+    placed, branches = placed_clip(clip, options, option.least(clip)), None
     if not clip.has_branches:
-        work = Work(
-            BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, options.effort), report, "branches"
-        )
-        work.expected = BRANCH_SHARE * allowed_work(clip.vertex_count, clip.frame_count, "default")
+        vertices, frames = placed.clip.vertex_count, clip.frame_count
+        work = Work(BRANCH_SHARE * allowed_work(vertices, frames, options.effort), report, "branches")
+        work.expected = BRANCH_SHARE * allowed_work(vertices, frames, "default")
         with work.trying("branches"):
-            branches = best_branches(grown, option, work, options.host_rest)
-    job = EncodingJob.begin(clip, grown, branches, options, report)
+            placed, branches = _best_places(placed, option, options, work)
+    job = EncodingJob.begin(placed, _grown(placed, options), branches, options, report)
     if branches is not None:
         job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
@@ -220,6 +224,40 @@ def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
     """Warn the caller of `encode` of a bound that was kept and is coarse."""
     if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
         warnings.warn(objection, CoarseWarning, stacklevel=4)
+
+
+def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
+    return placed.clip if options.keeps_rest else with_grown_pose(placed.clip)
+
+
+def _best_places(
+    placed: PlacedClip, option: BoundOption, options: EncodingOptions, work: Work
+) -> tuple[PlacedClip, Found]:
+    """Return the clip with the places that make the smallest file, as far as there is work for trials, and the branches
+    of its places. Parts that touch at a point are joined there or apart; like objects may be joined alike."""
+    apart = placed.apart()
+    first = placed if apart is None else apart
+    regular = first.regular()
+    is_joined_tried = apart is not None and placed.places.count <= FEWER_PLACES * apart.places.count
+    is_compared = is_joined_tried or regular is not None
+    branches, size = best_branches(_grown(first, options), option, work, options.host_rest, is_compared)
+    best, least = (first, branches), size + _table_bytes(first)
+    if regular is not None:
+        moved, trial = (
+            first.moved_to(branches, regular),
+            Trial(_grown(regular, options), option, options.host_rest, work),
+        )
+        size = trial.size(moved)[0] + _table_bytes(regular)
+        best, least = ((regular, moved), size) if size < least else (best, least)
+    if is_joined_tried and work.fits(work.done):
+        others, size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
+        if size + _table_bytes(placed) < JOINED_SHARE * least:
+            return placed, others
+    return best
+
+
+def _table_bytes(placed: PlacedClip) -> int:
+    return len(pack_places(placed.places)) if placed.places.are_shared else 0
 
 
 def _weighted_progress(

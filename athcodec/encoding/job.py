@@ -45,6 +45,7 @@ from athcodec.encoding.layers import (
     step_factors,
 )
 from athcodec.encoding.motion import release_memory
+from athcodec.encoding.places import PlacedClip, find_places
 from athcodec.encoding.progress import (
     FILE_BYTE,
     LEVEL_MOTION,
@@ -74,6 +75,7 @@ from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
 from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
 from athcodec.motion.joining import split
 from athcodec.motion.neighbours import lost_neighbours
+from athcodec.motion.places import Places
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
@@ -94,6 +96,7 @@ CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the e
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
+PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another that is coded in its place.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
@@ -165,7 +168,8 @@ class Draft:
     choice: Choice
     seen: Survey
     segment_count: int
-    branches: Found | None  # Branches for a clip without.
+    places: Places
+    branches: Found | None  # Branches of places for a clip without.
     options: EncodingOptions
     fingerprint: str
     thresholds: Thresholds
@@ -196,15 +200,31 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _completed(
-    clip: MotionClip, branches: Found | None, options: EncodingOptions
-) -> tuple[MotionClip, np.ndarray | None]:
-    """Return the clip on branches that were found for it, with the rest pose as a host has it, and its weights."""
+def _completed(clip: MotionClip, branches: Found | None, options: EncodingOptions) -> MotionClip:
+    """Return the clip on branches that were found for it, with the rest pose as a host has it."""
     if branches is not None:
         clip = with_branches(clip, branches)
     if options.host_rest:
-        clip = clip.replace(rest=clip.rest.astype(np.float32) + np.float32(0))  # -0.0 is 0.0
-    return (clip, None) if options.weights is None else _weighted(clip, options.weights)
+        clip = clip.replace(rest=_host_rest(clip))
+    return clip
+
+
+def _host_rest(clip: MotionClip) -> np.ndarray:
+    return clip.rest.astype(np.float32) + np.float32(0)  # -0.0 is 0.0
+
+
+def placed_clip(
+    clip: MotionClip, options: EncodingOptions, bound: float = 0.0, places: Places | None = None
+) -> PlacedClip:
+    """Return the clip with a vertex for each place. bound: the largest error at least; places: as they were found
+    before. Raises ClipError."""
+    clip, weights = (clip, None) if options.weights is None else _weighted(clip, options.weights)
+    if places is None:
+        labels = [] if weights is None else [weights]
+        least = bound if weights is None else bound * float(weights.min() / weights.max())
+        most_error = 0.0 if options.lossless or options.keeps_rest else PLACE_SHARE * least
+        places = find_places(clip, labels, options.lossless or options.exact_rest, most_error)
+    return PlacedClip.of(clip, places, weights)
 
 
 def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
@@ -283,6 +303,7 @@ class EncodingJob:
     """One clip on its way into a file: what does not depend on the bound."""
 
     source: Source
+    placed: PlacedClip
     options: EncodingOptions
     report: Progress = silent
     branches: Found | None = None
@@ -292,13 +313,13 @@ class EncodingJob:
 
     @classmethod
     def begin(
-        cls, clip: MotionClip, grown: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress
+        cls, placed: PlacedClip, grown: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress
     ) -> EncodingJob:
         """Return the job for a clip, all of whose frames are read. grown: the clip itself, or with a rest pose that
         shows more of it, which motion is coded about; branches: those found for a clip without."""
-        of_grown, _ = _completed(grown, branches, options)
+        clip, of_grown = placed.clip, _completed(grown, branches, options)
         hierarchy = hierarchy_of(of_grown)
-        _check_limits(clip, hierarchy)
+        _check_limits(placed.source, hierarchy)
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
         for far in (parts_hidden_far_away(part) for part in split(clip).values()):
@@ -319,25 +340,27 @@ class EncodingJob:
             )
         of_grown = of_grown if options.keeps_rest else with_grown_branches(of_grown, hierarchy)
         seen = survey(of_grown, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
-        return cls(cls._source(clip, branches, seen, options, pool), options, report, branches)
+        return cls(cls._source(placed, branches, seen, options, pool), placed, options, report, branches)
 
     @classmethod
     def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
         """Return the job in the state in which it made the draft. Raises ClipError."""
         seen = draft.seen
-        got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, seen.hierarchy.vertex_count)
+        got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, draft.places.vertex_count)
         if got != expected:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
-        source = cls._source(clip, draft.branches, seen, options, ThreadPool(jobs or default_jobs()))
-        return cls(source, options, report, draft.branches)
+        placed = placed_clip(clip, options, places=draft.places)
+        source = cls._source(placed, draft.branches, seen, options, ThreadPool(jobs or default_jobs()))
+        return cls(source, placed, options, report, draft.branches)
 
     @staticmethod
     def _source(
-        clip: MotionClip, branches: Found | None, seen: Survey, options: EncodingOptions, pool: ThreadPool
+        placed: PlacedClip, branches: Found | None, seen: Survey, options: EncodingOptions, pool: ThreadPool
     ) -> Source:
-        clip, factors = _completed(clip, branches, options)
+        clip = _completed(placed.clip, branches, options)
         order, reference = seen.hierarchy.vertex_source, None
+        first, sizes = placed.places.first[order], placed.places.sizes[order]
         if not np.array_equal(seen.rest, clip.rest[order]):
             if not clip.rest_given:
                 pose = np.empty_like(seen.rest)
@@ -351,10 +374,13 @@ class EncodingJob:
             seen,
             options.segment_frames,
             options.keeps_rest or (options.lossless and clip.rest_given),
-            None if factors is None else factors[seen.hierarchy.vertex_source],
+            None if placed.weights is None else placed.weights[first],
             pool,
             options.host_rest,
             polygons=_polygons(clip, options),
+            shares=sizes if placed.places.are_shared else None,
+            place_error=placed.places.error,
+            host_mesh=_host_rest(placed.source) if options.host_rest else None,
             rest_precision=options.rest_precision,
             without=options.without,
         )
@@ -593,6 +619,7 @@ class EncodingJob:
             decided.choice,
             self.seen,
             decided.segment_count,
+            self.placed.places,
             self.branches,
             options,
             decided.fingerprint,
@@ -643,7 +670,7 @@ class EncodingJob:
         result = self.fill(writing.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.clip_ranges):
-            mesh = self.clip.source_rest if self.options.host_rest else None
+            mesh = _host_rest(self.placed.source) if self.options.host_rest else None
             with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(decided, self._seam_errors(decoder)))
             out.seek(0)
@@ -664,6 +691,7 @@ class EncodingJob:
         if self.clip.clip_ranges:
             store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.clip_ranges)))
         header = ct.Header(
+            self.placed.source.vertex_count,
             self.clip.vertex_count,
             self.clip.branch_count,
             self.clip.frame_count,
@@ -702,7 +730,8 @@ class EncodingJob:
 
     def _step(self, frame: int, following: int) -> np.ndarray:
         """Return how far the vertices move from one frame of the source to another, (N, 3) float64."""
-        before, after = (self.clip.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
+        source = self.placed.source
+        before, after = (source.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
         return after - before
 
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
@@ -723,30 +752,36 @@ class EncodingJob:
         if decided.layers.source_rest:
             store.add(ct.SOURCE_REST, decided.layers.source_rest)
         store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
-        kept = self.clip.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
-        metadata = {key: value for key, value in self.clip.metadata.items() if key in kept}
+        source, places = self.placed.source, self.placed.places
+        if places.are_shared:
+            store.add(ct.PLACES, polygons.pack_places(places))
+        kept = source.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
+        metadata = {key: value for key, value in source.metadata.items() if key in kept}
         metadata |= stated_scene(metadata)
         if self.options.tam is not None:
             metadata[THRESHOLDS] = self.options.tam.in_metadata
         if metadata:
             store.add(ct.METADATA, writing.pack_metadata(metadata))
-        if self.source.polygons is not None:
-            store.add(ct.FACES, polygons.pack(self.source.polygons, self.clip.vertex_count))
-        if self._keeps_static and self.clip.edges is not None:
-            store.add(ct.EDGES, self._edges())
+        faces = _polygons(source, self.options)
+        if faces is not None:
+            store.add(ct.FACES, polygons.pack(faces, places))
+        if self._keeps_static and source.edges is not None:
+            store.add(ct.EDGES, self._edges(source.edges))
 
-    def _edges(self) -> bytes:
-        derived = derived_edges(self.source.hierarchy)
-        if derived.shape == self.clip.edges.shape and (derived == self.clip.edges).all():
-            return writing.pack_derived_edges(type_code(self.clip.edges.dtype))
-        return polygons.pack(Polygons.of_rows(self.clip.edges), self.clip.vertex_count)
+    def _edges(self, edges: np.ndarray) -> bytes:
+        places = self.placed.places
+        derived = places.first[derived_edges(self.source.hierarchy)]
+        if derived.shape == edges.shape and (derived == edges).all():
+            return writing.pack_derived_edges(type_code(edges.dtype))
+        return polygons.pack(Polygons.of_rows(edges), places)
 
     def _add_static(self, store: writing.ChunkStore) -> None:
-        if self._keeps_static and len(self.clip.attributes) > ct.Limits.attributes:
-            raise ClipError(f"attributes: got {len(self.clip.attributes)}; expected at most {ct.Limits.attributes}")
-        in_faces = POLYGON_ARRAYS if self.source.polygons is not None and self.clip.faces is None else ()
+        source = self.placed.source
+        if self._keeps_static and len(source.attributes) > ct.Limits.attributes:
+            raise ClipError(f"attributes: got {len(source.attributes)}; expected at most {ct.Limits.attributes}")
+        in_faces = POLYGON_ARRAYS if self.source.polygons is not None and source.faces is None else ()
         if self._keeps_static:
-            for name, array in self.clip.attributes.items():
+            for name, array in source.attributes.items():
                 if name in in_faces:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
@@ -842,7 +877,7 @@ class EncodingJob:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
-            errors[:, segment.index] = segment.errors + decided.source.held_error
+            errors[:, segment.index] = segment.errors + decided.source.replaced_error
             joins[:, segment.index] = segment.joins
             flaws[:, segment.index] = segment.flaws
             for (level, kind), payload in segment.chunks.items():
@@ -895,7 +930,7 @@ def _summary(
         "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
     }
-    diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.vertex_count * 12
+    diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.placed.source.vertex_count * 12
     return Summary(
         path,
         result.header.file_length,

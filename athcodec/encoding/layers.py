@@ -598,7 +598,8 @@ class CodedMotion:
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:
-        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, rounding)
+        shares = self._prelude.shares
+        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, shares, rounding)
 
 
 class _EvenLevels:

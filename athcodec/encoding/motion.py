@@ -532,11 +532,12 @@ def position_errors(
     origin: np.ndarray,
     pool: ThreadPool,
     shown: np.ndarray | None = None,
+    shares: np.ndarray | None = None,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
     """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up for files.
-    shown: how many frames of the clip show each frame, (T,) int32; None: one. rounding: added for a decoder that
-    rounds to the other side."""
+    shown: how many frames of the clip show each frame, (T,) int32; shares: how many vertices of the source are at each
+    place, (N,) int32; None: one. rounding: added for a decoder that rounds to the other side."""
     vertices, _, frames = positions.shape
     shown = np.ones(frames, np.int32) if shown is None else shown
 
@@ -546,6 +547,7 @@ def position_errors(
             stop - start,
             frames,
             address(shown, np.int32, frames),
+            None if shares is None else address(shares[start:stop], np.int32, stop - start),
             part.dtype == np.float64,
             address(part, part.dtype, 0),
             address(source[start:stop], np.float64, part.size),
@@ -559,7 +561,7 @@ def position_errors(
 
     results, histograms = zip(*pool.map(measured, ranges(vertices, 3 * frames)))
     largest, squares = np.transpose(results)
-    count = vertices * int(shown.sum())
+    count = int(vertices if shares is None else shares.sum()) * int(shown.sum())
     within = np.cumsum(np.sum(histograms, axis=0, dtype=np.int64))
     p99 = int(np.searchsorted(within, count - count // 100))
     return float(largest.max()) + rounding, from_short_float(p99), math.sqrt(float(sum(squares)) / count) + rounding

@@ -60,6 +60,7 @@ class PlantSample:
             shapes=None,
             polygons=None,  # Trials go without faces.
             weights=None if source.weights is None else source.weights[self.vertices],
+            shares=None if source.shares is None else source.shares[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
             whole=(source, self.vertices),
         )

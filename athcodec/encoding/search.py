@@ -336,7 +336,6 @@ class Search:
             coarsest_rest_step=start.coarsest_rest_step,
             lags=start.lags,
             connected_rest=start.connected_rest,
-            welded_rest=start.welded_rest,
             shape_of=start.shape_of,
             loose=start.loose,
             learned_pieces=None,

@@ -50,7 +50,6 @@ ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 LEAST_THREADED = 16 << 20  # Bytes of a segment from which a clip of one segment is coded by several threads.
 WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
-WELD_TOLERANCE = 1e-7  # Size of the cells, in diagonals, in which vertices share a place.
 LEAST_SAMPLED, SPARSE = 256, 16  # Vertices from which one of so many is enough if many frames are to be corrected.
 SPREAD = 512  # Vertices all over the plant of which frames beyond the limit are counted.
 MANY, MANY_SHARE = 8000, 0.06  # Frames of vertices beyond the limit that are many, and more for each that is coded.
@@ -81,7 +80,10 @@ class Source:
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
     held: np.ndarray | None = None  # (frames,) bool: frames that the pose before them stands for; None: repeats alone.
     held_error: float = 0.0  # Largest distance of any vertex in a held frame from the pose that stands for it.
-    polygons: Polygons | None = None  # Polygons that the file stores as FACES.
+    place_error: float = 0.0  # Largest distance of any vertex from the one that stands for its place.
+    polygons: Polygons | None = None  # Polygons that the file stores as FACES, by places.
+    shares: np.ndarray | None = None  # (N,) int32: how many vertices of the source are at each place; None: one.
+    host_mesh: np.ndarray | None = None  # Rest pose of the host with all vertices; None: that of the clip.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     shapes: tuple[np.ndarray, np.ndarray] | None = None  # Details and keeps_shape of an inexact reference, if known.
     whole: tuple[Source, np.ndarray] | None = None  # The source that this is a sample of, and its vertices there.
@@ -204,26 +206,9 @@ class Source:
             return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 
-    @cached_property
-    def welded_mesh(self) -> Mesh | None:
-        """The mesh with the vertices of each branch welded that share their place in the rest pose; None: none do."""
-        if self.mesh is None:
-            return None
-        rest = self.clip.source_rest[self.hierarchy.vertex_source] if self.reference_is_exact else self.rest
-        if not self.reference_is_exact:
-            rest = np.rint(rest / (WELD_TOLERANCE * self.seen.diagonal or 1.0)) + 0.0  # Adding 0 turns -0.0 into 0.0.
-        rows = np.empty(len(rest), [("branch", np.int64), ("position", rest.dtype, (3,))])
-        rows["branch"], rows["position"] = self.hierarchy.vertex_branch(), rest
-        rows = rows[np.argsort(self.hierarchy.vertex_source)].view(f"V{rows.itemsize}")
-        _, first, place = np.unique(rows, return_index=True, return_inverse=True)
-        if len(first) == len(rest):
-            return None
-        names = np.argsort(np.argsort(first))[place].astype(np.int32)  # Places are counted as the source has them.
-        return Mesh.of(self.polygons, self.hierarchy.vertex_source, names)
-
     def mesh_for(self, settings: Settings) -> Mesh | None:
         """Return the faces that the rest pose of some settings goes by."""
-        return self.welded_mesh if settings.welded_rest else self.mesh if settings.connected_rest else None
+        return self.mesh if settings.connected_rest else None
 
     @cached_property
     def still(self) -> bool:
@@ -251,11 +236,18 @@ class Source:
         """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
-        return np.array([qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.held_error])
+        return np.array(
+            [qz.error_limit(limit, self.seen.diagonal) for limit in bound * self.weights - self.replaced_error]
+        )
 
     def unweighted_limit(self, bound: float) -> float:
         """Return what decoded positions of any vertex are held to if weights do not count."""
-        return qz.error_limit(bound - self.held_error, self.seen.diagonal)
+        return qz.error_limit(bound - self.replaced_error, self.seen.diagonal)
+
+    @property
+    def replaced_error(self) -> float:
+        """Largest distance of any vertex in any frame from what is coded in its place."""
+        return self.held_error + self.place_error
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""
@@ -396,7 +388,7 @@ class CodedPrelude:
     def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False, bases: bool = True):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
-        self._of = source, ath, settings
+        self.shares, self._of = source.shares, (source, ath, settings)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.shape_of = settings.shape_of
@@ -422,7 +414,11 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
     """Return REST, and the rest pose as decoded."""
     head = writing.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.host_rest:
-        head.is_host, head.step, head.stream = True, 1.0, writing.mesh_checksum(source.clip.source_rest)
+        head.is_host, head.step, head.stream = (
+            True,
+            1.0,
+            writing.mesh_checksum(source.clip.source_rest if source.host_mesh is None else source.host_mesh),
+        )
         return head, source.rest
     if source.reference_is_exact:
         pose = source.clip.source_rest[source.hierarchy.vertex_source]

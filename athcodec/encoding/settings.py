@@ -14,7 +14,7 @@ from athcodec.encoding.motion import LearnedModes
 
 BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SHEET, or the vertices in a tube's ring.
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
-OF_PRELUDE = "rest_step rest_slack connected_rest welded_rest lags shape_of forms still layer free_rigid".split()
+OF_PRELUDE = "rest_step rest_slack connected_rest lags shape_of forms still layer free_rigid".split()
 OF_MOTION = (
     "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces learned_coded"
 ).split()
@@ -49,7 +49,6 @@ class Settings:
     free_rigid: bool = False  # Whether rigid branches are loose.
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces, in radians; 0: none.
     connected_rest: bool = False
-    welded_rest: bool = False  # Whether a connected rest pose has vertices at one place coded once.
     coarsest_rest_step: float = np.inf  # Largest step of layers' rest poses; 0: all have that of the last, unrefined.
     rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
     shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.

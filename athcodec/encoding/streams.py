@@ -74,8 +74,7 @@ def encode_rest(
             address(moved, np.float64, rest.size),
             address(decoded, np.float64, rest.size),
         )
-    welds = b"" if mesh is None or coarse is not None else mesh.welds
-    return CodedRest(step, welds + data, decoded, steps, mesh)
+    return CodedRest(step, data, decoded, steps, mesh)
 
 
 def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float) -> np.ndarray | None:
@@ -115,8 +114,7 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray, mesh: Mesh | None = None) -> bytes:
     """Code a rest pose that comes back bit for bit, (N, 3) float32 or float64 with the origin. mesh: its faces."""
     numbers = pose.astype(np.float64, order="C")
-    welds = b"" if mesh is None else mesh.welds
-    return welds + encode_stream(
+    return encode_stream(
         "ath_encode_exact_rest",
         1024 + 10 * pose.size,
         address(branches, BRANCH, 1),

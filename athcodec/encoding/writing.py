@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from athcodec.encoding.polygons import Mesh
 
 IS_HOST = 4  # Method of a REST that the host has.
-_IS_CONNECTED, _IS_WELDED = 8, 16  # Bits of Method.
+_IS_CONNECTED = 8  # Bit of Method.
 _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
 _MESH_CHECKSUM = struct.Struct("<II")
@@ -119,7 +119,7 @@ class Rest:
 
 
 def pack_rest(rest: Rest) -> bytes:
-    by_mesh = 0 if rest.mesh is None else _IS_CONNECTED | (_IS_WELDED if rest.mesh.welds else 0)
+    by_mesh = 0 if rest.mesh is None else _IS_CONNECTED
     method = int(rest.exact) | int(rest.source_dtype == np.float64) << 1 | by_mesh
     return _REST.pack(IS_HOST if rest.is_host else method, *rest.origin, rest.step) + rest.stream
 

@@ -212,6 +212,15 @@ def branches_from_edges(
     return number[vertex_branch].astype(np.int32), renumbered.astype(np.int32), stem_index.astype(np.int32)
 
 
+def is_forest(edges: np.ndarray, vertex_count: int) -> bool:
+    """Return whether edges (E, 2) between vertices close no cycle; an edge given twice counts once."""
+    try:
+        _EulerTour(np.asarray(edges, np.int64), vertex_count)
+    except ClipError:
+        return False
+    return True
+
+
 def derived_edges(hierarchy: Hierarchy) -> np.ndarray:
     """Return the edges that the hierarchy implies, (E, 2) int32, in source numbering.
 

@@ -66,7 +66,10 @@ export interface AthInfo {
   readonly maxError: number;
   /** x, y, z that the file's numbers are relative to. For information: positions are absolute. */
   readonly origin: readonly [number, number, number];
+  /** Vertices of the source, which order "source" has. */
   readonly vertexCount: number;
+  /** Places of vertices, which order "file" has: as many, or fewer where vertices coincide. */
+  readonly placeCount: number;
   readonly branchCount: number;
   /** Counted over all clips. */
   readonly frameCount: number;
@@ -260,8 +263,11 @@ export class AthFile {
   readonly held: boolean;
 
   branches(): Branches;
-  /** File vertex i is vertex vertexSource()[i] of the source; branches likewise. */
+  /** The first vertex of the source that is at each of placeCount vertices in file order. */
   vertexSource(): Int32Array;
+  /** The vertex in file order whose position each of vertexCount vertices of the source has. */
+  vertexPlaces(): Int32Array;
+  /** File branch i is branch branchSource()[i] of the source. */
   branchSource(): Int32Array;
   /** Seconds, one per frame, increasing within a clip. */
   times(): Float64Array;

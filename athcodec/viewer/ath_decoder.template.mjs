@@ -14,7 +14,7 @@ const HEADER_SIZE = 24, NO_LEVEL = 255, PAGE = 65536, MOST_STEPS = 0x7fffffff;
 // The structs of ath.h, in order of declaration; wasm.c asserts that nothing has moved.
 const INFO = {
   fileLength: "u64", preludeLength: "u64", maxError: "f64", originX: "f64", originY: "f64", originZ: "f64",
-  vertexCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
+  vertexCount: "i32", placeCount: "i32", branchCount: "i32", frameCount: "i32", segmentCount: "i32", clipCount: "i32",
   levelCount: "i32", fullLevelCount: "i32", layerCount: "i32", depthLevels: "i32", nodeCount: "i32",
   chunkCount: "i32", isFloat64: "i32", restIsFloat64: "i32", restIsHost: "i32", meshForwards: "u32", meshBackwards: "u32",
   isPredicted: "i32",
@@ -34,7 +34,7 @@ const PART = ["first", "count", "branch", "index"];
 const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
 const FAULT_SIZE = 56, FAULT_TEXT = 256, LEVEL_NAME = 32;
 const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed: "u8", isDerived: "u8" };
-const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 0x8005, edges: 0x8006 };
+const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 5, edges: 0x8006 };
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
 const SHARE_SIZE = 24, BLEND_CLIPS = 4;
@@ -500,7 +500,11 @@ export class AthFile {
   }
 
   vertexSource() {
-    return this.#core.copy(Int32Array, this.#c.ath_vertex_source(this.#at), this.info.vertexCount);
+    return this.#core.copy(Int32Array, this.#c.ath_vertex_source(this.#at), this.info.placeCount);
+  }
+
+  vertexPlaces() {
+    return this.#core.copy(Int32Array, this.#c.ath_vertex_places(this.#at), this.info.vertexCount);
   }
 
   branchSource() {
@@ -521,9 +525,14 @@ export class AthFile {
     return this.#pose(out, order, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
   }
 
+  // Its number, and the numbers of all its vertices.
+  #order(order) {
+    const which = choice(order, ORDERS, "order");
+    return [which, 3 * (which === ORDERS.file ? this.info.placeCount : this.info.vertexCount)];
+  }
+
   #pose(out, order, fill) {
-    const length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
-    const result = asOut(out, length, [Float32Array, Float64Array]);
+    const [which, length] = this.#order(order), result = asOut(out, length, [Float32Array, Float64Array]);
     result.set(this.#fill(new Float64Array(length), length, (at) => fill(which, at)));
     return result;
   }
@@ -850,7 +859,7 @@ export class AthFile {
   }
 
   positions(segments, frame, { out, order = "source", fade = null } = {}) {
-    const c = this.#c, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+    const c = this.#c, [which, length] = this.#order(order);
     const result = asOut(out, length, [Float32Array, Float64Array]);
     if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
       c.ath_faded_positions(this.#at, array, count, frame, faded, which, at, 12));
@@ -861,7 +870,7 @@ export class AthFile {
 
   // Shares are { segments, frame, weight }.
   blended(shares, { out, order = "source" } = {}) {
-    const c = this.#c, core = this.#core, length = 3 * this.info.vertexCount, which = choice(order, ORDERS, "order");
+    const c = this.#c, core = this.#core, [which, length] = this.#order(order);
     const result = asOut(out, length, [Float32Array]), count = whole(shares.length, 1, BLEND_CLIPS, "clips to blend");
     const pointers = shares.map(({ segments }) => Array.from(segments, (segment) => this.#pointer(segment)));
     const table = count * SHARE_SIZE, scratch = c.ath_blend_size(this.#at) >>> 0;

@@ -8,7 +8,7 @@ void *memcpy(void *restrict to, const void *restrict from, size_t size) { return
 void *memset(void *to, int value, size_t size) { return __builtin_memset(to, value, size); }
 
 _Static_assert(sizeof(size_t) == 4 && sizeof(void *) == 4, "pointers and sizes are read as 32 bits");
-_Static_assert(offsetof(ath_info, is_predicted) == 112 && sizeof(ath_info) == 120, "INFO");
+_Static_assert(offsetof(ath_info, is_predicted) == 116 && sizeof(ath_info) == 120, "INFO");
 _Static_assert(offsetof(ath_clip, loop) == 32 && sizeof(ath_clip) == 40, "CLIP");
 _Static_assert(offsetof(ath_chunk, level) == 30 && sizeof(ath_chunk) == 32, "CHUNK");
 _Static_assert(offsetof(ath_branch, ring) == 40 && sizeof(ath_branch) == 44, "BRANCH");

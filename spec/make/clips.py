@@ -266,14 +266,14 @@ for title, make in {
         clips=(CALM, loop(STORM, *[1.0] * 5))
     ).with_header(full_level_count=5),
     "clips-memory LIMIT_EXCEEDED: 2^18 vertices and a segment of 256 frames, though the mean is 86": lambda: lone_clips(
-        258, 3, *UNEVEN, vertex_count=1 << 18
+        258, 3, *UNEVEN, place_count=1 << 18
     ),
     "clips-before-memory BAD_CHECKSUM: CLIPS is damaged, and its longest segment takes too much memory": lambda: (
-        lone_clips(258, 3, *UNEVEN, vertex_count=1 << 18).change(CLIPS, checksum=0)
+        lone_clips(258, 3, *UNEVEN, place_count=1 << 18).change(CLIPS, checksum=0)
     ),
     "clips-memory-of-mean LIMIT_EXCEEDED: 2^22 vertices are too many, before CLIPS is missed": lambda: lone(
         frames=2, segments=2
-    ).with_header(vertex_count=1 << 22, clip_count=2),
+    ).with_header(place_count=1 << 22, clip_count=2),
 }.items():
     invalid(title, make)
 

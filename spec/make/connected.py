@@ -5,41 +5,36 @@ from spec.make.polygons import FACES_3, MANY_FACES, derived, mixed_polygons, pol
 from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 
 
-def welded_mesh(content: bytes, welds: bytes, order: list) -> tuple:
-    """Bits of Method from the third on, what stands before Rest_Body, and the mesh."""
-    method = REST_CONNECTED | (REST_WELDED if welds else 0)
-    front = struct.pack("<I", len(welds)) + welds if welds else b""
-    return method >> 2, front, rules.mesh_of_faces(content, method, front, order)[0]
-
-
 def connected(
     make_faces: Callable[[], bytes],
     seed: int = 73,
     step: float = 0.25,
     exact: bool = False,
     order: list | None = None,
-    welds: bytes = b"",
+    **fields,
 ) -> Plant:
     """BY_VERTEX, by faces."""
     content, branches, script = make_faces(), branches_of(BY_VERTEX), Chance(seed, large=6)
-    bits, front, mesh = welded_mesh(content, welds, order or list(range(sum(stem.count for stem in BY_VERTEX))))
+    count = sum(stem.count for stem in BY_VERTEX)
+    mesh = mesh_of(content, order or list(range(count)), fields.get("places"))
     if exact:
         stream = write(rules.decode_exact_rest, script, branches, False, mesh)
-        rest = rest_chunk(front + stream, exact=1, reserved=bits)
+        rest = rest_chunk(stream, exact=1, reserved=REST_CONNECTED >> 2)
     else:
         stream = write(rules.decode_rest, script, branches, step, None, mesh)
-        rest = rest_chunk(front + stream, step=step, reserved=bits)
-    fields = {} if order is None else {"vertex_source": order}
+        rest = rest_chunk(stream, step=step, reserved=REST_CONNECTED >> 2)
+    fields |= {} if order is None else {"vertex_source": order}
     return with_rest(BY_VERTEX, rest, faces=content, **fields)
 
 
-def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, welds: bytes = b"", **fields) -> Plant:
+def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
     """A rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
-    content = mixed_polygons(faces, count)
-    bits, front, mesh = welded_mesh(content, welds, list(range(count)))
+    places = fields.get("places")
+    content = mixed_polygons(faces, count if places is None else places)
+    mesh = mesh_of(content, list(range(count)), places)
     coded = write(rules.decode_rest, script, branches_of(stems), step, None, mesh)
-    chunk = rest_chunk(front + coded, step=step, rest_type=1, reserved=bits)
+    chunk = rest_chunk(coded, step=step, rest_type=1, reserved=REST_CONNECTED >> 2)
     return with_rest(stems, chunk, faces=content, **fields)
 
 

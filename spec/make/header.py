@@ -50,7 +50,7 @@ def errors_by_chance(count: int) -> tuple[int, ...]:
 
 def of_memory(vertices: int) -> Draft:
     """128 frames, whose first fault behind the front is a checksum."""
-    return lone().with_header(vertex_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
+    return lone().with_header(place_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
 
 
 def of_range(max_error: int) -> Draft:
@@ -60,7 +60,7 @@ def of_range(max_error: int) -> Draft:
         lone()
         .add(Entry(CLIPS, b"".join(clips), checksum=0))
         .with_header(
-            vertex_count=13,
+            place_count=13,
             branch_count=2,
             frame_count=49,
             segment_count=41,
@@ -127,16 +127,16 @@ invalid("cut-in-header TRUNCATED: 23 bytes", lambda: first_bytes(23))
 invalid("cut-in-front-stream TRUNCATED: ends inside the front stream", lambda: first_bytes(40))
 invalid("cut-in-checksums TRUNCATED: ends inside the checksums", lambda: first_bytes(rules.u32(lone().file(), 16) - 1))
 header("major-1 UNSUPPORTED_VERSION: Major_Version 1, which is to come", major=1, minor=0)
-header("minor-before UNSUPPORTED_VERSION: Minor_Version 12", minor=12)
-header("minor-later UNSUPPORTED_VERSION: Minor_Version 14", minor=14)
+header("minor-before UNSUPPORTED_VERSION: Minor_Version 13", minor=13)
+header("minor-later UNSUPPORTED_VERSION: Minor_Version 15", minor=15)
 header("feature-first UNSUPPORTED_FEATURE: the lowest bit of Features is set", features=1)
 header("feature-last UNSUPPORTED_FEATURE: the highest bit of Features is set", features=1 << 15)
 header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=1, features=1)
 invalid(
     "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature",
-    lambda: first_bytes(12, b"\0\x0d\0\1"),
+    lambda: first_bytes(12, b"\0\x0e\0\1"),
 )
-header("vertices-limit LIMIT_EXCEEDED: Vertex_Count 2^26 + 1", vertex_count=(1 << 26) + 1)
+header("vertices-limit LIMIT_EXCEEDED: Vertex_Count 2^26 + 1", place_count=(1 << 26) + 1)
 header("branches-limit LIMIT_EXCEEDED: Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1)
 header("branches-more-than-vertices: two branches, one vertex", branch_count=2)
 header("frames-limit LIMIT_EXCEEDED: Frame_Count 2^20 + 1", frame_count=(1 << 20) + 1)
@@ -168,7 +168,7 @@ header(
 )
 header("clips-256: Clip_Count 256", clip_count=256)
 header("levels-negative: Level_Count is below 0", level_count=-7)
-header("counts-largest LIMIT_EXCEEDED: Vertex_Count 2^30", vertex_count=1 << 30)
+header("counts-largest LIMIT_EXCEEDED: Vertex_Count 2^30", place_count=1 << 30)
 header("chunks-limit LIMIT_EXCEEDED: Chunk_Count 2^20 + 1", chunk_count=(1 << 20) + 1)
 header("levels-0: Level_Count 0", level_count=0)
 header("full-levels-33: Full_Level_Count 33", full_level_count=33)
@@ -180,7 +180,7 @@ invalid(
 header("max-error-nan: Max_Error is NaN", max_error=NAN)
 header("max-error-infinite: Max_Error is infinite", max_error=INFINITY)
 header("checksum BAD_CHECKSUM: Front_Checksum is another", checksum=0)
-header("memory-limit LIMIT_EXCEEDED: 2^22 vertices take more than Max_Memory_Bytes", vertex_count=1 << 22)
+header("memory-limit LIMIT_EXCEEDED: 2^22 vertices take more than Max_Memory_Bytes", place_count=1 << 22)
 for title, make in {
     "checksums-damaged BAD_CHECKSUM: a bit of a checksum is flipped": lambda: flipped(
         lone().file(), rules.u32(lone().file(), 16) - 2

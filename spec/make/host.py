@@ -42,7 +42,7 @@ def without_mesh(stems: list[Stem]) -> Draft:
     levels, front = range(plan.height + 2), Plant([Stem(-1, 1)], mesh=np.zeros((1, 3), "<f4")).draft()
     return (
         replace(front, entries=front.entries[:3])
-        .with_header(vertex_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
+        .with_header(place_count=count, branch_count=len(stems), level_count=len(levels), full_level_count=len(levels))
         .change(HIERARCHY, content=stream)
         .add(*(Entry(STEMS, b"", level, 0) for level in levels if rules.has_stems(plan, level)))
         .add(*(Entry(AFFINES, b"", level, 0) for level in levels if rules.has_affines(plan, level, level)))

@@ -28,16 +28,17 @@ def polygon_shape(index_type: int, count_type: int | None, face_count: int, colu
     )
 
 
-def polygons(rows: np.ndarray, vertex_count: int = 5, script: Script | None = None) -> bytes:
-    """FACES or EDGES with as many corners each."""
+def polygons(rows: np.ndarray, places: int | list = 5, script: Script | None = None) -> bytes:
+    """FACES or EDGES with as many corners each. places: of each vertex, or how many that share none."""
     shape = polygon_shape(polygon_type(rows.dtype.str), None, *rows.shape, rows.size)
-    stream = write(rules.decode_polygons, script or rows.reshape(-1).tolist(), shape, vertex_count)
+    places = range(places) if isinstance(places, int) else places
+    stream = write(rules.decode_polygons, script or rows.reshape(-1).tolist(), shape, places)
     return polygon_head(rows.dtype.str, *rows.shape) + stream
 
 
 def mixed_polygons(
     faces: list[list[int]],
-    vertex_count: int = 5,
+    places: int | list = 5,
     types: tuple[str, str] = ("<u4", "|u1"),
     corner_count: int | None = None,
 ) -> bytes:
@@ -46,9 +47,8 @@ def mixed_polygons(
     index_type, count_type = map(polygon_type, types)
     shape = polygon_shape(index_type, count_type, len(faces), 0, corners)
     script = [value for face in faces for value in (len(face), *face)]
-    return polygon_head(types[0], len(faces), corners, types[1]) + write(
-        rules.decode_polygons, script, shape, vertex_count
-    )
+    places = range(places) if isinstance(places, int) else places
+    return polygon_head(types[0], len(faces), corners, types[1]) + write(rules.decode_polygons, script, shape, places)
 
 
 def derived(type_: str) -> bytes:
@@ -77,7 +77,7 @@ def edges(content: bytes) -> Callable[[], Draft]:
 
 def recent(_: bytes) -> None:
     """A triangle of vertex 0 and of the corner before that."""
-    coder, model = rules.RangeDecoder(b""), rules.PolygonModel()
+    coder, model = rules.RangeDecoder(b""), rules.PolygonModel(range(5))
     decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
     node = 1
     for bit in (0, 0, 0, 0, 1):
@@ -182,7 +182,7 @@ static(
         polygon_head("<u4", 2, MANY_CORNERS, "<u4")
         + write(
             *(rules.decode_polygons, [42, *[0, 1, 2] * 14, MANY_CORNERS - 41]),
-            *(polygon_shape(2, 2, 2, 0, MANY_CORNERS), 5),
+            *(polygon_shape(2, 2, 2, 0, MANY_CORNERS), range(5)),
             lowest=True,
         )
     ),
@@ -219,7 +219,7 @@ for title, make in {
     ),
     "faces-of-8-bytes-count: a face of 2^30 - 1 corners, a number of 8 bytes": faces(
         polygon_head("<u8", 1, 3, "<u8")
-        + write(rules.decode_polygons, [(1 << 30) - 1], polygon_shape(3, 3, 1, 0, 3), 5)
+        + write(rules.decode_polygons, [(1 << 30) - 1], polygon_shape(3, 3, 1, 0, 3), range(5))
     ),
     "edges-of-8-bytes-beyond: an edge to vertex 5 of 5": edges(polygons(np.array([[0, 5]], "<u8"))),
 }.items():

@@ -22,6 +22,7 @@ EVERYTHING = stems_of(
 def everything() -> Draft:
     random = np.random.default_rng(99)
     vertices = sum(stem.count for stem in EVERYTHING)
+    places = [*range(vertices), 2, 0, 2]
     bases = {
         level: stems_head(0.03 + 0.01 * level, level % 3, 3, rank, basis_by_chance(random, rank, 5))
         for level, rank in ((1, 3), (2, 1), (4, 5))
@@ -34,6 +35,7 @@ def everything() -> Draft:
         time=uneven_time(*random.random((2, 5)).cumsum(axis=1).ravel().tolist()),
         branch_source=random.permutation(len(EVERYTHING)).tolist(),
         vertex_source=random.permutation(vertices).tolist(),
+        places=places,
         is_float64=True,
         layers=2,
         heads=HEADS | bases | {5: stems_head(0.01, 2)},
@@ -61,7 +63,7 @@ def everything() -> Draft:
         Entry(EXACT, b"", 6, 0),
         Entry(EXACT, b"", 6, 1),
         Entry(METADATA, b"\1" + WIND_FRAME),
-        Entry(FACES, polygons(FACES_3)),
+        Entry(FACES, polygons(FACES_3, places)),
         Entry(EDGES, derived("<i2")),
         Entry(0x8009, FUTURE),
         Entry(0x8018, FUTURE, 1, 1),

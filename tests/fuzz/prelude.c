@@ -136,6 +136,23 @@ static int decode_coarse_pose(void *model, ath_bytes body, const ath_branch *bra
     return result;
 }
 
+/* Places of twice as many vertices from the bytes of a pose, whatever these are. */
+static void decode_places(ath_bytes body, int32_t place_count)
+{
+    int32_t vertices = 2 * place_count, *places = integers((size_t)vertices), found = 0;
+    void *memory = fuzz_memory(ath_faces_memory(place_count, place_count), 0xa5);
+    ath_polygons shape;
+    int result = ath_start_places(memory, body, &shape, vertices, place_count, places);
+    if (result == ATH_OK) result = ath_decode_faces(memory, NULL);
+    for (int32_t v = 0; result == ATH_OK && v < vertices; v++) {
+        REQUIRE(places[v] >= 0 && places[v] <= found, "places are numbered in the order of their first vertices");
+        found += places[v] == found;
+    }
+    REQUIRE(result != ATH_OK || found <= place_count, "there are no more places than are counted");
+    free(memory);
+    free(places);
+}
+
 /* Faces from the bytes of a pose, whatever these are, and the mesh of those that are accepted; null: none. */
 static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, const uint8_t *head, ath_arena *arena)
 {
@@ -146,10 +163,10 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
     shape.corner_count = shape.face_count * size;
     int32_t *corners = integers(shape.corner_count + 1);
     uint32_t *counts = shape.is_mixed ? (uint32_t *)integers(shape.face_count + 1) : NULL;
-    void *memory = fuzz_memory(ath_faces_memory(vertices), 0xa5);
+    void *memory = fuzz_memory(ath_faces_memory(vertices, vertices), 0xa5);
     int32_t *order = integers((size_t)vertices);
     for (int32_t v = 0; v < vertices; v++) order[v] = vertices - 1 - v;
-    ath_start_faces(memory, body, &shape, vertices, counts, corners);
+    ath_start_faces(memory, body, &shape, vertices, NULL, vertices, counts, corners);
     int result = ath_decode_faces(memory, NULL);
     for (uint32_t i = 0; result == ATH_OK && i < shape.corner_count; i++)
         REQUIRE(corners[i] >= 0 && corners[i] < vertices, "corners are vertices");
@@ -159,7 +176,6 @@ static ath_mesh *decode_mesh(ath_mesh *mesh, ath_bytes body, int32_t vertices, c
         arena->base = fuzz_memory((size_t)arena->used, 0xa5);
         arena->used = 0;
         ath_carve_mesh(mesh, arena, (uint64_t)vertices, shape.corner_count, work);
-        ath_weld_mesh(mesh, head[9] & 1 && shape.corner_count >= (uint32_t)vertices ? corners : NULL, order);
         for (int32_t i = 0; i < MESH_PARTS; i++) ath_build_mesh(mesh, i, &shape, counts, corners, order);
     }
     free(order);
@@ -194,6 +210,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     ath_bytes hierarchy = own(take(&rest_of_input, u16_at(data + 14)));
     ath_bytes body = own(take(&rest_of_input, rest_of_input.left));
     void *model = fuzz_memory(ath_prelude_model_size(), 0x7f);
+    if (method & 16) decode_places(body, vertices);
     if (method & 4) decode_time(model, body, frames);
     int32_t shorter = ath_min(frames, ATH_SEGMENT_FRAMES);
     if (method & 8) decode_basis(model, body, shorter, 1 + data[7] % shorter);

@@ -90,7 +90,7 @@ static int is_bad_header(const ath_limits *limits, const ath_header *header, ath
            || is_bad_count(fault, ATH_FIELD_BRANCH_COUNT, header->branch_count, limits->branches)
            || is_bad_count(fault, ATH_FIELD_FRAME_COUNT, header->frame_count, limits->frames)
            || is_bad_count(fault, ATH_FIELD_SEGMENT_COUNT, header->segment_count, limits->frames)
-           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_BRANCH_COUNT, header->branch_count, 1, header->vertex_count)
+           || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_BRANCH_COUNT, header->branch_count, 1, header->place_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_SEGMENT_COUNT, header->segment_count, least_segments,
                          header->frame_count)
            || is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, header->full_level_count, 1, ATH_LEVELS)
@@ -183,6 +183,7 @@ const char *ath_kind_name(int kind)
     case ATH_REFINED_REST: return "REFINED_REST";
     case ATH_PREDICTED: return "PREDICTED";
     case ATH_ATTRIBUTE: return "ATTRIBUTE";
+    case ATH_PLACES: return "PLACES";
     default: return 0;
     }
 }
@@ -354,7 +355,7 @@ static ath_bytes rest_of(ath_bytes chunk, size_t head)
 }
 
 /* Bits of Method. */
-enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_CONNECTED = 8, REST_WELDED = 16 };
+enum { REST_EXACT = 1, REST_FLOAT64 = 2, REST_HOST = 4, REST_CONNECTED = 8 };
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
 {
@@ -364,8 +365,7 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
     head->is_float64 = (method & REST_FLOAT64) != 0;
     head->is_host = method == REST_HOST;
     head->connected = (method & REST_CONNECTED) != 0;
-    head->welded = (method & REST_WELDED) != 0;
-    int32_t others = REST_EXACT | REST_FLOAT64 | (head->connected ? REST_CONNECTED | REST_WELDED : 0);
+    int32_t others = REST_EXACT | REST_FLOAT64 | REST_CONNECTED;
     if (!head->is_host && method & ~others) return ATH_BAD_CHUNK;
     head->step = (double)f32_at(chunk.bytes + 13);
     *body = rest_of(chunk, 17);
@@ -376,15 +376,6 @@ int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body)
         valid = valid && ath_is_finite(head->origin[k]);
     }
     return valid ? ATH_OK : ATH_BAD_CHUNK;
-}
-
-int ath_parse_welds(ath_bytes *body, ath_bytes *welds)
-{
-    if (body->size < 4 || u32_at(body->bytes) > body->size - 4) return ATH_BAD_CHUNK;
-    *welds = rest_of(*body, 4);
-    welds->size = u32_at(body->bytes);
-    *body = rest_of(*body, 4 + welds->size);
-    return ATH_OK;
 }
 
 /* Bits of Index_Type above the type itself. */

@@ -29,7 +29,7 @@ typedef struct {
 
 typedef struct {
     double origin[3], step;
-    int32_t exact, is_float64, is_host, connected, welded;
+    int32_t exact, is_float64, is_host, connected;
     uint32_t host_checksum[2]; /* checksums of the host's mesh, if that is the rest pose */
 } ath_rest_head;
 
@@ -68,8 +68,6 @@ typedef struct {
 } ath_stems_head;
 
 int ath_parse_rest(ath_bytes chunk, ath_rest_head *head, ath_bytes *body);
-/* Takes the polygons that name the places of vertices from the front of `body`. */
-int ath_parse_welds(ath_bytes *body, ath_bytes *welds);
 /* Largest sum of faces and corners of FACES or EDGES. */
 enum { MOST_CORNERS = 1 << 26 };
 /* Returns the bits of the largest number that an integer type holds. */

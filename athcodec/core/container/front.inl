@@ -6,12 +6,12 @@
 #include "container/header.h"
 #include "bits/numbers.inl"
 
-enum { KNOWN_KINDS = 16, KIND_BITS = 5, SIZE_BITS = 30 };
+enum { KNOWN_KINDS = 17, KIND_BITS = 5, SIZE_BITS = 30 };
 
-static const uint16_t known_kinds[KNOWN_KINDS] = {ATH_HIERARCHY, ATH_REST,         ATH_TIME,        ATH_METADATA,
-                                                  ATH_FACES,     ATH_EDGES,        ATH_CLIPS,       ATH_SOURCE_REST,
-                                                  ATH_STEMS,     ATH_AFFINES,      ATH_CORRECTIONS, ATH_SHAPES,
-                                                  ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED,   ATH_ATTRIBUTE};
+static const uint16_t known_kinds[KNOWN_KINDS] = {
+    ATH_HIERARCHY, ATH_REST,         ATH_TIME,      ATH_METADATA,  ATH_FACES,       ATH_EDGES,
+    ATH_CLIPS,     ATH_SOURCE_REST,  ATH_STEMS,     ATH_AFFINES,   ATH_CORRECTIONS, ATH_SHAPES,
+    ATH_EXACT,     ATH_REFINED_REST, ATH_PREDICTED, ATH_ATTRIBUTE, ATH_PLACES};
 
 typedef struct {
     ath_context kind[KNOWN_KINDS + 1][1 << KIND_BITS], usual[KNOWN_KINDS + 1]; /* by the kind of the chunk before */
@@ -56,11 +56,11 @@ static uint32_t code_from(ath_coder *coder, number_model *model, uint32_t least,
 static void code_counts(ath_coder *coder, ath_header *header)
 {
     number_model counts;
-    ath_context predicted;
+    ath_context predicted, split;
     uint64_t bits;
     number_model_init(&counts);
-    header->vertex_count = code_from(coder, &counts, 1, 1 << 16, header->vertex_count);
-    uint32_t branches = 2 * clipped((int32_t)header->vertex_count);
+    header->place_count = code_from(coder, &counts, 1, 1 << 16, header->place_count);
+    uint32_t branches = 2 * clipped((int32_t)header->place_count);
     header->branch_count = code_from(coder, &counts, 1, branches, header->branch_count);
     header->frame_count = code_from(coder, &counts, 1, 1 << 11, header->frame_count);
     header->segment_count = code_from(coder, &counts, 1, header->frame_count / 4, header->segment_count);
@@ -70,6 +70,12 @@ static void code_counts(ath_coder *coder, ath_header *header)
         - (int32_t)code_from(coder, &counts, 0, 0, (uint32_t)(header->full_level_count - header->level_count));
     header->clip_count = (int32_t)code_from(coder, &counts, 1, 0, (uint32_t)header->clip_count);
     header->layer_count = (int32_t)code_from(coder, &counts, 1, 16, (uint32_t)header->layer_count);
+    context_init(&split, 6000);
+    if (coder_bit(coder, &split, header->vertex_count > header->place_count))
+        header->vertex_count =
+            header->place_count + code_from(coder, &counts, 1, 1 << 16, header->vertex_count - header->place_count);
+    else
+        header->vertex_count = header->place_count;
     header->is_float64 = coder_raw_bit(coder, header->is_float64);
     context_init(&predicted, 6000);
     header->is_predicted = coder_bit(coder, &predicted, header->is_predicted);

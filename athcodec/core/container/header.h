@@ -7,7 +7,7 @@
 typedef struct ath_header {
     uint64_t file_length, front_length;
     double max_error;
-    uint32_t chunk_count, vertex_count, branch_count, frame_count, segment_count;
+    uint32_t chunk_count, vertex_count, place_count, branch_count, frame_count, segment_count;
     int32_t level_count, full_level_count, clip_count, layer_count, is_float64, is_predicted;
     int32_t has_faces;          /* whether the chunk table names FACES */
     int32_t stage_count;        /* stages up to the last stored level, see ath_stage_of */

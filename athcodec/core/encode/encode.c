@@ -141,10 +141,20 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
 }
 
 int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
-                         const uint32_t *counts, const int32_t *corners)
+                         const int32_t *places, int32_t place_count, const uint32_t *counts, const int32_t *corners)
 {
     faces_model *model = (faces_model *)memory;
-    start_faces(model, shape, vertex_count, (uint32_t *)counts, (int32_t *)corners);
+    start_faces(model, shape, vertex_count, places, place_count, (uint32_t *)counts, (int32_t *)corners);
+    coder_start(&model->coder, bytes, capacity);
+    return written(&model->coder, code_faces(model, 0));
+}
+
+int64_t ath_encode_places(void *memory, uint8_t *bytes, size_t capacity, uint32_t columns, int32_t vertex_count,
+                          int32_t place_count, const int32_t *places)
+{
+    faces_model *model = (faces_model *)memory;
+    ath_polygons shape;
+    start_places(model, &shape, columns, vertex_count, place_count, (int32_t *)places);
     coder_start(&model->coder, bytes, capacity);
     return written(&model->coder, code_faces(model, 0));
 }

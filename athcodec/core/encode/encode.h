@@ -161,11 +161,31 @@ void ath_nearest_rotation(const double H[9], double R[9]);
 ATH_ENCODER_API void ath_solve(int64_t count, int32_t n, int32_t columns, double *matrices, double *rows);
 
 /* Measures the largest distance and the sum of squared distances between positions and source (plus origin). shown: how
- * many frames of the clip show each frame. rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts
+ * many frames of the clip show each frame. shares: how many vertices of the source are at each place; null: one.
+ * rounding: error that a decoder may add. histogram: ATH_SHORT_FLOATS counts
  * of distances, rounded up as in the error table, which are added to. */
-ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64,
-                               const void *positions, const double *source, const double origin[3], double rounding,
-                               double *max_error, double *sum_squares, uint32_t *histogram);
+ATH_ENCODER_API void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, const int32_t *shares,
+                               int is_float64, const void *positions, const double *source, const double origin[3],
+                               double rounding, double *max_error, double *sum_squares, uint32_t *histogram);
+
+/* Mixes the positions of `count` vertices, in frames x vertex_count x 3 floats or (is_float64) doubles, into a hash of
+ * each. zeros_differ: whether 0.0 and -0.0 are different numbers. */
+ATH_ENCODER_API void ath_hash_positions(int64_t count, const int32_t *vertices, int32_t frames, int32_t vertex_count,
+                                        int is_float64, int zeros_differ, const void *positions, uint64_t *hashes);
+/* Sets `apart` to 1 for each of `count` vertices that is not where another one is in all of the frames. */
+ATH_ENCODER_API void ath_find_apart(int64_t count, const int32_t *vertices, const int32_t *others, int32_t frames,
+                                    int32_t vertex_count, int is_float64, int zeros_differ, const void *positions,
+                                    uint8_t *apart);
+
+/* Fills for each of `count` points the first one with its label that is within a tolerance of it in all poses; itself if
+ * there is none. points: count x poses x 3. pose: the one in which points lie furthest apart. table: a power of two.
+ * work: table + count. */
+ATH_ENCODER_API void ath_find_near(int32_t count, int32_t poses, int32_t pose, const double *points,
+                                   const int32_t *labels, double tolerance, int32_t *work, uint32_t table,
+                                   int32_t *leaders);
+/* Raises `squares` to the square of the largest distance of each vertex from another in any of the frames. */
+ATH_ENCODER_API void ath_find_far(int64_t count, const int32_t *vertices, const int32_t *others, int32_t frames,
+                                  int32_t vertex_count, int is_float64, const void *positions, double *squares);
 
 enum { ATH_CORRECTION_ROW = 6 }; /* int32_t per row */
 
@@ -223,9 +243,13 @@ ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                               int32_t branch_count, const ath_mesh *mesh, int is_float64,
                                               const double *rest);
-/* memory: ath_faces_memory bytes. */
+/* memory: ath_faces_memory bytes. places: of each vertex, below place_count; not read if there are as many. */
 ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
-                                         int32_t vertex_count, const uint32_t *counts, const int32_t *corners);
+                                         int32_t vertex_count, const int32_t *places, int32_t place_count,
+                                         const uint32_t *counts, const int32_t *corners);
+/* The stream of PLACES. memory: ath_faces_memory bytes for place_count vertices and places. */
+ATH_ENCODER_API int64_t ath_encode_places(void *memory, uint8_t *bytes, size_t capacity, uint32_t columns,
+                                          int32_t vertex_count, int32_t place_count, const int32_t *places);
 ATH_ENCODER_API int64_t ath_encode_times(void *model, uint8_t *bytes, size_t capacity, int32_t frame_count,
                                          const double *times);
 ATH_ENCODER_API int64_t ath_encode_temporal(void *model, uint8_t *bytes, size_t capacity, int32_t rank, int32_t frames,

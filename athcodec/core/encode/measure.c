@@ -162,23 +162,23 @@ static void shorts_above(int32_t count, const double *squares, double rounding, 
     }
 }
 
-void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, int is_float64, const void *positions,
-               const double *source, const double origin[3], double rounding, double *max_error, double *sum_squares,
-               uint32_t *histogram)
+void ath_error(int32_t vertex_count, int32_t frames, const int32_t *shown, const int32_t *shares, int is_float64,
+               const void *positions, const double *source, const double origin[3], double rounding, double *max_error,
+               double *sum_squares, uint32_t *histogram)
 {
     double largest = 0.0, sum = 0.0, squares[ATH_SEGMENT_FRAMES];
     int32_t shorts[ATH_SEGMENT_FRAMES];
     size_t T = (size_t)frames;
     for (size_t v = 0; v < (size_t)vertex_count; v++)
         for (int32_t start = 0; start < frames; start += ATH_SEGMENT_FRAMES) {
-            int32_t count = ath_min(frames - start, ATH_SEGMENT_FRAMES);
+            int32_t count = ath_min(frames - start, ATH_SEGMENT_FRAMES), share = shares ? shares[v] : 1;
             square_distances(count, T, is_float64, positions, v * 3 * T + (size_t)start, source, origin, squares);
             for (int32_t t = 0; t < count; t++) {
-                sum += shown[start + t] * squares[t];
+                sum += (double)shown[start + t] * share * squares[t];
                 if (squares[t] > largest) largest = squares[t];
             }
             shorts_above(count, squares, rounding, shorts);
-            for (int32_t t = 0; t < count; t++) histogram[shorts[t]] += (uint32_t)shown[start + t];
+            for (int32_t t = 0; t < count; t++) histogram[shorts[t]] += (uint32_t)(shown[start + t] * share);
         }
     *max_error = ath_sqrt(largest);
     *sum_squares = sum;

@@ -44,7 +44,7 @@ static int build_to(ath_file *file, int32_t level, int32_t *cost)
     while (result == ATH_OK && file->built_level < level) {
         int32_t next = file->built_level + 1;
         if (file->planned_level < next) {
-            if (!ath_spend(cost, file->info.vertex_count)) return ATH_MORE;
+            if (!ath_spend(cost, file->info.place_count)) return ATH_MORE;
             ath_plan_nodes(&file->plan, file->nodes, next, next);
             file->planned_level = next;
         }
@@ -124,8 +124,8 @@ static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_i
     layer->plan.rest = plan_before(file, q)->rest;
     if (!file->is_reading) plan_pieces(file, q);
     if (!chunk) {
-        if (!ath_spend(cost, file->info.vertex_count)) return ATH_MORE;
-        memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.vertex_count * sizeof(int32_t));
+        if (!ath_spend(cost, file->info.place_count)) return ATH_MORE;
+        memcpy(layer->rest_steps, rest_steps_before(file, q), 3 * (size_t)file->header.place_count * sizeof(int32_t));
         return ATH_OK;
     }
     ath_bytes content = {chunk->bytes, chunk->length};
@@ -136,7 +136,7 @@ static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_i
     if (result == ATH_OK) result = ath_decode_rest(file->model, cost);
     file->is_reading = result == ATH_MORE;
     if (file->is_reading) return ATH_MORE;
-    ath_spend(cost, file->info.vertex_count);
+    ath_spend(cost, file->info.place_count);
     if (result != ATH_OK) {
         ath_refuse(fault, ATH_BAD_CHUNK, ATH_FIELD_CONTENT, 0, 0, 0);
         return ath_fault_at(fault, chunk, index);

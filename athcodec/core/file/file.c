@@ -34,6 +34,7 @@ const uint8_t *ath_stages(const ath_file *file) { return file->header.stages; }
 const uint8_t *ath_repeats(const ath_file *file) { return file->repeats; }
 const ath_branch *ath_branches(const ath_file *file) { return file->branches; }
 const int32_t *ath_vertex_source(const ath_file *file) { return file->vertex_source; }
+const int32_t *ath_vertex_places(const ath_file *file) { return file->vertex_places; }
 const int32_t *ath_branch_source(const ath_file *file) { return file->branch_source; }
 const double *ath_times(const ath_file *file) { return file->times; }
 const ath_clip *ath_clips(const ath_file *file) { return file->clips; }
@@ -113,6 +114,15 @@ int32_t ath_segment_of(const ath_file *file, int32_t frame)
     while (segment + 1 < clip->first_segment + clip->segment_count && ath_segment_start(file, segment + 1) <= frame)
         segment++;
     return segment;
+}
+
+void ath_fill_places(const ath_file *file, void *xyz, size_t stride, size_t bytes)
+{
+    if (!ath_is_split(file)) return;
+    for (size_t i = 0; i < file->header.vertex_count; i++) {
+        size_t first = (size_t)file->vertex_source[file->vertex_places[i]];
+        if (first != i) memcpy((char *)xyz + i * stride, (char *)xyz + first * stride, bytes);
+    }
 }
 
 const ath_chunk *ath_chunks(const ath_file *file) { return file->chunks; }
@@ -195,7 +205,10 @@ int ath_polygons_of(const ath_file *file, int kind, ath_polygons *shape, ath_fau
     return find_polygons(file, kind, shape, &body, fault ? fault : &unwanted);
 }
 
-size_t ath_polygons_size(const ath_file *file) { return ath_faces_memory(file->info.vertex_count); }
+size_t ath_polygons_size(const ath_file *file)
+{
+    return ath_size_or_most(ath_faces_memory(file->info.vertex_count, file->info.place_count));
+}
 
 int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memory_bytes, uint32_t *counts,
                       int32_t *corners, ath_fault_info *fault)
@@ -207,7 +220,8 @@ int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memor
     if (result != ATH_OK || shape.is_derived) return result;
     if (!ath_fits(memory, memory_bytes, ath_polygons_size(file)))
         return ath_refuse(why, ATH_NO_MEMORY, ATH_FIELD_NONE, 0, 0, 0);
-    ath_start_faces(memory, body, &shape, file->info.vertex_count, counts, corners);
+    ath_start_faces(memory, body, &shape, file->info.vertex_count, file->vertex_places, file->info.place_count, counts,
+                    corners);
     return why->code = ath_decode_faces(memory, 0);
 }
 

@@ -32,7 +32,7 @@ struct ath_file {
     char *names;  /* clip_count x NAME_BYTES */
     float *seams; /* clip_count x full_level_count */
     ath_branch *branches;
-    int32_t *branch_source, *vertex_source;
+    int32_t *branch_source, *vertex_source, *vertex_places; /* see ath.h */
     double *times;
     double *rest;        /* the reference pose, relative to the origin */
     double *source_rest; /* the rest pose; null where it is the reference pose, not exact */
@@ -42,6 +42,7 @@ struct ath_file {
     void *model;                  /* ath_prelude_model_size bytes */
     void *scratch;                /* for opening and building */
     double *bases;                /* null until ath_build */
+    void *places_work;            /* for reading PLACES, or null */
     ath_mesh mesh;                /* only where the file has FACES */
     ath_mesh *connected;          /* &mesh where the rest pose is connected, else null */
     int32_t *rest_steps;          /* null where no layer refines the rest pose */
@@ -88,6 +89,12 @@ int32_t ath_segment_before(const ath_file *file, int32_t segment);
 /* Returns how the positions that the level of a stage shows are joined: an entry of ath_joins. */
 int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t stage);
 
+/* ---- places ---- */
+
+ATH_INLINE int ath_is_split(const ath_file *file) { return file->header.vertex_count > file->header.place_count; }
+/* Copies positions, `bytes` each, from the first vertex of each place to the others there. */
+void ath_fill_places(const ath_file *file, void *xyz, size_t stride, size_t bytes);
+
 /* ---- chunks ---- */
 
 const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
@@ -108,7 +115,7 @@ ATH_INLINE int ath_shapes_end(int32_t kind) { return kind != ATH_CORRECTIONS && 
 
 /* Does one of ATH_REST_PARTS parts of reading REST: the reference pose, or which mesh of the host's it is. Returns ATH_OK
  * when it is done, or ATH_MORE. */
-enum { ATH_REST_PARTS = 5 + MESH_PARTS };
+enum { ATH_REST_PARTS = 4 + MESH_PARTS };
 int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_info *fault);
 /* Completes what follows from the reference pose. */
 void ath_know_rest(ath_file *file);

@@ -7,12 +7,12 @@ enum { LEAST_PIECE = 32 }; /* fewest vertices of a long stem's pieces: whole rin
 
 static int32_t most_pieces(const ath_header *header)
 {
-    return (int32_t)(header->branch_count + header->vertex_count / LEAST_PIECE);
+    return (int32_t)(header->branch_count + header->place_count / LEAST_PIECE);
 }
 
 static uint64_t scratch_size(const ath_header *header)
 {
-    uint64_t size = ath_larger(header->vertex_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
+    uint64_t size = ath_larger(header->place_count, ath_basis_table_size(most_pieces(header))) * sizeof(int32_t);
     size = ath_larger(size, (uint64_t)header->branch_count * 9 * sizeof(double)); /* turns of SOURCE_REST */
     return ath_larger(size, ATH_BASIS_WORK * sizeof(double));
 }
@@ -20,7 +20,7 @@ static uint64_t scratch_size(const ath_header *header)
 /* If the file has layers, all of them get memory for a rest pose, stored or not. */
 static void carve_layers(ath_file *file, const ath_header *header, ath_arena *arena)
 {
-    uint64_t vertices = header->vertex_count;
+    uint64_t vertices = header->place_count;
     if (header->layer_count < 2) return;
     file->rest_steps = (int32_t *)ath_take(arena, vertices * 3 * sizeof(int32_t));
     file->layers[0].nodes = (ath_node *)ath_take(arena, header->branch_count * sizeof(ath_node));
@@ -32,18 +32,19 @@ static void carve_layers(ath_file *file, const ath_header *header, ath_arena *ar
 }
 
 /* Returns the bytes of FACES as read, and of scratch memory to read and build them. */
-static uint64_t mesh_work(uint64_t vertices)
+static uint64_t mesh_work(const ath_header *header)
 {
-    uint64_t read = (MESH_CORNERS + MESH_FACES) * vertices * sizeof(int32_t);
-    uint64_t building = ath_mesh_work(vertices, MESH_CORNERS * vertices) * sizeof(int32_t);
-    return read + ath_larger(building, ath_faces_memory((int32_t)vertices));
+    uint64_t places = header->place_count, read = (MESH_CORNERS + MESH_FACES) * places * sizeof(int32_t);
+    uint64_t building = ath_mesh_work(places, MESH_CORNERS * places) * sizeof(int32_t);
+    return read + ath_larger(building, ath_faces_memory((int32_t)header->vertex_count, (int32_t)header->place_count));
 }
 
 /* Places the file's arrays behind its struct, or only counts them if the base is null. Returns the bytes of all. */
 static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *base)
 {
     ath_arena arena = {base, 0};
-    uint64_t vertices = header->vertex_count, branches = header->branch_count;
+    uint64_t vertices = header->place_count, branches = header->branch_count;
+    int32_t place_count = (int32_t)header->place_count;
     uint64_t entries = (uint64_t)header->level_count * header->segment_count, clips = (uint64_t)header->clip_count;
     ath_take(&arena, sizeof *file);
     file->chunks = (ath_chunk *)ath_take(&arena, (uint64_t)header->chunk_count * sizeof(ath_chunk));
@@ -57,6 +58,9 @@ static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *ba
     file->branches = (ath_branch *)ath_take(&arena, branches * sizeof(ath_branch));
     file->branch_source = (int32_t *)ath_take(&arena, branches * sizeof(int32_t));
     file->vertex_source = (int32_t *)ath_take(&arena, vertices * sizeof(int32_t));
+    file->vertex_places = (int32_t *)ath_take(&arena, (uint64_t)header->vertex_count * sizeof(int32_t));
+    if (header->vertex_count > header->place_count)
+        file->places_work = ath_take(&arena, ath_faces_memory(place_count, place_count));
     file->times = (double *)ath_take(&arena, (uint64_t)header->frame_count * sizeof(double));
     file->rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
     file->source_rest = (double *)ath_take(&arena, vertices * 3 * sizeof(double));
@@ -66,15 +70,16 @@ static uint64_t carve_file(ath_file *file, const ath_header *header, uint8_t *ba
     file->model = ath_take(&arena, ath_prelude_model_size());
     file->scratch = ath_take(&arena, scratch_size(header));
     carve_layers(file, header, &arena);
-    if (header->has_faces)
-        ath_carve_mesh(&file->mesh, &arena, vertices, MESH_CORNERS * vertices, mesh_work(header->vertex_count));
+    if (header->has_faces) ath_carve_mesh(&file->mesh, &arena, vertices, MESH_CORNERS * vertices, mesh_work(header));
     return arena.used;
 }
 
 /* Checks the memory of a segment, which does not depend on the decoder (FORMAT.md, "Limits"). */
 static int check_memory(const ath_header *header, const ath_limits *limits, uint64_t frames, ath_fault_info *fault)
 {
-    uint64_t needed = header->vertex_count * (ATH_BYTES_PER_FRAME * frames + ATH_BYTES_PER_VERTEX);
+    uint64_t twins = header->vertex_count - header->place_count;
+    uint64_t needed =
+        header->place_count * (ATH_BYTES_PER_FRAME * frames + ATH_BYTES_PER_VERTEX) + twins * ATH_BYTES_PER_TWIN;
     if (needed <= limits->memory_bytes) return ATH_OK;
     return ath_refuse(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_MEMORY, (double)needed, 0, (double)limits->memory_bytes);
 }
@@ -195,7 +200,7 @@ static int check_depth(const ath_file *file, ath_fault_info *fault)
 static int read_hierarchy(ath_file *file, ath_fault_info *fault)
 {
     const ath_header *header = &file->header;
-    int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->vertex_count;
+    int32_t branch_count = (int32_t)header->branch_count, vertex_count = (int32_t)header->place_count;
     ath_bytes chunk;
     int result = check_memory(header, &file->limits, (uint64_t)file->longest, fault);
     if (result == ATH_OK) result = count_coded(file, fault);
@@ -208,10 +213,48 @@ static int read_hierarchy(ath_file *file, ath_fault_info *fault)
     return check_depth(file, fault);
 }
 
+/* Begins to read which vertices share a place. */
+static int prepare_places(ath_file *file, ath_fault_info *fault)
+{
+    const ath_header *header = &file->header;
+    ath_bytes chunk;
+    const ath_chunk *unwanted = ath_find_chunk(file->chunks, header->chunk_count, ATH_PLACES, ATH_NO_LEVEL, 0);
+    if (!ath_is_split(file) && unwanted) {
+        ath_refuse(fault, ATH_BAD_CHUNK_TABLE, ATH_FIELD_CHUNK_KIND, ATH_PLACES, 0, 0);
+        return ath_fault_at(fault, unwanted, (int32_t)(unwanted - file->chunks));
+    }
+    if (!ath_is_split(file)) return ATH_OK;
+    int result = ath_load(file, ATH_PLACES, &chunk, fault);
+    if (result != ATH_OK) return result;
+    return ath_start_places(file->places_work, chunk, &file->shape, (int32_t)header->vertex_count,
+                            (int32_t)header->place_count, file->vertex_places);
+}
+
+/* Turns the numbers of places into vertices in file order and back, all of which the file has as decoded so far. */
+static void number_vertices(ath_file *file)
+{
+    const ath_header *header = &file->header;
+    int32_t *number = (int32_t *)file->scratch; /* in file order, of each place */
+    int32_t vertex_count = (int32_t)header->vertex_count, place_count = (int32_t)header->place_count;
+    for (int32_t v = 0; v < place_count; v++) number[file->vertex_source[v]] = v;
+    for (int32_t i = vertex_count - 1; i >= 0; i--) {
+        int32_t v = number[ath_is_split(file) ? file->vertex_places[i] : i];
+        file->vertex_places[i] = v;
+        file->vertex_source[v] = i; /* the first vertex there comes last */
+    }
+}
+
+static int read_places(ath_file *file, int32_t *cost)
+{
+    int result = ath_is_split(file) ? ath_decode_faces(file->places_work, cost) : ATH_OK;
+    if (result == ATH_OK) number_vertices(file);
+    return result;
+}
+
 static void build_plan(ath_file *file)
 {
     ath_plan *plan = &file->plan;
-    plan->vertex_count = (int32_t)file->header.vertex_count;
+    plan->vertex_count = (int32_t)file->header.place_count;
     plan->branch_count = (int32_t)file->header.branch_count;
     plan->branches = file->branches;
     plan->pieces = file->pieces;
@@ -349,6 +392,7 @@ static void set_info(ath_file *file, uint64_t prelude)
     info->prelude_length = prelude;
     info->max_error = header->max_error;
     info->vertex_count = (int32_t)header->vertex_count;
+    info->place_count = (int32_t)header->place_count;
     info->branch_count = (int32_t)header->branch_count;
     info->frame_count = (int32_t)header->frame_count;
     info->segment_count = (int32_t)header->segment_count;
@@ -386,14 +430,16 @@ static int read_plan(ath_file *file, ath_fault_info *fault)
 
 int ath_open_within(ath_file *file, int32_t *cost, ath_fault_info *fault)
 {
-    const int32_t first = 3, last = first + ATH_REST_PARTS; /* the parts that read REST, and the one behind them */
+    const int32_t first = 5, last = first + ATH_REST_PARTS; /* the parts that read REST, and the one behind them */
     ath_fault_info *why = &file->fault;
     int result = file->opened > last ? ATH_OK : ATH_MORE;
     while (result == ATH_MORE && (!cost || *cost > 0)) {
         int32_t part = file->opened; /* in the order of FORMAT.md, "Opening" */
         result = part == 0      ? read_clips(file, why)
                  : part == 1    ? read_hierarchy(file, why)
-                 : part == 2    ? read_plan(file, why)
+                 : part == 2    ? prepare_places(file, why)
+                 : part == 3    ? read_places(file, cost)
+                 : part == 4    ? read_plan(file, why)
                  : part == last ? read_time(file, why)
                                 : ath_read_reference(file, part - first, cost, why);
         if (result != ATH_OK) continue;

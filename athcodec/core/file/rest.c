@@ -10,7 +10,7 @@ static int has_source_rest(const ath_file *file)
 /* Derives the reference pose from the source's own numbers. */
 static void take_numbers(ath_file *file)
 {
-    size_t numbers = 3 * (size_t)file->header.vertex_count;
+    size_t numbers = 3 * (size_t)file->header.place_count;
     for (size_t i = 0; i < numbers; i++) file->rest[i] = file->source_rest[i] - file->info.origin[i % 3];
     if (file->rest_steps) memset(file->rest_steps, 0, numbers * sizeof *file->rest_steps);
 }
@@ -19,19 +19,20 @@ static void take_numbers(ath_file *file)
 static int start_polygons(ath_file *file, ath_bytes chunk)
 {
     ath_polygons *shape = &file->shape;
-    int32_t vertex_count = (int32_t)file->header.vertex_count, *work = file->mesh.work;
-    size_t vertices = file->header.vertex_count, building = ath_mesh_work(vertices, MESH_CORNERS * vertices);
+    int32_t vertex_count = (int32_t)file->header.vertex_count, place_count = (int32_t)file->header.place_count;
+    int32_t *work = file->mesh.work;
+    size_t places = file->header.place_count, building = ath_mesh_work(places, MESH_CORNERS * places);
     ath_bytes body;
     int result = ath_parse_polygons(chunk, shape, &body);
     if (result != ATH_OK) return result;
-    if (shape->is_derived || !ath_serves_rest(shape, vertex_count)) return ATH_BAD_CHUNK;
-    file->corners = work + ath_larger(building, (ath_faces_memory(vertex_count) + 3) / 4);
+    if (shape->is_derived || !ath_serves_rest(shape, place_count)) return ATH_BAD_CHUNK;
+    file->corners = work + ath_larger(building, (ath_faces_memory(vertex_count, place_count) + 3) / 4);
     file->counts = shape->is_mixed ? (uint32_t *)(void *)(file->corners + shape->corner_count) : 0;
-    ath_start_faces(work, body, shape, vertex_count, file->counts, file->corners);
+    ath_start_faces(work, body, shape, vertex_count, file->vertex_places, place_count, file->counts, file->corners);
     return ATH_OK;
 }
 
-/* Reads the head of REST. Which vertices share a place follows it. */
+/* Reads the head of REST, and begins FACES if the pose goes by them. */
 static int read_head(ath_file *file, ath_fault_info *fault)
 {
     ath_rest_head *head = &file->rest_head;
@@ -41,21 +42,6 @@ static int read_head(ath_file *file, ath_fault_info *fault)
     if (result != ATH_OK || !head->connected) return result;
     file->connected = &file->mesh;
     result = ath_load(file, ATH_FACES, &chunk, fault); /* without FACES there is no memory for a mesh */
-    if (result != ATH_OK || !head->welded) return result;
-    result = ath_load(file, ATH_REST, &chunk, fault);
-    if (result == ATH_OK) result = ath_parse_welds(&file->rest_body, &chunk);
-    return result == ATH_OK ? start_polygons(file, chunk) : result;
-}
-
-static int read_welds(ath_file *file, int32_t *cost, ath_fault_info *fault)
-{
-    int welded = file->rest_head.welded;
-    ath_bytes chunk;
-    int result = welded ? ath_decode_faces(file->mesh.work, cost) : ATH_OK;
-    if (result == ATH_OK && welded && file->shape.corner_count < file->header.vertex_count) return ATH_BAD_CHUNK;
-    if (result != ATH_OK) return result;
-    ath_weld_mesh(&file->mesh, file->corners, file->vertex_source);
-    result = ath_load(file, ATH_FACES, &chunk, fault);
     return result == ATH_OK ? start_polygons(file, chunk) : result;
 }
 
@@ -87,12 +73,11 @@ int ath_read_reference(ath_file *file, int32_t part, int32_t *cost, ath_fault_in
 {
     int has_mesh = file->rest_head.connected;
     if (part == 0) return read_head(file, fault);
-    if (part == 1 && has_mesh) return read_welds(file, cost, fault);
-    if (part == 2 && has_mesh) return ath_decode_faces(file->mesh.work, cost);
-    if (part == 3 + MESH_PARTS) return start_pose(file, fault);
-    if (part == 4 + MESH_PARTS && !file->rest_is_exact) return ath_decode_rest(file->model, cost);
-    if (part < 3 + MESH_PARTS && has_mesh)
-        ath_build_mesh(&file->mesh, part - 3, &file->shape, file->counts, file->corners, file->vertex_source);
+    if (part == 1 && has_mesh) return ath_decode_faces(file->mesh.work, cost);
+    if (part == 2 + MESH_PARTS) return start_pose(file, fault);
+    if (part == 3 + MESH_PARTS && !file->rest_is_exact) return ath_decode_rest(file->model, cost);
+    if (part < 2 + MESH_PARTS && has_mesh)
+        ath_build_mesh(&file->mesh, part - 2, &file->shape, file->counts, file->corners, file->vertex_places);
     return ATH_OK;
 }
 
@@ -145,7 +130,7 @@ static size_t first_not_finite(const uint8_t *xyz, size_t stride, size_t count)
 
 static void copy_mesh(ath_file *file, const uint8_t *xyz, size_t stride)
 {
-    for (size_t v = 0; v < file->header.vertex_count; v++) {
+    for (size_t v = 0; v < file->header.place_count; v++) {
         uint32_t bits[3];
         float numbers[3];
         mesh_bits(xyz + (size_t)file->vertex_source[v] * stride, bits);
@@ -192,11 +177,12 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
     int32_t stage = ath_file_stage(file, level), layer = ath_layer_of(file, stage);
     const ath_plan *plan = ath_level_plan(file, stage);
     if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
-    for (size_t v = 0; v < file->header.vertex_count; v++) {
+    for (size_t v = 0; v < file->header.place_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);
         for (size_t k = 0; k < 3; k++)
             out[k] = file->rest_is_exact ? file->source_rest[3 * v + k] : plan->rest[3 * v + k] + file->info.origin[k];
     }
+    if (order == ATH_SOURCE_ORDER) ath_fill_places(file, xyz, stride, 3 * sizeof(double));
     return ATH_OK;
 }
 
@@ -222,7 +208,7 @@ static int read_source_rest(ath_file *file, ath_fault_info *fault)
                                      file->info.rest_is_float64, file->source_rest);
     result = ath_decode_source_rest(file->model, body.bytes, body.size, file->branches, file->info.branch_count,
                                     head.step, finest_reference(file), turns, file->source_rest);
-    for (size_t i = 0; i < 3 * (size_t)file->header.vertex_count; i++)
+    for (size_t i = 0; i < 3 * (size_t)file->header.place_count; i++)
         file->source_rest[i] = file->source_rest[i] + file->info.origin[i % 3];
     return result;
 }
@@ -254,10 +240,12 @@ static int put_rest(const ath_file *file, ath_order order, void *xyz, size_t str
     int result = rest_is_there(file);
     if (result != ATH_OK) return result;
     const double *reference = finest_reference(file);
-    for (size_t v = 0; v < file->header.vertex_count; v++)
+    for (size_t v = 0; v < file->header.place_count; v++)
         for (size_t k = 0; k < 3; k++)
             ath_put_number((char *)xyz + place_of(file, order, v) * stride, k, is_float64,
                            rest_number(file, reference, 3 * v + k));
+    if (order == ATH_SOURCE_ORDER)
+        ath_fill_places(file, xyz, stride, 3 * (is_float64 ? sizeof(double) : sizeof(float)));
     return ATH_OK;
 }
 

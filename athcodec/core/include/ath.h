@@ -90,7 +90,7 @@ ATH_API const char *ath_result_name(int result);
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
 /* A decoder of format 0.x reads files of its own version only. ATH_FEATURES has a bit for each known feature. */
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 13, ATH_FEATURES = 0 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 14, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. A decoder skips unknown kinds with the bit ATH_OPTIONAL. */
 enum {
@@ -99,9 +99,10 @@ enum {
     ATH_REST = 2,
     ATH_TIME = 3,
     ATH_METADATA = ATH_OPTIONAL | 4,
-    ATH_FACES = ATH_OPTIONAL | 5,
+    ATH_FACES = 5,
     ATH_EDGES = ATH_OPTIONAL | 6,
     ATH_CLIPS = 7,
+    ATH_PLACES = 8,
     ATH_STEMS = 16,
     ATH_AFFINES = 17,
     ATH_CORRECTIONS = 18,
@@ -118,9 +119,9 @@ enum { ATH_NO_LEVEL = 255 }; /* level of a chunk that belongs to no level */
 /* Returns the name of a kind, such as "STEMS"; null if it is unknown. */
 ATH_API const char *ath_kind_name(int kind);
 
-/* ath_limits.memory_bytes limits vertices * (ATH_BYTES_PER_FRAME * F + ATH_BYTES_PER_VERTEX), where F is the number of
- * frames of the longest segment. */
-enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512 };
+/* ath_limits.memory_bytes limits places * (ATH_BYTES_PER_FRAME * F + ATH_BYTES_PER_VERTEX), where F is the number of
+ * frames of the longest segment, plus ATH_BYTES_PER_TWIN for each vertex that shares the place of another. */
+enum { ATH_BYTES_PER_FRAME = 60, ATH_BYTES_PER_VERTEX = 512, ATH_BYTES_PER_TWIN = 32 };
 
 /* ---- faults ------------------------------------------------------------------------------------------------------ */
 
@@ -261,7 +262,9 @@ typedef struct ath_info {
     uint64_t file_length, prelude_length;
     double max_error; /* error bound of the deepest stored level, scene units */
     double origin[3];
-    int32_t vertex_count, branch_count;
+    int32_t vertex_count; /* vertices of the source, which ATH_SOURCE_ORDER has */
+    int32_t place_count;  /* places of vertices, which ATH_FILE_ORDER has; as many, or fewer where some coincide */
+    int32_t branch_count;
     int32_t frame_count, segment_count; /* sums over all clips */
     int32_t clip_count;
     int32_t level_count;      /* stored levels: 0 to level_count - 1 */
@@ -298,7 +301,8 @@ ATH_API double ath_seam_error(const ath_file *file, int32_t clip, int32_t level)
 
 enum { ATH_SHEET = 1, ATH_LOOSE = 2, ATH_WHOLE = 4, ATH_STILL = 8 };
 
-/* A branch. Parents come before children; the subtree of branch b is the branches b to b + subtree - 1. */
+/* A branch. Parents come before children; the subtree of branch b is the branches b to b + subtree - 1. Vertices are
+ * those of ATH_FILE_ORDER. */
 typedef struct ath_branch {
     int32_t parent;  /* branch with a smaller index; -1 for a root */
     int32_t count;   /* vertices of the stem, at least 1 */
@@ -315,12 +319,16 @@ typedef struct ath_branch {
 } ath_branch;
 
 ATH_API const ath_branch *ath_branches(const ath_file *file);
-/* Return permutations: vertex (branch) i of the file is vertex (branch) [i] of the source. */
+/* Returns for each of place_count vertices in file order the first vertex of the source that is there. */
 ATH_API const int32_t *ath_vertex_source(const ath_file *file);
+/* Returns for each of vertex_count vertices of the source the one in file order whose position it has. */
+ATH_API const int32_t *ath_vertex_places(const ath_file *file);
+/* Returns a permutation: branch i of the file is branch [i] of the source. */
 ATH_API const int32_t *ath_branch_source(const ath_file *file);
 /* Returns the times of all frames, in seconds. They increase within a clip. */
 ATH_API const double *ath_times(const ath_file *file);
 
+/* info.place_count vertices in file order, stem after stem, or info.vertex_count of the source in its order. */
 typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
 
 /* Reads the rest pose of the source, if it differs from the reference pose and so has a chunk of its own, SOURCE_REST.
@@ -328,7 +336,7 @@ typedef enum ath_order { ATH_FILE_ORDER = 0, ATH_SOURCE_ORDER = 1 } ath_order;
  * ath_refine_size has read: read again with a finer one, the result is closer to the source. For files without the
  * chunk there is nothing to do. Returns ATH_OK, ATH_MISSING, ATH_BAD_CHECKSUM or ATH_BAD_CHUNK. */
 ATH_API int ath_read_rest(ath_file *file, ath_fault_info *fault);
-/* Write the rest pose of the source, for binding and normals: vertex_count positions, `stride` bytes apart. If the
+/* Write the rest pose of the source, for binding and normals: a position for each vertex, `stride` bytes apart. If the
  * source had none, it is the finest reference pose (see ath_level_rest) that ath_refine_size has read. If
  * info.rest_is_float64 is 0, round doubles to float to get the source's numbers. Return ATH_OK, ATH_NEEDS_HOST_MESH, or
  * ATH_MISSING: call ath_read_rest first. */

@@ -797,23 +797,10 @@ int ath_player_ahead(ath_player *player, int32_t vertex_frames)
 
 /* ---- topology ---- */
 
-/* Returns the file's vertex for each vertex of the source; null: there is no memory. */
-static uint32_t *ath_player_file_vertices(const ath_player *p)
+static void ath_player_reorder(const ath_player *p, ath_order order, uint32_t *vertices, size_t count)
 {
-    size_t size = (size_t)p->info.vertex_count * sizeof(uint32_t);
-    uint32_t *vertices = (uint32_t *)ath_player_take(&p->options, size);
-    const int32_t *source = ath_vertex_source(p->file);
-    for (int32_t i = 0; vertices && i < p->info.vertex_count; i++) vertices[source[i]] = (uint32_t)i;
-    return vertices;
-}
-
-static int ath_player_reorder(const ath_player *p, ath_order order, uint32_t *vertices, size_t count)
-{
-    uint32_t *own = order == ATH_FILE_ORDER ? ath_player_file_vertices(p) : NULL;
-    if (order == ATH_FILE_ORDER && !own) return ATH_NO_MEMORY;
-    for (size_t i = 0; own && i < count; i++) vertices[i] = own[vertices[i]];
-    ath_player_give(&p->options, own);
-    return ATH_OK;
+    const int32_t *places = ath_vertex_places(p->file);
+    for (size_t i = 0; order == ATH_FILE_ORDER && i < count; i++) vertices[i] = (uint32_t)places[vertices[i]];
 }
 
 /* Splits polygons into fans of primitives with `size` corners. */
@@ -853,7 +840,8 @@ static int ath_player_primitives(ath_player *p, int kind, uint32_t size, ath_ord
     ath_player_give(&p->options, memory);
     ath_player_give(&p->options, counts);
     ath_player_give(&p->options, corners);
-    return result == ATH_OK && out ? ath_player_reorder(p, order, out, *count * size) : result;
+    if (result == ATH_OK && out) ath_player_reorder(p, order, out, *count * size);
+    return result;
 }
 
 int ath_player_triangles(ath_player *player, ath_order order, uint32_t *triangles, size_t *count)

@@ -19,7 +19,6 @@ void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uin
     mesh->first = (int32_t *)ath_take(arena, (vertex_count + 1) * sizeof(int32_t));
     mesh->order = (int32_t *)ath_take(arena, vertex_count * sizeof(int32_t));
     mesh->rank = (int32_t *)ath_take(arena, vertex_count * sizeof(int32_t));
-    mesh->same = (int32_t *)ath_take(arena, vertex_count * sizeof(int32_t));
     mesh->from = (int32_t *)ath_take(arena, vertex_count * sizeof(int32_t));
     mesh->work = (int32_t *)ath_take(arena, work_bytes);
 }
@@ -144,8 +143,8 @@ static void order_vertices(ath_mesh *mesh)
     for (int32_t s = 0; s < MESH_STACKS; s++) front.stack[s] = mesh->work + (size_t)s * (size_t)n;
     front.state = (uint8_t *)(mesh->work + MESH_STACKS * (size_t)n);
     memset(front.state, UNTOUCHED, (size_t)n);
-    for (int32_t v = 0; v < n; v++) mesh->rank[v] = mesh->same[v] == v ? -1 : n;
-    for (int32_t placed = 0; placed < mesh->place_count; placed++) {
+    for (int32_t v = 0; v < n; v++) mesh->rank[v] = -1;
+    for (int32_t placed = 0; placed < n; placed++) {
         int32_t v = take_next(mesh, &front);
         if (v < 0) {
             while (mesh->rank[seed] >= 0) seed++;
@@ -162,32 +161,15 @@ static void order_vertices(ath_mesh *mesh)
     }
 }
 
-void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_source)
-{
-    int32_t *named = mesh->order; /* not in use yet: serves as the first vertex of each name */
-    mesh->place_count = 0;
-    for (int32_t v = 0; v < mesh->vertex_count; v++) named[v] = -1;
-    for (int32_t v = 0; v < mesh->vertex_count; v++) {
-        int32_t *first = named + (names ? names[vertex_source[v]] : v);
-        if (*first < 0) {
-            *first = v;
-            mesh->place_count++;
-        }
-        mesh->same[v] = *first;
-    }
-}
-
 void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
-                    const int32_t *corners, const int32_t *vertex_source)
+                    const int32_t *corners, const int32_t *vertex_of)
 {
     if (part == 1) join_triangles(mesh);
     if (part == 2) order_vertices(mesh);
     if (part > 0) return;
-    int32_t *place = mesh->rank; /* not in use yet: serves as the file's number of each vertex of the source */
     uint32_t first = 0;
     mesh->corner_count = (int32_t)shape->corner_count;
-    for (int32_t v = 0; v < mesh->vertex_count; v++) place[vertex_source[v]] = mesh->same[v];
-    for (int32_t k = 0; k < mesh->corner_count; k++) mesh->corners[k] = place[corners[k]];
+    for (int32_t k = 0; k < mesh->corner_count; k++) mesh->corners[k] = vertex_of[corners[k]];
     for (uint32_t f = 0; f < shape->face_count; f++) {
         uint32_t count = counts ? counts[f] : shape->columns;
         place_face(mesh, first, count);

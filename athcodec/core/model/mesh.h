@@ -8,13 +8,12 @@
 enum { MESH_CORNERS = 8, MESH_FACES = 4 };
 
 /* `corners` holds the vertex of each corner in file order, `opposite` the corner that completes its parallelogram (-1:
- * none). The corners of vertex v are at[first[v]] to at[first[v + 1] - 1]. `same` holds the first vertex at the place of
- * each vertex, which alone is coded and has corners. */
+ * none). The corners of vertex v are at[first[v]] to at[first[v + 1] - 1]. */
 typedef struct ath_mesh {
-    int32_t vertex_count, corner_count, place_count;
-    int32_t *corners, *opposite, *first, *at, *same;
+    int32_t vertex_count, corner_count;
+    int32_t *corners, *opposite, *first, *at;
     uint8_t *place;        /* place of each corner in its face, for ath_next_corner and ath_corner_before */
-    int32_t *order, *rank; /* the place_count vertices in the order of coding, and its inverse */
+    int32_t *order, *rank; /* the vertices in the order of coding, and its inverse */
     int32_t *from;         /* the neighbour that each vertex was coded from */
     int32_t *work;         /* scratch of decoding and building */
 } ath_mesh;
@@ -45,13 +44,12 @@ uint64_t ath_mesh_work(uint64_t vertex_count, uint64_t corner_count);
 /* Places the arrays of a mesh of at most `corner_count` corners. */
 void ath_carve_mesh(ath_mesh *mesh, ath_arena *arena, uint64_t vertex_count, uint64_t corner_count,
                     uint64_t work_bytes);
-/* Fills `same`. names: vertices of the same name, in source order, share a place; null: each has its own. */
-ATH_ENCODER_API void ath_weld_mesh(ath_mesh *mesh, const int32_t *names, const int32_t *vertex_source);
-/* Does one of MESH_PARTS parts of building the mesh of faces in source order. counts: null if all have shape->columns corners. `corners` and `counts`
- * must not be in the mesh's memory. `same` is filled already. */
+/* Does one of MESH_PARTS parts of building the mesh of faces in source order. counts: null if all have shape->columns
+ * corners. vertex_of: of each vertex of the source, the one in file order. `corners` and `counts` must not be in the
+ * mesh's memory. */
 enum { MESH_PARTS = 3 };
 ATH_ENCODER_API void ath_build_mesh(ath_mesh *mesh, int32_t part, const ath_polygons *shape, const uint32_t *counts,
-                                    const int32_t *corners, const int32_t *vertex_source);
+                                    const int32_t *corners, const int32_t *vertex_of);
 #ifdef ATH_ENCODER
 /* Returns the bytes of a mesh's memory, which ath_place_mesh begins with the struct itself. */
 ATH_API size_t ath_mesh_size(int32_t vertex_count, int32_t corner_count);

@@ -185,6 +185,7 @@ int ath_blended_positions(const ath_file *file, const ath_share *shares, int32_t
         float *out = (float *)(void *)((char *)xyz + place * stride);
         for (int32_t k = 0; k < 3; k++) out[k] = (float)vertex_of(own.out, v)[k];
     }
+    if (order == ATH_SOURCE_ORDER) ath_fill_places(file, xyz, stride, 3 * sizeof(float));
     return held;
 }
 

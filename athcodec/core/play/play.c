@@ -317,7 +317,9 @@ static int positions(const ath_file *file, const ath_segment *const *segments, i
 {
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, -1, &shown);
-    if (result != ATH_NOT_PREPARED) put_all(file, &shown, &to);
+    if (result == ATH_NOT_PREPARED) return result;
+    put_all(file, &shown, &to);
+    if (to.place) ath_fill_places(file, to.out, to.stride, 3 * (to.is_float64 ? sizeof(double) : sizeof(float)));
     return result;
 }
 
@@ -476,6 +478,7 @@ int ath_faded_positions(const ath_file *file, const ath_segment *const *segments
         to.share = found.share[i];
         put_all(file, found.shown + i, &to);
     }
+    if (to.place) ath_fill_places(file, xyz, stride, 3 * sizeof(float));
     return found.result;
 }
 

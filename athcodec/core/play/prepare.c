@@ -211,7 +211,7 @@ static int are_copied(const ath_file *file, int32_t index, int32_t level)
 {
     int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index), vertex = 0;
     ath_cut_size(file, level, 0, 0, &exact);
-    if (exact < file->plan.vertex_count || frames != ath_file_frames(file, index)) return 0;
+    if (ath_is_split(file) || exact < file->plan.vertex_count || frames != ath_file_frames(file, index)) return 0;
     while (vertex < exact && file->vertex_source[vertex] == vertex) vertex++;
     return vertex == exact;
 }

@@ -96,16 +96,26 @@ int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const 
                     code_exact_rest(&coder, (exact_model *)model, branches, branch_count, mesh, is_float64, rest));
 }
 
-size_t ath_faces_memory(int32_t vertex_count)
+uint64_t ath_faces_memory(int32_t vertex_count, int32_t place_count)
 {
-    return sizeof(faces_model) + 2 * FACE_SIDES * sizeof(int32_t) * (size_t)vertex_count;
+    faces_list list;
+    return carve_faces(0, (uint64_t)vertex_count, (uint64_t)place_count, &list);
 }
 
-void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
-                     int32_t *corners)
+void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count,
+                     const int32_t *places, int32_t place_count, uint32_t *counts, int32_t *corners)
 {
-    start_faces((faces_model *)memory, shape, vertex_count, counts, corners);
+    start_faces((faces_model *)memory, shape, vertex_count, places, place_count, counts, corners);
     coder_start(&((faces_model *)memory)->coder, stream.bytes, stream.size);
+}
+
+int ath_start_places(void *memory, ath_bytes chunk, ath_polygons *shape, int32_t vertex_count, int32_t place_count,
+                     int32_t *places)
+{
+    if (chunk.size < 1 || chunk.bytes[0] == 0) return ATH_BAD_CHUNK;
+    start_places((faces_model *)memory, shape, chunk.bytes[0], vertex_count, place_count, places);
+    coder_start(&((faces_model *)memory)->coder, chunk.bytes + 1, chunk.size - 1);
+    return ATH_OK;
 }
 
 int ath_decode_faces(void *memory, int32_t *cost)

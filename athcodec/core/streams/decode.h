@@ -24,10 +24,15 @@ int ath_decode_source_rest(void *model, const uint8_t *bytes, size_t size, const
 /* Decodes positions as stored, floats or (is_float64) doubles, with the origin. All are finite. */
 int ath_decode_exact_rest(void *model, const uint8_t *bytes, size_t size, const ath_branch *branches,
                           int32_t branch_count, const ath_mesh *mesh, int is_float64, double *rest);
-/* The same for corners in source order. memory: ath_faces_memory bytes. counts: null unless shape->is_mixed is 1. */
-ATH_ENCODER_API size_t ath_faces_memory(int32_t vertex_count);
-void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count, uint32_t *counts,
-                     int32_t *corners);
+/* Begins to decode corners in source order, or the place of each vertex, which ath_decode_faces goes on with for a
+ * budget while it returns ATH_MORE. memory: ath_faces_memory bytes. places: of each vertex, below place_count; not read
+ * if there are as many. counts: null unless shape->is_mixed is 1. ath_start_places fills the shape; both need it until
+ * they are done. */
+ATH_ENCODER_API uint64_t ath_faces_memory(int32_t vertex_count, int32_t place_count);
+void ath_start_faces(void *memory, ath_bytes stream, const ath_polygons *shape, int32_t vertex_count,
+                     const int32_t *places, int32_t place_count, uint32_t *counts, int32_t *corners);
+int ath_start_places(void *memory, ath_bytes chunk, ath_polygons *shape, int32_t vertex_count, int32_t place_count,
+                     int32_t *places);
 int ath_decode_faces(void *memory, int32_t *cost);
 /* Times are finite. The caller checks that they increase. */
 int ath_decode_times(void *model, const uint8_t *bytes, size_t size, int32_t frame_count, double *times);

@@ -39,7 +39,7 @@ typedef struct {
     ath_coder coder; /* of a stream that is decoded for budgets */
     rest_layer layer;
     int32_t has_copies, next; /* next: the branch to code, or the place in the mesh's order */
-    int32_t shape, filled;    /* last branch whose role is a shape; vertices of a mesh filled from their places */
+    int32_t shape;            /* last branch whose role is a shape */
     number_model bent;        /* steps of single vertices of SOURCE_REST */
     uint32_t bent_mean[3];
     union {
@@ -309,14 +309,14 @@ static int is_untouched(const ath_mesh *mesh, const ath_branch *branch, int32_t 
 enum { VERTEX_COST = 16 }; /* vertex-frames that coding a vertex takes */
 
 /* Codes vertices in the order of the mesh about their neighbours. A vertex without known neighbours is coded as on a
- * stem, since the places of all vertices before it are known. */
+ * stem, since all vertices before it are known. */
 static int code_connected_rest(ath_coder *coder, rest_model *model, const double *source, int32_t *cost)
 {
     const rest_layer *layer = &model->layer;
     const ath_branch *branches = layer->branches, *branch = branches;
     ath_mesh *mesh = layer->mesh;
     double *rest = layer->rest, own = rest_step(branch, layer->step);
-    for (; model->next < mesh->place_count; model->next++) {
+    for (; model->next < mesh->vertex_count; model->next++) {
         int32_t t = model->next, v = mesh->order[t];
         if (!ath_spend(cost, VERTEX_COST)) return ATH_MORE;
         if (mesh->from[v] == OF_COPY) continue;
@@ -329,10 +329,6 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const double
         rest_ring ring;
         rest_guess at;
         rest_ring_of(mesh, rest, v, &ring);
-        if (ring.base < 0) {
-            fill_places(mesh, model->filled, v, rest);
-            model->filled = v;
-        }
         if (model->has_copies && ring.base < 0 && is_untouched(mesh, branch, v, t)) {
             int32_t b = (int32_t)(branch - branches);
             int32_t role = code_part(coder, model, layer, branches, b, step_here, source, rest);
@@ -351,7 +347,6 @@ static int code_connected_rest(ath_coder *coder, rest_model *model, const double
         rest_look_beside(predictor, mesh, &ring, rest, layer->before, v, 1.0 / unit, &at);
         code_expected_vertex(coder, model, layer, branch, predictor, &at, v, unit, source, rest);
     }
-    fill_places(mesh, model->filled, mesh->vertex_count, rest);
     return 1;
 }
 
@@ -375,7 +370,7 @@ static void start_rest(ath_coder *coder, rest_model *model)
     rest_model_init(model, layer->coarse != 0);
     model->has_copies = !layer->coarse && coder_bit(coder, &model->copies.any, layer->shape_of != 0);
     model->shape = -1;
-    model->next = model->filled = 0;
+    model->next = 0;
     for (int32_t v = 0; layer->mesh && v < layer->mesh->vertex_count; v++) layer->mesh->from[v] = -1;
 }
 

@@ -61,13 +61,6 @@ static void rest_ring_of(const ath_mesh *mesh, const double *rest, int32_t v, re
     }
 }
 
-/* Gives vertices `first` to `stop` - 1 the positions of their places. */
-static void fill_places(const ath_mesh *mesh, int32_t first, int32_t stop, double *rest)
-{
-    for (int32_t v = first; v < stop; v++)
-        for (size_t k = 0; k < 3; k++) rest[3 * (size_t)v + k] = rest[3 * (size_t)mesh->same[v] + k];
-}
-
 /* before: the rest pose of the layer before, or null. */
 static void rest_look_beside(rest_predictor *predictor, const ath_mesh *mesh, const rest_ring *ring, const double *rest,
                              const double *before, int32_t v, double per_unit, rest_guess *at)

@@ -27,23 +27,20 @@ static void predict_rest(const ath_branch *branch, const double *rest, int32_t i
 static int code_connected_exact_rest(ath_coder *coder, exact_model *model, const ath_branch *branches,
                                      const ath_mesh *mesh, int is_float64, double *rest)
 {
-    int32_t length[3] = {0, 0, 0}, filled = 0;
+    int32_t length[3] = {0, 0, 0};
     const ath_branch *branch = branches;
-    for (int32_t t = 0; t < mesh->place_count; t++) {
+    for (int32_t t = 0; t < mesh->vertex_count; t++) {
         int32_t v = mesh->order[t];
         double predicted[3];
         rest_ring ring;
         rest_ring_of(mesh, rest, v, &ring);
         const double *expected = ring.parallelograms > 0 ? ring.mean : ring.neighbours > 0 ? ring.middle : predicted;
         if (ring.base < 0) {
-            fill_places(mesh, filled, v, rest);
-            filled = v;
             while (v >= branch->first + branch->count) branch++;
             predict_rest(branch, rest, v - branch->first, predicted);
         }
         if (!code_exact_point(coder, model, is_float64, expected, length, rest + 3 * (size_t)v)) return 0;
     }
-    fill_places(mesh, filled, mesh->vertex_count, rest);
     return 1;
 }
 

@@ -235,7 +235,7 @@ def code_predicted_segment(
     payload, decoded = _predicted(prelude, choice, positions)
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
-        return position_errors(shown, positions, prelude.origin, plan.pool, shown_times)
+        return position_errors(shown, positions, prelude.origin, plan.pool, shown_times, prelude.shares)
 
     last = plan.level_count - 1
     chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])

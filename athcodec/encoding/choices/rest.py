@@ -43,7 +43,7 @@ def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
 def candidates(source: Source, ath: Ath, settings: Settings) -> list[Settings]:
     """Return the settings with all predictors of the rest pose, connected or not, with copies and without."""
     best = lags(source, settings.rest_step, settings.details)
-    settings = replace(settings, shape_of=None, lags=best, connected_rest=False, welded_rest=False)
+    settings = replace(settings, shape_of=None, lags=best, connected_rest=False)
     if source.reference_is_exact:
         return [settings, *_connected(source, settings)]
     tried = [settings, *_other_lags(source, settings), *_connected(source, settings)]
@@ -73,7 +73,7 @@ def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settin
     if source.mesh is None or source.host_rest:
         return settings
     size = judge(source, ath, poses_size)
-    connected = min(_by_faces(source, settings), key=size)
+    connected = replace(settings, connected_rest=True)
     share = 1.0 if source.reference_is_exact else CONNECTED_SHARE
     return connected if size(connected) < share * size(settings) else settings
 
@@ -118,13 +118,7 @@ def _connected(source: Source, settings: Settings) -> list[Settings]:
     if source.mesh is None or source.host_rest:
         return []
     tried = (settings.lags, np.ones_like(settings.lags))
-    return [by_faces for lag in tried for by_faces in _by_faces(source, replace(settings, lags=lag))]
-
-
-def _by_faces(source: Source, settings: Settings) -> list[Settings]:
-    """Return the settings with a rest pose that goes by faces, and if vertices share places, welded as well."""
-    welded = [False] if source.welded_mesh is None else [False, True]
-    return [replace(settings, connected_rest=True, welded_rest=some) for some in welded]
+    return [replace(settings, lags=lag, connected_rest=True) for lag in tried]
 
 
 def _with_copies(source: Source, ath: Ath, tried: list[Settings]) -> list[Settings]:

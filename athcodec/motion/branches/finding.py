@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -75,6 +75,8 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
         if first.method == "skeleton":
             yield dataclasses.replace(first, stem_index=None)
         if first.method == "components":
+            if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
+                yield arranged(seen, seen.parts, None, "components")
             unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
             if len(unwelded.branch_parent) != len(first.branch_parent):
                 yield unwelded
@@ -129,10 +131,9 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
     """Find branches by labels under a usual name, for vertices or faces, and their parents if the source has those
     too."""
     clip = seen.clip
-    source = {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): name for name in clip.attributes}
+    source = _plain_names(clip)
     named = {name: clip.attributes[original] for name, original in source.items()}
-    candidates = ((name, _vertex_labels(clip, named.get(name))) for name in LABEL_NAMES)
-    taken, labels = next(((name, label) for name, label in candidates if label is not None), ("", None))
+    taken, labels = _named_labels(clip, named)
     if labels is None:
         return None
     names, vertex_branch = np.unique(labels, return_inverse=True)
@@ -141,6 +142,22 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
         above = parents[names].astype(np.int64)
         parent = np.where(np.isin(above, names), np.searchsorted(names, above).clip(0, len(names) - 1), -1)
     return dataclasses.replace(arranged(seen, vertex_branch, root, "attributes", parent), taken=source[taken])
+
+
+def _plain_names(clip: MotionClip) -> dict[str, str]:
+    """Return the names of the arrays by their last words in lower case."""
+    return {name.lower().rsplit("/", 1)[-1].replace("primvars:", ""): name for name in clip.attributes}
+
+
+def _named_labels(clip: MotionClip, named: Mapping[str, np.ndarray]) -> tuple[str, np.ndarray | None]:
+    """Return the first of the arrays under a usual name of branch numbers, and the number of each vertex, (N,)."""
+    candidates = ((name, _vertex_labels(clip, named.get(name))) for name in LABEL_NAMES)
+    return next(((name, label) for name, label in candidates if label is not None), ("", None))
+
+
+def named_labels(clip: MotionClip) -> np.ndarray | None:
+    """Return the number of the branch of each vertex that an array of the source names, (N,); None: none does."""
+    return _named_labels(clip, {name: clip.attributes[original] for name, original in _plain_names(clip).items()})[1]
 
 
 def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
+from athcodec.motion.places import Places
 
 SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
 AFFINE_ERROR = 1e-4  # Part of the diagonal that parts may be off one affine map.
@@ -36,7 +37,21 @@ class Seen:
     @cached_property
     def links(self) -> np.ndarray:
         """The links of `mesh`, and those between vertices that stay at one place."""
-        return _welded(self.clip, self.mesh)
+        return np.concatenate([self.mesh, self._pairs])
+
+    @cached_property
+    def _pairs(self) -> np.ndarray:
+        """Pairs of vertices that stay at one place."""
+        return _pairs_at_one_place(self.clip)
+
+    @cached_property
+    def parts(self) -> np.ndarray | None:
+        """Labels of what sides of faces join, (N,); None: it is no mesh of faces alone, or single points join nothing
+        that sides do not."""
+        count = self.clip.vertex_count
+        label = parts_by_sides(self.clip, Places(components(self._pairs, count)))
+        welded = components(self.links, count)
+        return None if label is None or label.max() == welded.max() else label
 
 
 def links_of(clip: MotionClip) -> np.ndarray:
@@ -114,8 +129,33 @@ def copies_of(clip: MotionClip) -> np.ndarray:
     return np.where(np.repeat(copies > 1, counts), np.repeat(np.arange(1, len(each) + 1), each), 0)
 
 
-def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
-    """Return `links`, and links between vertices that stay at the same place: seams of a mesh split for its normals."""
+def parts_by_sides(clip: MotionClip, places: Places) -> np.ndarray | None:
+    """Return labels of the parts of a mesh whose faces join each other along sides, (N,), and not just at a point. A
+    vertex of several parts is of the largest. None: it is no mesh of faces alone."""
+    if clip.polygons is None or clip.edges is not None or copies_of(clip).any():
+        return None
+    counts, corners = (array.astype(np.int64) for array in clip.polygons)
+    if not len(corners):
+        return None
+    face, following = np.repeat(np.arange(len(counts)), counts), np.arange(1, len(corners) + 1)
+    ends = np.cumsum(counts)
+    following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
+    at = places.of_vertex[corners]
+    sides = np.sort(np.stack([at, at[following]], axis=1), axis=1)
+    order = np.lexsort(sides.T)
+    same = np.flatnonzero((sides[order[1:]] == sides[order[:-1]]).all(axis=1))
+    of_face = components(np.stack([face[order[same]], face[order[same + 1]]], axis=1), len(counts))
+    size = np.bincount(of_face[face], minlength=of_face.max() + 1)
+    label = np.full(clip.vertex_count, -1)
+    largest_last = np.argsort(size[of_face[face]], kind="stable")
+    label[corners[largest_last]] = of_face[face[largest_last]]
+    bare = label < 0
+    label[bare] = len(size) + places.of_vertex[bare]
+    return numbered(label)
+
+
+def _pairs_at_one_place(clip: MotionClip) -> np.ndarray:
+    """Return pairs of vertices that stay at the same place, (L, 2): seams of a mesh split for its normals."""
     rest = clip.rest
     last = clip.block(clip.frame_count - 1, clip.frame_count)[0].astype(np.float64)
     middle = clip.block(clip.frame_count // 2, clip.frame_count // 2 + 1)[0].astype(np.float64)
@@ -124,7 +164,7 @@ def _welded(clip: MotionClip, links: np.ndarray) -> np.ndarray:
     order = np.lexsort(cells.T)
     copy = copies_of(clip)[order]
     same = np.flatnonzero((cells[order[1:]] == cells[order[:-1]]).all(axis=1) & (copy[1:] == copy[:-1]))
-    return np.concatenate([links, np.stack([order[same], order[same + 1]], axis=1)])
+    return np.stack([order[same], order[same + 1]], axis=1)
 
 
 def components(links: np.ndarray, vertex_count: int) -> np.ndarray:

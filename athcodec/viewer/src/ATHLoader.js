@@ -227,27 +227,34 @@ class Channel {
   }
 
   #partOfVertices({ nodeCount, exactCount, branch, first, count, index }, texels) {
-    const out = new Float32Array(this.info.vertexCount), stride = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
+    const out = new Float32Array(this.info.placeCount), stride = exactCount > 0 ? (texels - 3 * nodeCount) / exactCount : 1;
     for (let part = 0; part < branch.length; part++)
       for (let i = 0; i < count[part]; i++)
-        out[this.vertexSource[first[part] + i]] = branch[part] >= 0 ? 1 + 3 * index[part]
-          : -(1 + 3 * nodeCount + stride * (index[part] + i));
-    return out;
+        out[first[part] + i] = branch[part] >= 0 ? 1 + 3 * index[part] : -(1 + 3 * nodeCount + stride * (index[part] + i));
+    return this.#ofVertices(out);
+  }
+
+  // Numbers of the vertices in source order, by those of their places in file order.
+  #ofVertices(numbers) {
+    return numbers.constructor.from(this.vertexPlaces, (place) => numbers[place]);
   }
 
   // The branch that a vertex moves with: that of its node, or its own where its position is exact.
   nodeNumbers({ parts: { branch, first, count } }) {
-    const out = this.vertexBranch;
+    const out = this.#branchOfPlaces();
     for (let part = 0; part < branch.length; part++)
-      for (let i = 0; branch[part] >= 0 && i < count[part]; i++) out[this.vertexSource[first[part] + i]] = branch[part];
-    return out;
+      if (branch[part] >= 0) out.fill(branch[part], first[part], first[part] + count[part]);
+    return this.#ofVertices(out);
   }
 
   /** Number (file order) of the branch of every vertex, in source order. */
   get vertexBranch() {
-    const { branches: { first, count }, vertexSource } = this, out = new Int32Array(vertexSource.length);
-    for (let b = 0; b < first.length; b++)
-      for (let i = first[b]; i < first[b] + count[b]; i++) out[vertexSource[i]] = b;
+    return this.#ofVertices(this.#branchOfPlaces());
+  }
+
+  #branchOfPlaces() {
+    const { branches: { first, count } } = this, out = new Int32Array(this.info.placeCount);
+    for (let b = 0; b < first.length; b++) out.fill(b, first[b], first[b] + count[b]);
     return out;
   }
 

@@ -114,7 +114,7 @@ export class ATHForest extends Group {
     const { motion, channel } = this.#ath, { limits } = this.#device, numbers = new Float32Array(8 * Math.max(1, instances.length));
     this.#forget();
     const clipOf = (name) => this.#clip(name) ?? motion.clip, clips = new Set(instances.map(({ clip }) => clipOf(clip)));
-    const most = Math.floor(limits.maxStorageBufferBindingSize / (12 * SLOTS * channel.info.vertexCount) / Math.max(1, clips.size));
+    const most = Math.floor(limits.maxStorageBufferBindingSize / (12 * SLOTS * channel.info.placeCount) / Math.max(1, clips.size));
     const phases = Math.max(1, Math.min(this.phases, most)), plants = new Map();
     const plantOf = (clip, seconds = 0) => {
       const round = roundOf(clip) || 1, phase = Math.floor(((seconds / round) % 1 + 1) % 1 * phases), key = clip.index * phases + phase;
@@ -220,7 +220,7 @@ export class ATHForest extends Group {
     const passes = new Passes(this.#device, this.#kernels, words, { slots: SLOTS * shown, shown, vertices: this.#bufferOf(shared) });
     const own = { level, passes, shared, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
       slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
-    if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel.vertexSource));
+    if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel));
     for (const clip of this.#motions.keys()) {
       if (!await this.#upload(own, clip, is)) {
         passes.dispose();
@@ -284,7 +284,7 @@ export class ATHForest extends Group {
     const list = this.#shapes.length;
     if (list === MOST_SHAPES) return;
     const geometry = this.#shape(simple, tolerance).clone(), { source } = simple.userData, lines = !geometry.hasAttribute("normal");
-    const place = inverse(this.#ath.channel.vertexSource), vertexOf = geometry.userData.vertices ?? source;
+    const place = this.#ath.channel.vertexPlaces, vertexOf = geometry.userData.vertices ?? source;
     geometry.setAttribute("athVertex", new BufferAttribute(Uint32Array.from(vertexOf, (vertex) => place[vertex]), 1));
     geometry.setAttribute("position", new BufferAttribute(Float32Array.from({ length: 3 * vertexOf.length },
       (_, i) => this.#ath.rest[3 * vertexOf[Math.floor(i / 3)] + i % 3]), 3)); // the rest pose: not what rays find
@@ -472,16 +472,10 @@ export class ATHForest extends Group {
   }
 }
 
-function inverse(source) {
-  const place = new Uint32Array(source.length);
-  source.forEach((vertex, i) => { place[vertex] = i; });
-  return place;
-}
-
 // Corners that vertices.wgsl takes normals from: see `corners_of` in athcodec/gpu.
-function cornersOf(geometry, vertexSource) {
-  const place = inverse(vertexSource), index = Uint32Array.from(geometry.index.array, (i) => place[geometry.userData.source[i]]);
-  const count = vertexSource.length, next = new Uint32Array(count + 1), out = new Uint32Array(count + 1 + 2 * index.length);
+function cornersOf(geometry, { vertexPlaces, info: { placeCount: count } }) {
+  const index = Uint32Array.from(geometry.index.array, (i) => vertexPlaces[geometry.userData.source[i]]);
+  const next = new Uint32Array(count + 1), out = new Uint32Array(count + 1 + 2 * index.length);
   for (const vertex of index) next[vertex + 1]++;
   for (let v = 0; v < count; v++) next[v + 1] += next[v];
   for (let v = 0; v <= count; v++) out[v] = count + 1 + 2 * next[v];

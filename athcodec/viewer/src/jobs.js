@@ -100,9 +100,9 @@ export class Jobs {
   #keep(segment) {
     this.#tell.kept(segment);
     this.#use(segment);
-    const { frameCount, segmentCount, vertexCount } = this.#file.info;
+    const { frameCount, segmentCount, placeCount } = this.#file.info;
     const shown = [...this.#views.values()].reduce((sum, { frames }) => sum + frames.length, 0);
-    const most = Math.max(6, 2 * shown + 2, Math.floor(MOST_PREPARED / (16 * vertexCount * (frameCount / segmentCount))));
+    const most = Math.max(6, 2 * shown + 2, Math.floor(MOST_PREPARED / (16 * placeCount * (frameCount / segmentCount))));
     const wanted = new Set(Array.from(this.#jobs(), (job) => job.join("/")));
     for (const [oldest, old] of this.#prepared) {
       if (this.#prepared.size <= most) break;

@@ -58,7 +58,7 @@ export class Session {
     this.#texels = new Texels(file, statics.faces);
     this.#post({
       type: "opened", info: { ...info, levelNames }, statics, rest: this.#texels.rest, times: file.times(), branches: file.branches(),
-      vertexSource: file.vertexSource(), branchSource: file.branchSource(), clips, first,
+      vertexSource: file.vertexSource(), vertexPlaces: file.vertexPlaces(), branchSource: file.branchSource(), clips, first,
       chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
       segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),
     });

@@ -108,7 +108,7 @@ function derivedEdges(file) {
     before[first[b]] = attach[b];
     for (let i = first[b] + 1; i < first[b] + count[b]; i++) before[i] = i - 1;
   }
-  const previous = new Int32Array(source.length);
+  const previous = new Int32Array(file.info.vertexCount).fill(-1);
   source.forEach((vertex, i) => { previous[vertex] = before[i] < 0 ? -1 : source[before[i]]; });
   const edges = [];
   previous.forEach((u, v) => { if (u >= 0) edges.push(u, v); });

@@ -8,23 +8,26 @@ export const BLENDED = -1; // In place of a level: all vertices are exact, as bl
 const REFINED_REST = 0x15;
 
 export class Texels {
-  #file; #faces; #order;
+  #file; #order; #places;
+  #faces = null; // By places in file order.
   #parts = new Map();
   #finerRest; // The rest pose is level 0's, and levels above have another.
   #restNormals = null;
 
   constructor(file, faces) {
     this.#file = file;
-    this.#faces = faces;
     this.#order = file.vertexSource();
-    const exactCount = file.info.vertexCount, [none, zero, all] = [-1, 0, exactCount].map((number) => Int32Array.of(number));
+    this.#places = file.vertexPlaces();
+    this.faces = faces;
+    const exactCount = file.info.placeCount, [none, zero, all] = [-1, 0, exactCount].map((number) => Int32Array.of(number));
     this.#parts.set(BLENDED, { nodeCount: 0, exactCount, branch: none, first: zero, count: all, index: zero });
     this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
     this.rest = this.refine(file.readyLevel(0)) ?? file.levelRest(0);
   }
 
+  // All vertices of a place turn alike, and so do their normals.
   set faces(faces) {
-    this.#faces = faces;
+    this.#faces = faces && { ...faces, array: Int32Array.from(faces.array, (vertex) => this.#places[Number(vertex)]) };
     this.#restNormals = null;
   }
 
@@ -56,13 +59,20 @@ export class Texels {
     return this.#fill(this.#room(level, buffer), 0, shown, level);
   }
 
-  /** Returns the texture of positions, all vertices as exact ones. */
+  /** Returns the texture of positions in source order, all vertices as exact ones. */
   packExact(xyz, buffer) {
-    const data = this.#room(BLENDED, buffer), source = this.#order, stride = this.#faces ? 8 : 4;
-    for (let i = 0, to = 0; i < source.length; i++, to += stride)
-      for (let k = 0; k < 3; k++) data[to + k] = xyz[3 * source[i] + k];
-    if (this.#faces) this.#fillTurns(data, 0, BLENDED, xyz);
+    const data = this.#room(BLENDED, buffer), shown = this.#inFileOrder(xyz), stride = this.#faces ? 8 : 4;
+    for (let from = 0, to = 0; from < shown.length; from += 3, to += stride) data.set(shown.subarray(from, from + 3), to);
+    if (this.#faces) this.#fillTurns(data, 0, BLENDED, shown);
     return data;
+  }
+
+  #inFileOrder(xyz) {
+    const out = new Float32Array(3 * this.#order.length);
+    this.#order.forEach((vertex, i) => {
+      for (let k = 0; k < 3; k++) out[3 * i + k] = xyz[3 * vertex + k];
+    });
+    return out;
   }
 
   /** Returns every `step`-th frame of a clip at a level, one behind the other: what a forest plays. shownAt: what shows a frame. */
@@ -92,18 +102,18 @@ export class Texels {
       data[to + 1] = exact[from++];
       data[to + 2] = exact[from++];
     }
-    if (this.#faces) this.#fillTurns(data, exactAt, level, this.#file.positions(segments, frame, { fade }));
+    if (this.#faces) this.#fillTurns(data, exactAt, level, this.#file.positions(segments, frame, { fade, order: "file" }));
     return data;
   }
 
-  // How the normal of every exact vertex has turned since the rest pose.
+  // How the normal of every exact vertex has turned since the rest pose. positions: in file order.
   #fillTurns(data, at, level, positions) {
-    this.#restNormals ??= normals(this.rest, this.#faces);
+    this.#restNormals ??= normals(this.#inFileOrder(this.rest), this.#faces);
     const { branch, first, count, index } = this.parts(level), now = normals(positions, this.#faces);
     for (let part = 0; part < branch.length; part++) {
       if (branch[part] >= 0) continue;
       for (let i = 0; i < count[part]; i++)
-        turns(this.#restNormals, now, this.#order[first[part] + i], data, at + 8 * (index[part] + i) + 4);
+        turns(this.#restNormals, now, first[part] + i, data, at + 8 * (index[part] + i) + 4);
     }
   }
 }
