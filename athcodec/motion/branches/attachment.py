@@ -1,7 +1,8 @@
 """A tree over labelled vertices, and the order of the vertices along each branch.
 
-A branch hangs on one of those that it stays close to in a few frames, or is a root, whichever takes the fewest bits
-(price.py). Its vertices are put in order of their distance over the mesh from there.
+A branch hangs where it stays closest to a larger one in a few frames; or, for an encoder, on one of those that it is
+close to, or nowhere, whichever takes the fewest bits (price.py). Its vertices are put in order of their distance over
+the mesh from there.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ QUERY = 1 << 21  # Neighbours in one query.
 STAYING = 300.0  # Weight of the variation of two branches' distance against its size.
 RELATED = 0.5  # Cost factor for each word that the names of two branches have in common, place by place.
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
+ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
 MOST_STRAIN = 30.0  # Bits at most that a contact costs because it is far or does not stay.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
@@ -43,7 +45,8 @@ def arranged(
     relatives share the first."""
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
-        joints = _joints(frames, label, _contacts(frames, label, names), root)
+        arrange = _joints_by_price if seen.by_price else _joints_by_contact
+        joints = arrange(frames, label, _contacts(frames, label, names), root)
     else:
         joints = _joints_of(rest, frames, label, parent)
     return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
@@ -66,7 +69,7 @@ class _Contacts:
     cost: np.ndarray
 
 
-def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
     """Return the forest of branches that takes the fewest bits: each hangs where it costs least, or is a root. root: a
     vertex of the only root, as far as contacts lead to it."""
     prices, count = Prices(frames, label), int(label.max()) + 1
@@ -88,6 +91,35 @@ def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: in
     return _Joints(above, base)
 
 
+def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+    """Return a tree of branches of the least total cost, from a root outwards, for each part that contacts join: what
+    grows on what, as far as a mesh shows it."""
+    count = int(label.max()) + 1
+    branch, other = label[contacts.vertices].T
+    sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
+    least = contacts.cost.max(initial=1e-30) * 1e-9  # A cost of 0 would be no contact.
+    graph = sparse.coo_matrix((contacts.cost + least, (branch, other)), (count, count)).tocsr()
+    tree = graphs.minimum_spanning_tree(graph)
+    parts = graphs.connected_components(tree, directed=False)[1]
+    still = _stillest(frames, label)
+    roots = _roots(frames, label, still, parts, root)
+    hub = sparse.coo_matrix((np.ones(len(roots)), (np.full(len(roots), count), roots)), (count + 1, count + 1))
+    whole = sparse.bmat([[tree, None], [None, sparse.coo_matrix((1, 1))]]) + hub
+    parent = graphs.breadth_first_order(whole, count, directed=False)[1][:count]
+    parent = np.where(parent == count, -1, parent)
+    return _Joints(parent, _bases(parent, still, branch, other, contacts.vertices))
+
+
+def _bases(
+    parent: np.ndarray, still: np.ndarray, branch: np.ndarray, other: np.ndarray, vertices: np.ndarray
+) -> np.ndarray:
+    base = still.copy()
+    for child, above, vertex in ((branch, other, vertices[:, 0]), (other, branch, vertices[:, 1])):
+        hangs = parent[child] == above
+        base[child[hangs]] = vertex[hangs]
+    return base
+
+
 def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: np.ndarray) -> _Joints:
     """Return where branches touch the parents that they are known to have."""
     tree_of: dict[int, Any] = {}
@@ -107,6 +139,19 @@ def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
     way = ((frames - frames[0]) ** 2).sum(axis=(0, 2))
     order = np.lexsort((way, label))
     return order[np.searchsorted(label[order], np.arange(label.max() + 1))]
+
+
+def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
+    """Return the branch of each part, among the large ones, of which some vertex moves least."""
+    size = _sizes(frames[0], label)
+    largest = np.zeros(parts.max() + 1)
+    np.maximum.at(largest, parts, size)
+    way = ((frames[:, still] - frames[0, still]) ** 2).sum(axis=(0, 2))
+    is_small = size < ROOT_SIZE * largest[parts]
+    if root is not None:
+        way[label[root]], is_small[label[root]] = -1.0, False
+    order = np.lexsort((-size, way, is_small, parts))
+    return order[np.unique(parts[order], return_index=True)[1]]
 
 
 def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:

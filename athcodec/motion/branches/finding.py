@@ -58,7 +58,7 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
     that stands still has none."""
-    seen = Seen(clip)
+    seen = Seen(clip, by_price=True)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
     by_points = by_points and not still
@@ -71,6 +71,7 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     if first is not None and first.method == "objects":  # What hangs on a part that grows may move more simply alone.
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
         yield first
+        yield _by_contact(seen, first)
         other = _first_found(seen, METHODS[METHODS.index("objects") + 1 : -1], None)
         if other is not None:
             yield other
@@ -83,9 +84,10 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     yield single
     if first is not None:
         yield first
-    yield _by_motion(seen, None)
+    grown = Seen(clip)  # Patches of one mesh hang on each other.
+    yield _by_motion(grown, None)
     is_large = clip.vertex_count >= LARGE_MESH
-    yield _by_motion(seen, None, LARGE_PATCH if is_large else SMALL_PATCH)
+    yield _by_motion(grown, None, LARGE_PATCH if is_large else SMALL_PATCH)
     for size in FREE_PATCHES[-1:] if is_large else FREE_PATCHES:
         yield _free_patches(seen, size)
 
@@ -100,6 +102,8 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
     has_many_roots = MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent)
     if first.method == "components" and has_many_roots:
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
+    if first.method == "components" and roots > 1:
+        yield _by_contact(seen, first)
     yield dataclasses.replace(first, stem_index=None)
     if first.method == "components":
         if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
@@ -109,13 +113,19 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
             yield unwelded
 
 
+def _by_contact(seen: Seen, first: Found) -> Found:
+    """Return the same branches where they grow, as far as contacts show it."""
+    found = _FINDERS[first.method](Seen(seen.clip), None)
+    return first if found is None else found
+
+
 def _in_order(seen: Seen) -> Iterator[Found]:
     """Yield parts of points that nothing joins whose vertices follow each other in the source, as programs write them.
     The next one belongs to another part where the two do not keep their distance, or are far from each other, too:
     what stands in the ground keeps its distance from the feet around it."""
-    if len(seen.mesh):
-        return
     frames, count = seen.frames[1:], seen.clip.vertex_count
+    if len(seen.mesh) or count < 2:
+        return
     way = frames[:, 1:] - frames[:, :-1]
     apart = np.linalg.norm(way, axis=2)
     moved = np.sqrt(((way - way.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
@@ -124,7 +134,7 @@ def _in_order(seen: Seen) -> Iterator[Found]:
     is_far = apart.mean(axis=0) > FAR_NEXT * np.quantile(apart.mean(axis=0), 1 - PARTS_IN_ORDER)
     before = 0
     for begins in (is_unsteady, is_unsteady | is_far):
-        parts = np.count_nonzero(begins) + 1
+        parts = int(np.count_nonzero(begins)) + 1
         if before < parts <= PARTS_IN_ORDER * count and parts > 1:
             label = np.append(0, np.cumsum(begins))
             yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)

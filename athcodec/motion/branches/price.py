@@ -1,6 +1,6 @@
 """About how many bits the motion of a branch takes on each other one, and as a root.
 
-A branch takes the bits of what is left of the motion of a few of its vertices once its parent's motion is taken off: the
+A branch takes the bits of what is left of the motion of a few of its vertices once its parent's is taken off: the
 way of the vertex that it hangs on, with the turn of the parent or without. Motion is written in the components that all
 branches' motion over time has (Karhunen-Loeve), since the encoder learns such bases, too.
 """
