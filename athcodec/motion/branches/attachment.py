@@ -1,7 +1,8 @@
 """A tree over labelled vertices, and the order of the vertices along each branch.
 
-A branch hangs where it stays closest to a larger one in a few frames. Its vertices are put in order of their distance
-over the mesh from there.
+A branch hangs where it stays closest to a larger one in a few frames; or, for an encoder, on one of those that it is
+close to, or nowhere, whichever takes the fewest bits (price.py). Its vertices are put in order of their distance over
+the mesh from there.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from athcodec.motion.branches.forest import cheapest_forest
 from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import Seen, cheapest_of_each, components
 from athcodec.motion.clip import source_stem_index
@@ -25,6 +28,7 @@ STAYING = 300.0  # Weight of the variation of two branches' distance against its
 RELATED = 0.5  # Cost factor for each word that the names of two branches have in common, place by place.
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
 ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
+MOST_STRAIN = 30.0  # Bits at most that a contact costs because it is far or does not stay.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
 
@@ -41,7 +45,8 @@ def arranged(
     relatives share the first."""
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
-        joints = _joints(frames, label, _contacts(frames, label, names), root)
+        arrange = _joints_by_price if seen.by_price else _joints_by_contact
+        joints = arrange(frames, label, _contacts(frames, label, names), root)
     else:
         joints = _joints_of(rest, frames, label, parent)
     return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
@@ -64,8 +69,31 @@ class _Contacts:
     cost: np.ndarray
 
 
-def _joints(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
-    """Return a tree of branches of the least total cost, from a root outwards, for each part that contacts join."""
+def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+    """Return the forest of branches that takes the fewest bits: each hangs where it costs least, or is a root. root: a
+    vertex of the only root, as far as contacts lead to it."""
+    prices, count = Prices(frames, label), int(label.max()) + 1
+    vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
+    child, parent = label[vertices].T
+    strained = np.tile(contacts.cost, 2) / np.maximum(_sizes(frames[0], label)[child], np.finfo(float).tiny)
+    hanging = prices.on_others(vertices) + np.minimum(strained, MOST_STRAIN)
+    alone = prices.as_roots()
+    if root is not None:
+        alone += hanging.sum() + alone.sum()
+        alone[label[root]] = 0.0
+    every = np.arange(count)
+    chosen = cheapest_forest(
+        *(count, np.append(child, every), np.append(parent, np.full(count, count)), np.append(hanging, alone))
+    )
+    hangs = chosen < len(child)
+    base, above = _stillest(frames, label), np.full(count, -1)
+    base[hangs], above[hangs] = vertices[chosen[hangs], 0], parent[chosen[hangs]]
+    return _Joints(above, base)
+
+
+def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+    """Return a tree of branches of the least total cost, from a root outwards, for each part that contacts join: what
+    grows on what, as far as a mesh shows it."""
     count = int(label.max()) + 1
     branch, other = label[contacts.vertices].T
     sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")

@@ -33,6 +33,11 @@ COMPONENTS_AT_MOST = 0.6  # Part of the vertices above which components are no b
 PATCH_VERTICES = 150  # Average vertices of a patch in a mesh without other branches.
 SMALL_PATCH, LARGE_PATCH = 40, 600  # Sizes of patches, one of which is tried besides.
 LARGE_MESH = 10_000  # Vertices from which on LARGE_PATCH is the one.
+MANY_ROOTS = 0.25  # Part of the branches that are roots from which on all are tried as such.
+STEADY_NEXT = 0.2  # Change of the distance of two vertices, over their motion, above which they are of two parts.
+FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are of two parts.
+STILL = 1e-6  # Of the diagonal: change of a distance that is none.
+PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the source says nothing.
 FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
@@ -53,7 +58,7 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
     that stands still has none."""
-    seen = Seen(clip)
+    seen = Seen(clip, by_price=True)
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
     by_points = by_points and not still
@@ -66,29 +71,74 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     if first is not None and first.method == "objects":  # What hangs on a part that grows may move more simply alone.
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
         yield first
+        yield _by_contact(seen, first)
         other = _first_found(seen, METHODS[METHODS.index("objects") + 1 : -1], None)
         if other is not None:
             yield other
         return
     if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
         yield first
-        if first.method == "skeleton":
-            yield dataclasses.replace(first, stem_index=None)
-        if first.method == "components":
-            if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
-                yield arranged(seen, seen.parts, None, "components")
-            unwelded = pieces(clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
-            if len(unwelded.branch_parent) != len(first.branch_parent):
-                yield unwelded
+        yield from _others(seen, first)
         return
+    yield from _in_order(seen)
     yield single
     if first is not None:
         yield first
-    yield _by_motion(seen, None)
+    grown = Seen(clip)  # Patches of one mesh hang on each other.
+    yield _by_motion(grown, None)
     is_large = clip.vertex_count >= LARGE_MESH
-    yield _by_motion(seen, None, LARGE_PATCH if is_large else SMALL_PATCH)
+    yield _by_motion(grown, None, LARGE_PATCH if is_large else SMALL_PATCH)
     for size in FREE_PATCHES[-1:] if is_large else FREE_PATCHES:
         yield _free_patches(seen, size)
+
+
+def _others(seen: Seen, first: Found) -> Iterator[Found]:
+    """Yield alternatives to branches that are not found by motion alone."""
+    roots = np.count_nonzero(first.branch_parent < 0)
+    if first.method == "runs":
+        yield from _in_order(seen)
+    if first.method not in ("skeleton", "components"):
+        return
+    has_many_roots = MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent)
+    if first.method == "components" and has_many_roots:
+        yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
+    if first.method == "components" and roots > 1:
+        yield _by_contact(seen, first)
+    yield dataclasses.replace(first, stem_index=None)
+    if first.method == "components":
+        if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
+            yield arranged(seen, seen.parts, None, "components")
+        unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+        if len(unwelded.branch_parent) != len(first.branch_parent):
+            yield unwelded
+
+
+def _by_contact(seen: Seen, first: Found) -> Found:
+    """Return the same branches where they grow, as far as contacts show it."""
+    found = _FINDERS[first.method](Seen(seen.clip), None)
+    return first if found is None else found
+
+
+def _in_order(seen: Seen) -> Iterator[Found]:
+    """Yield parts of points that nothing joins whose vertices follow each other in the source, as programs write them.
+    The next one belongs to another part where the two do not keep their distance, or are far from each other, too:
+    what stands in the ground keeps its distance from the feet around it."""
+    frames, count = seen.frames[1:], seen.clip.vertex_count
+    if len(seen.mesh) or count < 2:
+        return
+    way = frames[:, 1:] - frames[:, :-1]
+    apart = np.linalg.norm(way, axis=2)
+    moved = np.sqrt(((way - way.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
+    still = STILL * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
+    is_unsteady = apart.std(axis=0) > STEADY_NEXT * moved + still
+    is_far = apart.mean(axis=0) > FAR_NEXT * np.quantile(apart.mean(axis=0), 1 - PARTS_IN_ORDER)
+    before = 0
+    for begins in (is_unsteady, is_unsteady | is_far):
+        parts = int(np.count_nonzero(begins)) + 1
+        if before < parts <= PARTS_IN_ORDER * count and parts > 1:
+            label = np.append(0, np.cumsum(begins))
+            yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)
+        before = parts
 
 
 def _leaves_many_alone(found: Found) -> bool:

@@ -17,10 +17,13 @@ WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of
 
 
 class Seen:
-    """Observations of a clip, each computed once, when it is asked for."""
+    """Observations of a clip, each computed once, when it is asked for.
 
-    def __init__(self, clip: MotionClip):
-        self.clip = clip
+    by_price: whether branches hang where they take the fewest bits, and not where they grow.
+    """
+
+    def __init__(self, clip: MotionClip, by_price: bool = False):
+        self.clip, self.by_price = clip, by_price
 
     @cached_property
     def frames(self) -> np.ndarray:

@@ -1,0 +1,49 @@
+"""The cheapest forest of a directed graph: every node hangs on another one or is a root, at the least total cost.
+
+Chu and Liu 1965, Edmonds 1967: every node takes its cheapest edge; cycles that this closes become single nodes, whose
+edges cost what they cost more than those of the cycle that they replace; and so on until there are no cycles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from athcodec.motion.branches.seen import cheapest_of_each
+
+
+def cheapest_forest(count: int, child: np.ndarray, parent: np.ndarray, cost: np.ndarray) -> np.ndarray:
+    """Return the number of the edge that each of `count` nodes takes, (count,).
+
+    child, parent, cost : (E,) arrays
+        Of edges; a node of parent `count` is a root, which every node needs to be able to be.
+    """
+    rounds: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    while True:
+        best = cheapest_of_each(child, cost)
+        is_in_cycle, name = _cycles(np.append(parent[best], count))
+        if not is_in_cycle.any():
+            break
+        cost = cost - np.where(is_in_cycle[child], cost[best][child], 0.0)
+        _, number = np.unique(name, return_inverse=True)  # The hub's, the largest, stays the largest.
+        kept = np.flatnonzero(number[child] != number[parent])
+        rounds.append((best, child, kept))
+        child, parent, cost, count = number[child][kept], number[parent][kept], cost[kept], int(number[-1])
+    for before, of_node, kept in reversed(rounds):
+        entering = kept[best]
+        best = before.copy()
+        best[of_node[entering]] = entering
+    return best
+
+
+def _cycles(above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which nodes are in cycles, and names, (count + 1,), which the nodes of a cycle share. above: of each node,
+    the last of which is its own."""
+    every, step = np.arange(len(above)), above
+    least = every
+    for _ in range(len(above).bit_length()):
+        least = np.minimum(least, least[step])
+        step = step[step]
+    is_in_cycle = np.zeros(len(above), bool)
+    is_in_cycle[step] = True  # What many steps lead to: cycles, all of which they reach, and the hub.
+    is_in_cycle[-1] = False
+    return is_in_cycle, np.where(is_in_cycle, least, every)

@@ -1,0 +1,83 @@
+"""About how many bits the motion of a branch takes on each other one, and as a root.
+
+A branch takes the bits of what is left of the motion of a few of its vertices once its parent's is taken off: the
+way of the vertex that it hangs on, with the turn of the parent or without. Motion is written in the components that all
+branches' motion over time has (Karhunen-Loeve), since the encoder learns such bases, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+STEP = 1e-4  # Of the diagonal: about the steps of quantisation, below which motion costs nothing.
+SHOWN = 3  # Vertices of a branch, far from each other, whose motion stands for its own.
+HANGING = 30.0  # Bits of hanging on anything: a flag, a vertex, and the errors of what it hangs on.
+AT_ONCE = 1 << 14  # Pairs of vertices whose prices are computed at once.
+FLAT = 1e-6  # Ratio of the extents of a branch below which its turns are not known.
+
+
+class Prices:
+    """Bits of the motion of labelled branches in a few frames, (1 + F, N, 3), of which the first is the rest pose."""
+
+    def __init__(self, frames: np.ndarray, label: np.ndarray):
+        self._rest, self._label = frames[0], label
+        self._ways = (frames[1:] - frames[0]).transpose(1, 2, 0)  # (N, 3, F)
+        self._shown = _far_vertices(self._rest, label)
+        tracks = self._ways[self._shown].reshape(-1, len(frames) - 1)
+        self._components = np.linalg.eigh(tracks.T @ tracks)[1]
+        self._turns = _turns(frames, label)
+        extent = np.ptp(frames.reshape(-1, 3), axis=0)
+        self._step = STEP * float(np.linalg.norm(extent)) + np.finfo(float).tiny
+
+    def as_roots(self) -> np.ndarray:
+        """Return the bits of each branch as a root, (B,)."""
+        return self._bits(self._ways[self._shown])
+
+    def on_others(self, vertices: np.ndarray) -> np.ndarray:
+        """Return the bits of a branch that hangs on another, (C,), for pairs of a vertex of the branch and the vertex
+        of the other that it hangs on, (C, 2)."""
+        chunks = range(0, len(vertices), AT_ONCE)
+        return np.concatenate([np.zeros(0), *(self._on(vertices[first : first + AT_ONCE]) for first in chunks)])
+
+    def _on(self, vertices: np.ndarray) -> np.ndarray:
+        child, attach = self._label[vertices[:, 0]], vertices[:, 1]
+        left = self._ways[self._shown[child]] - self._ways[attach][:, None]
+        arm = self._rest[self._shown[child]] - self._rest[attach][:, None]
+        turned = np.einsum("cijf,cpj->cpif", self._turns[self._label[attach]], arm)
+        return HANGING + np.minimum(self._bits(left), self._bits(left - turned))
+
+    def _bits(self, tracks: np.ndarray) -> np.ndarray:
+        """Return the bits of some tracks of each of some branches, (K, p, 3, F)."""
+        bits: np.ndarray = 0.5 * np.log2(1 + np.square(tracks @ self._components / self._step)).sum(axis=(1, 2, 3))
+        return bits
+
+
+def _far_vertices(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return vertices of each branch that are far from its centre and from each other, (B, SHOWN)."""
+    away = ((rest - _means(rest, label)[label]) ** 2).sum(axis=1)
+    shown: list[np.ndarray] = []
+    for _ in range(SHOWN):
+        order = np.lexsort((-away, label))
+        shown.append(order[np.searchsorted(label[order], np.arange(label.max() + 1))])
+        apart = ((rest - rest[shown[-1]][label]) ** 2).sum(axis=1)
+        away = apart if len(shown) == 1 else np.minimum(away, apart)
+    return np.stack(shown, axis=1)
+
+
+def _turns(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the rotations that carry the branches best from the rest pose to each frame, less the identity,
+    (B, 3, 3, F) (Kabsch 1976); zero for branches whose vertices lie on a line."""
+    rest = frames[0] - _means(frames[0], label)[label]
+    turns = np.empty((int(label.max()) + 1, 3, 3, len(frames) - 1))
+    for number, pose in enumerate(frames[1:]):
+        products = [np.bincount(label, pose[:, i] * rest[:, j]) for i in range(3) for j in range(3)]
+        left, sizes, right = np.linalg.svd(np.stack(products, axis=1).reshape(-1, 3, 3))
+        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+        flat = sizes[:, 1] <= FLAT * sizes[:, 0]
+        turns[..., number] = np.where(flat[:, None, None], 0.0, left @ right - np.eye(3))
+    return turns
+
+
+def _means(values: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the mean of the vertices of each label, (B, 3)."""
+    return np.stack([np.bincount(label, column) for column in values.T], axis=1) / np.bincount(label)[:, None]

@@ -1,0 +1,88 @@
+"""What stands side by side: found branches cost what true ones cost, as meshes and as points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import athcodec
+from athcodec import MotionClip
+from athcodec.motion.branches.forest import cheapest_forest
+
+FRAMES = 32
+MOST = 1.05  # Size on branches that are found, over that on true ones.
+
+
+def ribbons(count: int = 40, rows: int = 8, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (FRAMES, count * 2 * rows, 3) of ribbons that stand close together and bend in gusts, and faces."""
+    random = np.random.default_rng(seed)
+    time, along = np.arange(FRAMES) / 24, np.linspace(0, 1, rows)
+    foot = np.stack(np.divmod(np.arange(count), 8), axis=1) * 0.1 + random.normal(size=(count, 2)) * 0.02
+    gust = 0.3 * np.sin(2 * time[:, None] - foot @ [3.0, 1.0]) + 0.2 * np.sin(
+        random.uniform(3, 6, count) * time[:, None] + random.uniform(0, 6, count)
+    )
+    bend = (gust + random.normal(size=count) * 0.1)[:, :, None] * along
+    x = foot[:, :1] + np.cumsum(np.sin(bend), axis=2) / rows
+    y = np.cumsum(np.cos(bend), axis=2) / rows - np.cos(bend[:, :, :1]) / rows
+    side = 0.02 * np.array([-1.0, 1.0])
+    z = foot[:, 1, None, None] + np.broadcast_to(side, (count, rows, 2))
+    sheet = [np.repeat(array[..., None], 2, axis=-1) for array in (x, y)]
+    positions = np.stack([*sheet, np.broadcast_to(z, sheet[0].shape)], axis=-1)
+    faces = np.array([[2 * row + corner for corner in (0, 1, 3, 2)] for row in range(rows - 1)])
+    of_all = (faces + 2 * rows * np.arange(count)[:, None, None]).reshape(-1, 4)
+    triangles = np.concatenate([of_all[:, [0, 1, 2]], of_all[:, [0, 2, 3]]])
+    return positions.reshape(FRAMES, -1, 3).astype(np.float32), triangles
+
+
+def crown(leaves: int = 60, rows: int = 6, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """The same of leaves that flutter on a crown that sways, each near others."""
+    random = np.random.default_rng(seed)
+    time, along = np.arange(FRAMES) / 24, np.linspace(0, 1, rows)
+    base = random.normal(size=(leaves, 3)) * 0.6 + [0, 3, 0]
+    sway = np.stack([0.3 * np.sin(1.7 * time), 0 * time, 0.2 * np.sin(1.3 * time + 1)], axis=-1)
+    outward, aside = random.normal(size=(2, leaves, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    aside = np.cross(outward, aside)
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    flutter = 0.4 * np.sin(random.uniform(4, 9, leaves) * time[:, None] + random.uniform(0, 6, leaves))[..., None]
+    way = np.cos(flutter) * outward + np.sin(flutter) * np.cross(outward, aside)
+    line = (base + sway[:, None] * base[:, 1:2] / 3)[:, :, None] + 0.3 * along[:, None] * way[:, :, None]
+    wide = 0.05 * np.sin(np.pi * (0.1 + 0.8 * along))[:, None] * aside[:, None]
+    positions = np.stack([line - wide, line + wide], axis=3).reshape(FRAMES, -1, 3)
+    quads = np.array([[2 * row + corner for corner in (0, 1, 3, 2)] for row in range(rows - 1)])
+    of_all = (quads + 2 * rows * np.arange(leaves)[:, None, None]).reshape(-1, 4)
+    return positions.astype(np.float32), np.concatenate([of_all[:, [0, 1, 2]], of_all[:, [0, 2, 3]]])
+
+
+def size(positions: np.ndarray, plants: int = 0, faces: np.ndarray | None = None) -> int:
+    """Bytes on branches that are found, or of `plants` plants of as many vertices each, which are roots."""
+    each = np.arange(positions.shape[1]) * plants // positions.shape[1]
+    true = {"vertex_branch": each, "branch_parent": np.full(plants, -1)} if plants else {}
+    clip = MotionClip(positions, np.arange(FRAMES) / 24, faces=faces, **true)
+    return len(athcodec.encode(clip, ladder="none", attributes="none"))
+
+
+@pytest.mark.parametrize(
+    ("make", "plants", "has_faces"), [(ribbons, 40, True), (ribbons, 40, False), (crown, 60, True)]
+)
+def test_plants_side_by_side_cost_no_more_than_with_each_as_a_root(make, plants, has_faces):
+    positions, faces = make()
+    faces = faces if has_faces else None
+    assert size(positions, faces=faces) <= MOST * size(positions, plants, faces)
+
+
+def test_the_cheapest_forest_is_the_one_that_trying_all_finds():
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        cost = random.random((5, 6)) + np.eye(5, 6) * 9
+        child, parent = np.divmod(np.arange(30), 6)
+        kept = child != parent
+        chosen = cheapest_forest(5, child[kept], parent[kept], cost.reshape(-1)[kept])
+        total = cost.reshape(-1)[kept][chosen].sum()
+        every = np.stack(np.meshgrid(*[np.arange(6)] * 5, indexing="ij"), axis=-1).reshape(-1, 5)
+        step = np.concatenate([every, np.full((len(every), 1), 5)], axis=1)
+        end = every
+        for _ in range(5):
+            end = np.take_along_axis(step, end, axis=1)
+        is_forest = (end == 5).all(axis=1)
+        assert total == pytest.approx(cost[np.arange(5), every[is_forest]].sum(axis=1).min())
