@@ -188,7 +188,9 @@ class Plan:
                 carried.append((branch, stop))
             branch = stop
         first_piece = np.searchsorted(self.pieces["branch"], np.arange(len(after) + 1)).tolist()
-        return tuple([(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried, standing))
+        return tuple(
+            [(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried, standing)
+        )
 
     @cached_property
     def node_ranges(self) -> list[tuple[int, int]]:
