@@ -13,10 +13,12 @@ from athcodec.encoding.job import EncodingJob, EncodingOptions
 from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
+from athcodec.encoding.still import STILL_SHARE
 from athcodec.encoding.survey import survey
 from athcodec.errors import BoundError
-from athcodec.motion.branches.finding import candidates
+from athcodec.motion.branches.finding import candidates, named_labels
 from athcodec.motion.branches.result import Found, with_branches
+from athcodec.motion.branches.still import clip_among, joined, still_parts
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
@@ -29,6 +31,24 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 def best_branches(
     clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False, is_compared: bool = False
+) -> tuple[Found, float]:
+    """Return the branches that make the smallest file, as `_best_candidate` finds them. What stands still has branches
+    of its own, which no frame is tried for, unless the source names branches."""
+    least = option.least(clip)
+    is_named = clip.skin is not None or named_labels(clip) is not None
+    still = None if is_named or host_rest else still_parts(clip, STILL_SHARE * least)
+    if still is None:
+        return _best_candidate(clip, option, work, host_rest, is_compared)
+    if least > 0:  # The bound of the parts is that of the whole.
+        option = BoundOption(max_error=least)
+    moving, standing = (clip_among(clip, np.flatnonzero(some), some is still) for some in (~still, still))
+    branches, size = _best_candidate(moving, option, work, host_rest, is_compared)
+    others, still_size = _best_candidate(standing, option, Work(), host_rest, is_compared)
+    return joined(clip, still, branches, others), size + (still_size if is_compared else 0.0)
+
+
+def _best_candidate(
+    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
 ) -> tuple[Found, float]:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
     about its bytes, infinite where nothing had to be tried. Predicted motion hardly depends on branches: if two

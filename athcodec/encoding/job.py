@@ -65,6 +65,7 @@ from athcodec.encoding.segment_samples import typical_segments
 from athcodec.encoding.settings import Choice
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.start import still_choice
+from athcodec.encoding.still import SplitSource
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
 from athcodec.errors import BoundError, ClipError, SourceWarning
@@ -459,11 +460,38 @@ class EncodingJob:
     def decide(self, bound: float) -> _Decided:
         """Search for settings."""
         self._check(bound)
-        work = self._allowed_work(bound)
-        decided = self._holding(bound)._decide(bound, work)
+        holding = self._holding(bound)
+        split = holding._split(bound, self.thresholds(bound))
+        moving = holding if split is None else dataclasses.replace(holding, source=split.moving_source)
+        work = moving._allowed_work(bound)
+        decided = moving._decide(bound, work)
+        if split is not None:
+            choice = split.choice(decided.choice, decided.ath.thresholds, bound)
+            options = dataclasses.replace(holding.options, segment_frames=decided.source.segment_frames)
+            if len(decided.layers.each) == 1:
+                options = dataclasses.replace(options, ladder=())
+            decided = dataclasses.replace(holding, options=options)._of_choice(choice, decided.ath.thresholds)
         untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
         decided.choice = dataclasses.replace(decided.choice, untried=untried)
         return decided
+
+    def _split(self, bound: float, thresholds: Thresholds) -> SplitSource | None:
+        """Return what moves and what stands still, each as a source; None: one of them is missing. What stands still
+        takes no part in the search for settings."""
+        return SplitSource.of(self.source, self.seen.ath(thresholds), bound)
+
+    def _of_choice(self, choice: Choice, thresholds: Thresholds) -> _Decided:
+        """Return what follows from a choice for all branches."""
+        bound = choice.settings.bound
+        split = self._split(bound, thresholds)
+        source = self.source if split is None else split.marked
+        if choice.predicted is None and source.segment_frames != self.options.segment_frames:
+            source = source.in_segments(self.options.segment_frames)
+        job = dataclasses.replace(self, source=source)
+        if choice.predicted is not None:
+            return job._predicted(choice)
+        ath = self.seen.ath(thresholds)
+        return job._layered(ath, choice, CodedPrelude(source.about(choice.reference), ath, choice.settings))
 
     def _holding(self, bound: float) -> EncodingJob:
         """Return the job without frames that others show within a small part of the bound."""
@@ -631,13 +659,7 @@ class EncodingJob:
         return self._holding(draft.choice.settings.bound)._decided(draft)
 
     def _decided(self, draft: Draft) -> _Decided:
-        settings = draft.choice.settings
-        if draft.choice.predicted is not None:
-            decided = self._predicted(draft.choice)
-        else:
-            ath = self.seen.ath(draft.thresholds)
-            source = self.source.about(draft.choice.reference)
-            decided = self._layered(ath, draft.choice, CodedPrelude(source, ath, settings))
+        decided = self._of_choice(draft.choice, draft.thresholds)
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(
                 "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "

@@ -174,6 +174,7 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
 
 def _plan_on(pose: np.ndarray, prelude: CodedPrelude, before: Plan | None, layer: int = 0) -> Plan:
     plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, layer > 0, layer=layer)
+    plan.still_branches = prelude.plan.still_branches
     plan.set_rest(pose, like=before)
     return plan
 

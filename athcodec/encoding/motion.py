@@ -121,6 +121,7 @@ class Plan:
         if predicted:
             lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
         self.rest = self.bases = None
+        self.still_branches: np.ndarray | None = None  # (B,) bool: trees that stand as they are in the rest pose.
         self._samples: dict[int, PlanSample] = {}
 
     @property
@@ -163,25 +164,33 @@ class Plan:
         self.core.bases = self.bases.ctypes.data
 
     @cached_property
-    def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
         """Ranges of pieces with large subtrees, in order, and ranges that several threads may process after these:
-        whole subtrees of branches with at most a RANGES-th of the vertices."""
+        whole subtrees of branches with at most a RANGES-th of the vertices. The last ranges are of trees that stand
+        still, and in none of the others."""
         most = max(LEAST_RANGE, self.vertex_count // RANGES)
         vertices = np.append(self.branches["first"], self.vertex_count).tolist()
         after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
-        carrying, carried, branch = [], [], 0
+        carrying, carried, standing, branch = [], [], [], 0
+        is_still = np.zeros(len(after), bool) if self.still_branches is None else self.still_branches
         while branch < len(after):
             stop = after[branch]
+            if is_still[branch]:
+                standing.append((branch, stop))
+                branch = stop
+                continue
             if vertices[stop] - vertices[branch] > most and stop > branch + 1:
                 stop = branch + 1
                 carrying.append((branch, stop))
             else:
-                while stop < len(after) and vertices[after[stop]] - vertices[branch] <= most:
+                while stop < len(after) and not is_still[stop] and vertices[after[stop]] - vertices[branch] <= most:
                     stop = after[stop]
                 carried.append((branch, stop))
             branch = stop
         first_piece = np.searchsorted(self.pieces["branch"], np.arange(len(after) + 1)).tolist()
-        return tuple([(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried))
+        return tuple(
+            [(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried, standing)
+        )
 
     @cached_property
     def node_ranges(self) -> list[tuple[int, int]]:
@@ -410,15 +419,22 @@ class SegmentMotion:
         """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
         positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bent: leave
-        out rigid pieces on which nothing hangs.
+        out rigid pieces on which nothing hangs. Trees that stand still keep the rest pose, whatever the positions are.
         """
-        at, into = self._source(source), (bent, None, False, None)
+        at, into, place = self._source(source), (bent, None, False, None), None
         if positions is not None:
-            into = bent, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
+            level, out = self.plan.level_count - 1, (positions.dtype == np.float64, positions.ctypes.data)
+            into = bent, address(origin, np.float64, 3), *out
+
+            def place(motion: Motion, first: int, stop: int) -> None:
+                at_origin = address(origin, np.float64, 3)
+                lib.ath_pose(self.plan.core, motion, self.integers, first, stop, level, at_origin, *out)
+
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into
-            )
+            ),
+            place,
         )
 
     def analyse_nodes(
@@ -441,15 +457,20 @@ class SegmentMotion:
         self.node_tracks.fill(0)
         self.node_steps.fill(0)
 
-    def _piecewise(self, call: Callable[[Motion, int, int], None]) -> None:
-        """Call with a motion and each range of pieces, those that others hang on first."""
+    def _piecewise(
+        self, call: Callable[[Motion, int, int], None], of_still: Callable[[Motion, int, int], None] | None
+    ) -> None:
+        """Call with a motion and each range of pieces, those that others hang on first. of_still: called for ranges
+        that stand still instead; None: nothing is."""
         if self._attach_caches is None:
             self._attach_caches = zeros((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
             self.motion.attach_caches = self._attach_caches.ctypes.data
-        carrying, carried = self.plan.piece_ranges
+        carrying, carried, standing = self.plan.piece_ranges
         for first, stop in carrying:
             self._with_scratch(call)(first, stop)
         self.plan.pool.map(self._with_scratch(call), carried)
+        if of_still is not None:
+            self.plan.pool.map(self._with_scratch(of_still), standing)
 
     def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
         plan = self.plan
@@ -480,9 +501,11 @@ class SegmentMotion:
         else:
             positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
         into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
-        self._piecewise(
-            lambda motion, first, stop: lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
-        )
+
+        def place(motion: Motion, first: int, stop: int) -> None:
+            lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
+
+        self._piecewise(place, place)
         self._nodewise(
             lambda motion, first, stop: lib.ath_pose_nodes(self.plan.core, motion, self.integers, first, stop, *into)
         )

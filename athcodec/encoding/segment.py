@@ -87,6 +87,7 @@ class Source:
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     shapes: tuple[np.ndarray, np.ndarray] | None = None  # Details and keeps_shape of an inexact reference, if known.
     whole: tuple[Source, np.ndarray] | None = None  # The source that this is a sample of, and its vertices there.
+    still_branches: np.ndarray | None = None  # (B,) bool: branches whose motion is not looked at; None: there are none.
     source_rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin.
     rest: np.ndarray = field(init=False)  # (N, 3) float64 less the origin: the reference pose.
     origin: np.ndarray = field(init=False)  # (3,) float64
@@ -142,7 +143,11 @@ class Source:
         source._held, source._only = self._held, self._only
         return source
 
-    def in_segments(self, frames: int) -> Source:
+    def marking(self, still_branches: np.ndarray) -> Source:
+        """Return the source with branches marked whose motion is not looked at, (B,) bool."""
+        return self._changed(still_branches=still_branches)
+
+    def in_segments(self, frames: int | None) -> Source:
         """Return the source in segments of at most so many frames."""
         return self._changed(segment_frames=frames)
 
@@ -391,6 +396,7 @@ class CodedPrelude:
         self.shares, self._of = source.shares, (source, ath, settings)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
+        self.plan.still_branches = source.still_branches
         self.shape_of = settings.shape_of
         self.rest_chunk, rest = _coded_rest(source, branches, settings)
         self.plan.set_rest(rest, bases)

@@ -221,12 +221,12 @@ static void rest_centre(const ath_plan *plan, const ath_piece *piece, double cen
         for (int32_t k = 0; k < 3; k++) centre[k] += ath_rest_of(plan, piece->first + i)[k] / (double)piece->count;
 }
 
-/* Returns how many vertices, from a piece's first on, tell its rotation. For a root that is one piece, they are all of
+/* Returns how many vertices, from a piece's first on, tell its rotation. For the first piece of a root, they are all of
  * its tree, since an upright stem hardly tells how it turns about itself, and what hangs on it turns along. */
 static int32_t turned_vertices(const ath_plan *plan, const ath_piece *piece)
 {
     const ath_branch *branch = plan->branches + piece->branch;
-    if (piece->parent >= 0 || piece->count < branch->count || piece->flags & ATH_RIGID) return piece->count;
+    if (piece->parent >= 0 || piece->flags & ATH_RIGID) return piece->count;
     int32_t next = piece->branch + branch->subtree;
     return (next < plan->branch_count ? plan->branches[next].first : plan->vertex_count) - piece->first;
 }

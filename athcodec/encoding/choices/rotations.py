@@ -59,6 +59,13 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
         return trials.cheapest([settings, *uniform])
     per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
-    others, roots_turn = (0,) * (settings.levels - 1), trials.prelude(settings).plan.has_stems(0)
-    roots = [replace(settings, rotation_step_factors=(factor, *others)) for factor in factors if factor and roots_turn]
-    return trials.cheapest([settings, mixed, *roots, *uniform])
+    return trials.cheapest([settings, mixed, *_turning_roots(settings, trials, factors), *uniform])
+
+
+def _turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
+    """Return the settings with each rotation factor at the roots alone, which turn what turns as a whole. A root has
+    its stem at level 0 if it moves as one, else at level 1."""
+    has_stems = [trials.prelude(settings).plan.has_stems(level) for level in range(settings.levels)]
+    levels = [level for level in (1, 2) if any(has_stems[:level]) and level < settings.levels]
+    tried = [(factor,) * level + (0,) * (settings.levels - level) for level in levels for factor in factors if factor]
+    return [replace(settings, rotation_step_factors=factors) for factors in tried]

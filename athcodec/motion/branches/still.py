@@ -1,0 +1,154 @@
+"""What stands still beside what moves: terrain, pots, trellis. It has branches of its own, on which nothing hangs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.motion.branches.result import Found, checked_branches
+from athcodec.motion.branches.seen import components, links_of, near_neighbours
+from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
+from athcodec.motion.frames import Frames
+from athcodec.motion.polygons import POLYGON_ARRAYS
+
+NEIGHBOURS = 8  # Nearest points of each vertex without links, among which it stands.
+LEAST_STILL = 64  # Vertices below which what stands still stays with what moves.
+STILL_SHARE = 0.2  # Smallest share of a connected part that stands still apart from the rest of it.
+
+
+def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
+    """Return which vertices are of parts that stand still, (N,) bool.
+
+    Parameters
+    ----------
+    clip : MotionClip
+    most : float
+        The largest distance, in scene units, of what stands still from its place in the rest pose.
+
+    Returns
+    -------
+    (N,) bool array or None
+        Whole connected parts, or the inside of what stands still in a part of which much stands and much moves; None if
+        that is too little, or nothing moves.
+    """
+    if stands_still(clip):
+        return None
+    still = _still_vertices(clip, most)
+    if np.count_nonzero(still) < LEAST_STILL or still.all():
+        return None
+    links = _links(clip)
+    label = components(links, clip.vertex_count)
+    size, standing = np.bincount(label), np.bincount(label, still)
+    inside = _inside(still, links)
+    apart = (standing == size) | (np.bincount(label, inside) >= STILL_SHARE * size)
+    chosen: np.ndarray = np.where((standing == size)[label], True, inside) & apart[label]
+    return chosen if LEAST_STILL <= np.count_nonzero(chosen) < clip.vertex_count else None
+
+
+def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
+    """Return which vertices stay within a distance of the rest pose, (N,) bool; frames are read until none does."""
+    rest = clip.source_rest
+    still = np.ones(clip.vertex_count, bool)
+    for _, block in clip.blocks():
+        some = np.flatnonzero(still)
+        away = block[:, some] != rest[some]
+        moved = away.any(axis=(0, 2))
+        if most > 0 and moved.any():
+            apart = block[:, some[moved]].astype(np.float64) - rest[some[moved]]
+            moved[moved] = np.square(apart).sum(axis=2).max(axis=0) > most**2
+        still[some[moved]] = False
+        if not still.any():
+            break
+    return still
+
+
+def _links(clip: MotionClip) -> np.ndarray:
+    """Return pairs of vertices that belong together, (L, 2): over edges and faces, or by nearness where a vertex has
+    neither."""
+    links = links_of(clip)
+    bare = np.ones(clip.vertex_count, bool)
+    bare[links] = False
+    points = np.flatnonzero(bare)
+    if len(points) < 2:
+        return links
+    return np.concatenate([links, points[near_neighbours(np.asarray(clip.rest)[points], NEIGHBOURS)]])
+
+
+def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
+    """Return which vertices that stand still are linked to one all of whose neighbours stand still too, (N,) bool."""
+    core = still.copy()
+    for here, there in (links.T, links.T[::-1]):
+        core[here[~still[there]]] = False
+    inside = core.copy()
+    for here, there in (links.T, links.T[::-1]):
+        inside[here[core[there]]] = True
+    return inside & still
+
+
+def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -> MotionClip:
+    """Return some vertices of a clip, ascending, with what branches are found by; is_still: the rest pose alone."""
+    number = np.full(clip.vertex_count, -1)
+    number[vertices] = np.arange(len(vertices))
+    rest = clip.source_rest[vertices]
+    if is_still:
+        positions, time = rest[None].astype(clip.dtype), clip.time[:1]
+    else:
+        frames = Frames(lambda a, b: clip.block(a, b)[:, vertices], clip.frame_count, len(vertices), clip.dtype)
+        frames.chunks = getattr(clip.positions, "chunks", None)  # type: ignore[attr-defined]
+        positions, time = frames, clip.time
+    some = MotionClip(
+        positions,
+        time,
+        rest=rest,
+        edges=_among(clip.edges, number),
+        faces=_among(clip.faces, number),
+        attributes=_attributes(clip, vertices, number),
+        metadata=clip.metadata,
+        clip_ranges=() if is_still else clip.clip_ranges,
+    )
+    some.rest_given = clip.rest_given
+    return some
+
+
+def _among(corners: np.ndarray | None, number: np.ndarray) -> np.ndarray | None:
+    """Return the rows all of whose vertices have numbers, by these."""
+    if corners is None:
+        return None
+    rows = number[corners]
+    kept = rows[(rows >= 0).all(axis=1)]
+    return kept if len(kept) else None
+
+
+def _attributes(clip: MotionClip, vertices: np.ndarray, number: np.ndarray) -> dict[str, np.ndarray]:
+    arrays = {}
+    if POLYGON_ARRAYS[0] in clip.attributes and clip.polygons is not None:
+        counts, corners = clip.polygons
+        face = np.repeat(np.arange(len(counts)), counts)
+        kept = np.bincount(face, number[corners] < 0, len(counts)) == 0
+        if kept.any():
+            arrays = dict(zip(POLYGON_ARRAYS, (counts[kept], number[corners[kept[face]]].astype(corners.dtype))))
+    parts = clip.attributes.get("part_vertex_counts")
+    if parts is not None and parts.ndim == 1 and parts.dtype.kind in "iu" and parts.sum() == clip.vertex_count:
+        of_vertex = np.repeat(np.arange(len(parts)), parts)[vertices]
+        arrays["part_vertex_counts"] = left = np.bincount(of_vertex, minlength=len(parts)).astype(parts.dtype)
+        copies = clip.attributes.get("part_copies")
+        if copies is not None and copies.shape == parts.shape:
+            arrays["part_copies"] = np.where(left == parts, copies, 1).astype(copies.dtype)
+    return arrays
+
+
+def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) -> Found:
+    """Return the branches of what moves and of what stands still, (N,) bool, as those of one clip."""
+    first = len(moving.branch_parent)
+    label, place = np.empty((2, clip.vertex_count), np.int64)
+    label[~still], label[still] = moving.vertex_branch, standing.vertex_branch + first
+    for some, found in ((~still, moving), (still, standing)):
+        index = found.stem_index
+        place[some] = source_stem_index(found.vertex_branch) if index is None else index
+    above = standing.branch_parent.astype(np.int64)
+    parent = np.concatenate([moving.branch_parent, np.where(above < 0, -1, above + first)])
+    found = checked_branches(label, parent, place, moving.method)
+    if moving.stem_index is None and standing.stem_index is None:
+        found = replace(found, stem_index=None)
+    return replace(found, taken=moving.taken)

@@ -1,0 +1,104 @@
+"""What stands still beside what moves, and what turns as a whole, cost about what they cost alone."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+from plants import blown_tree, turns
+
+from athcodec.encoding.encoder import encode_clip
+from athcodec.encoding.trials import Trials
+from athcodec.motion.branches.still import still_parts
+from athcodec.motion.clip import MotionClip
+
+SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
+
+
+def size_of(clip: MotionClip, bound: float, **options) -> int:
+    file = io.BytesIO()
+    encode_clip(clip, file, max_error=bound, **SINGLE | options)
+    return len(file.getvalue())
+
+
+def terrain(side: int, seed: int, size: float) -> tuple[np.ndarray, np.ndarray]:
+    random, along = np.random.default_rng(seed), np.linspace(-1, 1, side)
+    x, z = np.meshgrid(along, along, indexing="ij")
+    waves = (random.uniform(0.02, 0.06) * np.sin(random.uniform(-4, 4) * x + random.uniform(-4, 4) * z) for _ in "1234")
+    y = sum(waves) + 0.002 * random.standard_normal(x.shape) - 0.1
+    number = np.arange(side * side, dtype=np.int32).reshape(side, side)
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    faces = np.concatenate(
+        [np.stack([corners[i] for i in three], -1).reshape(-1, 3) for three in ((0, 1, 2), (0, 2, 3))]
+    )
+    return (size * np.stack([x, y, z], -1)).reshape(-1, 3).astype(np.float32), faces
+
+
+def scene(side: int = 40, branches: int = 40, frames: int = 24) -> tuple[MotionClip, np.ndarray, np.ndarray]:
+    tree = blown_tree(3, branches, frames)
+    ground, faces = terrain(side, 5, 2.0)
+    return tree, ground, faces
+
+
+def beside(tree: MotionClip, ground: np.ndarray) -> np.ndarray:
+    moving = tree.block(0, tree.frame_count).astype(np.float32)
+    return np.concatenate([moving, np.broadcast_to(ground, (len(moving), *ground.shape))], axis=1)
+
+
+@pytest.mark.parametrize("has_faces", [False, True])
+def test_a_still_terrain_beside_a_tree_costs_what_it_costs_alone(has_faces):
+    tree, ground, faces = scene()
+    both, time, count = beside(tree, ground), tree.time, tree.vertex_count
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(both.reshape(-1, 3), axis=0)))
+    alone = size_of(MotionClip(both[:, :count], time), bound)
+    alone += size_of(MotionClip(both[:, count:], time, faces=faces if has_faces else None), bound)
+    together = size_of(MotionClip(both, time, faces=faces + count if has_faces else None), bound)
+    assert together <= 1.05 * alone
+
+
+def test_what_stands_still_takes_no_part_in_trials(monkeypatch):
+    tree, ground, _ = scene()
+    both, seen = beside(tree, ground), set()
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(both.reshape(-1, 3), axis=0)))
+    tried = Trials._try
+
+    def counted(self, settings):
+        seen.add(self.source.clip.vertex_count)
+        return tried(self, settings)
+
+    monkeypatch.setattr(Trials, "_try", counted)
+    size_of(MotionClip(both, tree.time), bound)
+    assert seen and max(seen) <= tree.vertex_count
+
+
+def test_frames_of_what_stands_still_may_differ_by_a_small_part_of_the_bound():
+    tree, ground, _ = scene(side=20)
+    both, count = beside(tree, ground), tree.vertex_count
+    both[:, count:] += 1e-6 * np.random.default_rng(2).standard_normal(both[:, count:].shape).astype(np.float32)
+    clip = MotionClip(both, tree.time)
+    assert still_parts(clip, 0.0) is None
+    standing = still_parts(clip, 1e-4)
+    # The base of the tree, and points of the ground right beside it, may count as either.
+    assert standing[count:].mean() > 0.98 and np.count_nonzero(standing[:count]) <= 1
+
+
+def test_a_plant_whose_trunk_stands_still_stays_whole():
+    tree = blown_tree(3, 40, 24)
+    positions = tree.block(0, tree.frame_count).copy()
+    positions[:, tree.vertex_branch == 0] = positions[0, tree.vertex_branch == 0]
+    assert still_parts(MotionClip(positions, tree.time, edges=None), 0.0) is None
+
+
+@pytest.mark.parametrize("turn", [0.25, 0.75])
+def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(turn):
+    tree = blown_tree(3, 40, 48)
+    positions = tree.block(0, tree.frame_count).astype(np.float64)
+    angles = np.linspace(0, 2 * np.pi * turn, len(positions))[:, None] * [0.0, 1.0, 0.0]
+    turned = positions @ turns(angles).transpose(0, 2, 1)
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0)))
+    on = {"vertex_branch": tree.vertex_branch, "branch_parent": tree.branch_parent}
+    standing, turning = (
+        size_of(MotionClip(one.astype(np.float32), tree.time, **on), bound) for one in (positions, turned)
+    )
+    assert turning <= 1.05 * standing + 500
