@@ -885,7 +885,7 @@ class EncodingJob:
             self.report("motion", 1 - len(missing) / count)
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
-        frames = [stop - start for start, stop in decided.source.segments]
+        frames = [[stop - start for start, stop in clip] for clip in decided.source.clip_range_segments]
         first_held = decided.layers.level_0.level_count - 1
         shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless, first_held)
         store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))

@@ -6,6 +6,8 @@
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
 enum { WAVES = 8 }; /* waves that a row is projected on at once */
 
+static const double STANDING = 0.1; /* largest RMS motion of a foot that stands, over that of its plant */
+
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
 /* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
@@ -530,12 +532,13 @@ void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
 }
 
 /* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
- * * w_r, track 3 the mean of e, `centre` the mean of w. */
-static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
-                         const double *source, double *tracks, double centre[3])
+ * * w_r, track 3 the mean of e, `centre` the mean of w, scratch->track e of the first vertex. Returns whether that
+ * vertex, the foot of a root, stands still while the others move. */
+static int node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                        const double *source, double *tracks, double centre[3])
 {
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
-    double *local = scratch->placed, weight = 1.0 / (double)node->count;
+    double *local = scratch->placed, weight = 1.0 / (double)node->count, moved = 0.0, of_foot = 0.0;
     memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
     centre[0] = centre[1] = centre[2] = 0.0;
     for (int32_t v = node->first; v < node->first + node->count; v++) {
@@ -546,7 +549,12 @@ static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, 
             for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
                 local[t] -= d[axis];
                 tracks[9 * T + t] += local[t] * weight;
+                moved += local[t] * local[t] * weight;
             }
+        if (v == node->first) {
+            memcpy(scratch->track, local, 3 * (size_t)T * sizeof *local);
+            of_foot = moved / weight;
+        }
         for (int32_t r = 0; r < node->rank; r++) {
             const double *w = node->whitening + 3 * r;
             double value = (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) * weight, *track = tracks + r * 3 * T;
@@ -554,18 +562,20 @@ static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, 
             for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
         }
     }
+    return of_foot <= STANDING * STANDING * moved;
 }
 
-/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, and e = s + Y w
- * for roots and loose parts. */
-static void fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3])
+/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, e = s + Y w for
+ * loose parts and roots. A root that stands on its foot turns about it: s is what little the foot moves. */
+static void fit_node(const ath_node *node, int free_base, const double *foot, int32_t T, double *tracks,
+                     const double centre[3])
 {
     double *shift = tracks + 9 * T, left = 1.0;
     for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
     for (int32_t i = 0; i < 3 * T; i++) {
         double mean = shift[i];
         for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
-        shift[i] = free_base && left > 1e-6 ? mean / left : 0.0;
+        shift[i] = foot ? foot[i] : free_base && left > 1e-6 ? mean / left : 0.0;
         for (int32_t r = 0; r < node->rank; r++) tracks[3 * r * T + i] -= shift[i] * centre[r];
     }
 }
@@ -590,8 +600,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double *tracks = scratch->rows, centre[3];
     int free_base = ath_has_shift(piece);
     ath_attach(plan, motion, piece, scratch->at);
-    node_moments(plan, node, T, scratch, source, tracks, centre);
-    fit_node(node, free_base, T, tracks, centre);
+    int stands = node_moments(plan, node, T, scratch, source, tracks, centre) && piece->parent < 0;
+    fit_node(node, free_base, stands ? scratch->track : 0, T, tracks, centre);
     *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
