@@ -345,8 +345,8 @@ def blown_tree(seed: int, branches: int = 120, frames: int = 120, lean: float = 
 
 
 def meadow(blades: int, frames: int = 30, rows: int = 8, seed: int = 0, faces: bool = True) -> MotionClip:
-    """Blades of about a metre with their feet in 12 m of ground, each a root of two vertices for a row, over which gusts
-    travel; each bends as a cantilever."""
+    """Blades of about a metre with their feet in 12 m of ground, over which gusts travel: each a root, two vertices
+    for a row, which bends as a cantilever."""
     rng, t = np.random.default_rng(seed), np.arange(frames) / 30
     foot, height = rng.uniform(0, 12, (blades, 2)), rng.uniform(0.7, 1.2, blades)
     turned = rng.uniform(0, np.pi, blades)

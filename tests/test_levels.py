@@ -137,7 +137,9 @@ def test_level_0_moves_each_plant_of_a_field():
     with opened(coded(clip, rel_error=1e-4)) as decoder:
         source, coarse = clip.block(0, clip.frame_count), decoder.positions(level=0)
     tips = np.arange(15, clip.vertex_count, 16)
-    moved, error = (np.linalg.norm(some - mean, axis=2) for some, mean in ((source, source.mean(axis=0)), (coarse, source)))
+    moved, error = (
+        np.linalg.norm(some - mean, axis=2) for some, mean in ((source, source.mean(axis=0)), (coarse, source))
+    )
     assert (error[:, tips].mean(axis=0) < 0.6 * moved[:, tips].mean(axis=0)).mean() > 0.9
 
 

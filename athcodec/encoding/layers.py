@@ -70,8 +70,8 @@ ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded nu
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
-RMS = MEASURES.index("rms")
-LEVEL_TOLERANCE = 1.0  # Largest RMS error of a level, over that of the level before.
+LARGEST, RMS = MEASURES.index("max"), MEASURES.index("rms")
+LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
 FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
 MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
@@ -177,7 +177,7 @@ def layers_of(
     factors: tuple[float, float],
     hold_errors: bool,
 ) -> Layers:
-    """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as Layer has it."""
+    """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as in Layer."""
     settings = choice.settings
     rest, level_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
@@ -475,8 +475,8 @@ class CodedMotion:
             self.errors[level] = self._set_last(layer, level, decoded, corrections)
 
     def _keep_smooth(self, layer: Layer, level: int, positions: np.ndarray) -> None:
-        """Leave out corrections without which a level before the last layer's does not jerk. It then names an error that
-        is somewhat larger than that of its layer, and is shown. positions: not corrected."""
+        """Leave out corrections without which a level before the last layer's does not jerk. It is then shown, with an
+        error that is above that of its layer. positions: not corrected."""
         if level not in self._corrected or layer.holds_error:
             return
         with self._corrected_as_shown(level, positions):
@@ -639,8 +639,9 @@ class CodedMotion:
 
 
 class _EvenLevels:
-    """Errors of the levels of the first layer. The steps of maps move until no level's RMS exceeds that of the level
-    before: finer if that helps, else coarser at the level before, which need not be better than what follows.
+    """Errors of the levels of the first layer. The steps of maps move until no level's RMS or largest error exceeds
+    that of the level before: finer if that helps, else coarser at the level before, which need not be better than what
+    follows.
 
     shown: the segment with its maps, as each level but the last shows it.
     """
@@ -656,12 +657,12 @@ class _EvenLevels:
                 self._move(coarser, level, len(shown), 2.0**0.5, COARSER_MAPS)
 
     def _is_worse(self, level: int) -> bool:
-        return self.errors[level][RMS] > LEVEL_TOLERANCE * self.errors[level - 1][RMS]
+        return self._excess(level, level) > 0
 
     def _excess(self, first: int, last: int) -> float:
         """Return how far the errors of the levels from `first` to `last` exceed those before them."""
-        pairs = pairwise(error[RMS] for error in self.errors[first - 1 : last + 1])
-        return sum(max(0.0, after - LEVEL_TOLERANCE * before) for before, after in pairs)
+        pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
+        return sum(float(np.maximum(after - LEVEL_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
 
     def _move(self, level: int, worse: int, last: int, factor: float, most: int) -> None:
         """Move the steps of the maps of a level while `worse` exceeds the level before it and all levels from there to
