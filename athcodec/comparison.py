@@ -100,7 +100,7 @@ def compare(source: Source, file: Decoder | Openable, **options: Any) -> Compari
     >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
     ...     coarse = athcodec.compare(grass[:], grass)
     >>> coarse.max_error.shape, float(coarse.max_error[-1].max())
-    ((5, 150), 0.0)
+    ((4, 150), 0.0)
     """
     opened = nullcontext(file) if isinstance(file, Decoder) else open(file, **options)
     with opened as decoder, clip_of(source) as (whole, _):

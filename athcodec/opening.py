@@ -68,7 +68,7 @@ def open(
     --------
     >>> with athcodec.open(athcodec.sample_path("grass"), clip="gale") as gale:
     ...     gale.shape, gale.metadata["unit"], gale.level_within(0.05)
-    ((150, 1400, 3), 'm', 1)
+    ((150, 1400, 3), 'm', 0)
     """
     mesh_path = host_mesh if isinstance(host_mesh, (str, os.PathLike)) else None
     mesh = None if mesh_path is not None else cast("HostMesh | None", host_mesh)

@@ -8,6 +8,7 @@ quantised. Ours is the decoder's output for the bytes of that level.
 from __future__ import annotations
 
 import argparse
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ from bench.tables import table
 
 GAP_FRAMES = 9
 ROUNDING = 1e-6  # the error table holds float32
+STANDING = 1e-3  # largest motion of a foot that stands still, over the extent of its plant
+LEVELLED_BYTES, FEWEST_LEVELS, LARGEST_PREFIX = 20_000, 3, 0.25  # what larger files should have
 
 LEVELS_NOTE = """
 Bytes: the file cut after this level, with rest pose and hierarchy, without attributes. Errors over the
@@ -33,6 +36,13 @@ where pieces are rigid they have no error at all and ours have that of the bound
 original within the bound; the paper gets there by its residuals. Of the one before: the larger ratio of the
 stored largest and RMS errors to those of the level before. Second difference: the largest RMS over vertices, over
 the source's within two frames, or half the bound.
+"""
+
+FILES_NOTE = """
+Bytes of the file without attributes; share of it that the first level takes, with rest pose and hierarchy. Of the one
+before: the largest ratio of the largest and RMS errors of a level to those of the level before, of any clip of the
+file. Foot: the largest distance, at any level, of the first vertex of a root that stands still in the source from where
+it is there, over the extent of its plant.
 """
 
 GAPS_NOTE = """
@@ -64,13 +74,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    levels, gaps, broken = [], [], []
+    levels, gaps, files, broken = [], [], [], []
     names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
     for path in map(data.path_of, names) if args.all else args.clips:
         with encoded(path, args.rel_error, ladder=args.ladder) as result:
             file = result.decoder.file
             ath = None if file.header.is_predicted else _same_nodes(result)  # The paper has no such motion.
             meters = measured_levels(result.decoder, result.clip)
+            files.append(_file_row(path.stem, result))
+            broken += _broken_file_lines(files[-1], file.header.is_predicted)
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
                 depth = file.header.stages[stored.level]
@@ -86,6 +98,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "tables": [
             table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
+            table("Files", files, FILES_NOTE),
             table(f"Gaps at the attach points, {GAP_FRAMES} frames", gaps, GAPS_NOTE),
         ],
         "broken": broken,
@@ -150,6 +163,67 @@ def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec
     if ours.max_error <= allowed:
         return []
     return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; expected at most {allowed:.9g}"]
+
+
+# ---- files ----
+
+
+def _file_row(name: str, result: Encoded) -> dict[str, Any]:
+    """What the levels of a file are worth in each of its clips."""
+    decoder, last = result.decoder, result.decoder.levels[-1].bytes
+    parts = [decoder.play(clip.name) for clip in decoder.file.clips]
+    return {
+        "clip": name,
+        "clips": len(parts),
+        "levels": decoder.file.level_count,
+        "bytes": last,
+        "first": decoder.levels[0].bytes / last,
+        "of the one before": max(map(_worst_ratio, parts)),
+        "foot": _foot_drift(result),
+    }
+
+
+def _worst_ratio(part: athcodec.Decoder) -> float:
+    """The largest ratio of the errors of a level to those of the level before."""
+    pairs = [
+        (getattr(after, name), getattr(before, name))
+        for before, after in pairwise(part.levels)
+        for name in ("max_error", "rms_error")
+    ]
+    return max((after / before if before else float(after > 0) for after, before in pairs), default=0.0)
+
+
+def _foot_drift(result: Encoded) -> float | None:
+    """How far any foot that stands still moves at any level, over the extent of its plant; None: no foot does."""
+    hierarchy, clip, decoder = result.decoder.file.hierarchy, result.clip, result.decoder
+    roots = np.flatnonzero(hierarchy.branch_parent < 0)
+    starts = hierarchy.first_vertex[roots]
+    feet, rest = hierarchy.vertex_source[starts], clip.rest[hierarchy.vertex_source]
+    low, high = (corner.reduceat(rest, starts, axis=0) for corner in (np.minimum, np.maximum))
+    extent = np.maximum(np.linalg.norm(high - low, axis=1), np.finfo(np.float64).tiny)
+    source = np.concatenate([frames[:, feet] for _, frames in clip.blocks()]).astype(np.float64)
+    still = np.linalg.norm(source - source[0], axis=2).max(axis=0) <= STANDING * extent
+    if not still.any():
+        return None
+    drift = 0.0
+    for level in range(decoder.file.level_count):
+        for start, shown in decoder.blocks(level):
+            away = np.linalg.norm(shown[:, feet] - source[start : start + len(shown)], axis=2) / extent
+            drift = max(drift, float(away[:, still].max()))
+    return drift
+
+
+def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
+    """A line for each thing that a file should have and has not."""
+    lines = []
+    if row["of the one before"] > 1:
+        lines.append(f"{row['of the one before']:.3f} of the level before in a clip; expected at most 1")
+    if row["bytes"] > LEVELLED_BYTES and not is_predicted:
+        if row["levels"] < FEWEST_LEVELS:
+            lines.append(f"{row['levels']} levels; expected at least {FEWEST_LEVELS}")
+        if row["first"] > LARGEST_PREFIX:
+            lines.append(f"{row['first']:.0%} of the file in its first level; expected at most {LARGEST_PREFIX:.0%}")
+    return [f"{row['clip']}: got {line}" for line in lines]
 
 
 # ---- gaps ----

@@ -344,6 +344,51 @@ def blown_tree(seed: int, branches: int = 120, frames: int = 120, lean: float = 
     )
 
 
+def meadow(blades: int, frames: int = 30, rows: int = 8, seed: int = 0, faces: bool = True) -> MotionClip:
+    """Blades of about a metre with their feet in 12 m of ground, over which gusts travel: each a root, two vertices
+    for a row, which bends as a cantilever."""
+    rng, t = np.random.default_rng(seed), np.arange(frames) / 30
+    foot, height = rng.uniform(0, 12, (blades, 2)), rng.uniform(0.7, 1.2, blades)
+    turned = rng.uniform(0, np.pi, blades)
+    up = np.linspace(0, 1, rows)
+    bend = 0.15 * rng.normal(size=(2, blades, 1)) + np.zeros((2, blades, frames))
+    for speed, size in ((1.7, 0.2), (3.1, 0.12), (5.3, 0.05)):
+        phase = speed * t - speed / 2 * foot @ rng.normal(size=(2, 1)) + rng.uniform(0, 6)
+        bend += size * rng.normal(size=(2, 1, 1)) * np.sin(phase)
+    across = np.moveaxis(bend[..., None] * up**2, 0, -1)  # (blades, T, rows, 2)
+    along = height[:, None, None] * up * np.sqrt(1 - np.clip((across**2).sum(axis=3), 0, 0.9))
+    line = np.concatenate([across * height[:, None, None, None] + foot[:, None, None], along[..., None]], axis=3)
+    half = 0.01 * np.stack([np.cos(turned), np.sin(turned), 0 * turned], axis=1)[:, None, None] * (1.2 - up[:, None])
+    positions = np.stack([line - half, line + half], axis=3).reshape(blades, frames, 2 * rows, 3)
+    positions = np.moveaxis(positions, 1, 0).reshape(frames, -1, 3)
+    quads = 2 * np.arange(rows - 1)[:, None] + [0, 1, 3, 2]
+    surface = (2 * rows * np.arange(blades)[:, None, None] + quads).reshape(-1, 4) if faces else None
+    branch = np.repeat(np.arange(blades), 2 * rows)
+    return clip_of(positions, positions.mean(axis=0), branch, np.full(blades, -1), faces=surface)
+
+
+def opening_flower(petals: int, frames: int = 60, seed: int = 0) -> MotionClip:
+    """Petals of 8 x 6 vertices on the tip of a stalk, which open slowly, one after the other."""
+    rng, at = np.random.default_rng(seed), np.linspace(0, 1, frames)[:, None, None]
+    u, v = (each.T for each in np.meshgrid(np.linspace(0, 1, 8), np.linspace(-1, 1, 6)))
+    stalk = np.zeros((frames, 12, 3)) + np.linspace(-1, 0, 12)[:, None] * [0, 0, 1]
+    parts, quads = [stalk], []
+    for petal in range(petals):
+        heading, length = 2.4 * petal + 0.1 * rng.normal(), rng.uniform(0.5, 0.8)
+        open_ = 1 / (1 + np.exp(-12 * (at - 0.35 - rng.uniform(0, 0.3))))
+        angle = 1.5 - 1.4 * open_ + 1.1 * (open_ - 1) * u + 0.1 * np.sin(3 * u * v * open_ + petal)
+        step = (0.5 + 0.5 * open_) * length / 8
+        out, up = (np.cumsum(turn(angle) * step, axis=1) for turn in (np.cos, np.sin))
+        side = 0.2 * length * (0.4 + 0.6 * open_) * v * np.sqrt(np.sin(np.pi * (0.9 * u + 0.05)))
+        cos, sin = np.cos(heading), np.sin(heading)
+        parts.append(np.stack([cos * out - sin * side, sin * out + cos * side, up], axis=3).reshape(frames, -1, 3))
+        corner = 12 + 48 * petal + 6 * np.arange(7)[:, None] + np.arange(5)
+        quads.append(np.stack([corner, corner + 1, corner + 7, corner + 6], axis=2).reshape(-1, 4))
+    positions = np.concatenate(parts, axis=1)
+    branch = np.concatenate([np.zeros(12, int), np.repeat(np.arange(1, petals + 1), 48)])
+    return clip_of(positions, positions[0], branch, np.append(-1, np.zeros(petals, int)), faces=np.concatenate(quads))
+
+
 def bending_tube() -> MotionClip:
     """Of quads, which bends to one side."""
     clip = tube(40, 12, 30)

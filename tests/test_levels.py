@@ -8,11 +8,12 @@ import pytest
 from files import Parts, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import awkward_plants, blown_tree, bound_for, diagonal, distance
+from plants import awkward_plants, blown_tree, bound_for, diagonal, distance, meadow, opening_flower
 from test_document import assert_same_bits
 
 import athcodec
 from athcodec.decoding import container as ct
+from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.errors import BadChunkTable, BadHeader, LevelUnavailable
 from athcodec.metrics import SmoothnessMeter
 
@@ -90,6 +91,71 @@ def test_levels_of_clips_loops_growth_and_storms_get_better(options, medley_clip
     tree = athcodec.read(athcodec.sample_path("tree"))
     for clip in (athcodec.join(medley_clips), growth, tree, blown_tree(0, branches=60, frames=40)):
         assert_levels_get_better(clip, coded(clip, rel_error=1e-3, **options))
+
+
+# ---- fields and single plants ----
+
+
+def foot_drift(clip: athcodec.MotionClip, data: bytes) -> list[float]:
+    """The largest distance of the first vertex of any root from where it is in the source, over the extent of a plant,
+    at each level."""
+    source, roots = clip.block(0, clip.frame_count), np.flatnonzero(clip.branch_parent < 0)
+    feet = np.array([np.flatnonzero(clip.vertex_branch == root)[0] for root in roots])
+    of_first = clip.vertex_branch == roots[0] if len(roots) > 1 else slice(None)
+    extent = np.linalg.norm(np.ptp(clip.rest[of_first], axis=0))
+    with opened(data) as decoder:
+        shown = (decoder.positions(level=level)[:, feet] for level in range(decoder.file.level_count))
+        return [float(np.linalg.norm(one - source[:, feet], axis=2).max() / extent) for one in shown]
+
+
+@pytest.mark.parametrize(
+    "plants",
+    [
+        lambda: meadow(100, rows=10, frames=40),  # Some blades move as rigid parts at the first levels.
+        lambda: meadow(40, faces=False, rows=40),  # Of two pieces each, whose maps are their own.
+        lambda: opening_flower(12),
+        lambda: blown_tree(0, branches=60, frames=40),
+        lambda: athcodec.read(athcodec.sample_path("growth")),
+    ],
+)
+def test_what_is_rooted_stays_rooted_at_each_level(plants):
+    clip = plants()
+    assert max(foot_drift(clip, coded(clip, rel_error=1e-4))) < 0.02
+
+
+@pytest.mark.parametrize("plants", [lambda: meadow(150), lambda: meadow(150, faces=False), lambda: opening_flower(20)])
+def test_a_file_of_many_plants_or_parts_has_three_levels_that_get_better(plants):
+    clip = plants()
+    data = coded(clip, rel_error=1e-4)
+    with opened(data) as decoder:
+        assert decoder.file.level_count >= 3
+    assert_levels_get_better(clip, data)
+
+
+def test_level_0_moves_each_plant_of_a_field():
+    clip = meadow(60)
+    with opened(coded(clip, rel_error=1e-4)) as decoder:
+        source, coarse = clip.block(0, clip.frame_count), decoder.positions(level=0)
+    tips = np.arange(15, clip.vertex_count, 16)
+    moved, error = (
+        np.linalg.norm(some - mean, axis=2) for some, mean in ((source, source.mean(axis=0)), (coarse, source))
+    )
+    assert (error[:, tips].mean(axis=0) < 0.6 * moved[:, tips].mean(axis=0)).mean() > 0.9
+
+
+def test_no_level_of_a_clip_is_worse_than_the_one_before_in_that_clip():
+    errors = np.array([[0.273, 1.0], [0.305, 0.5], [0.2, 0.4], [0.01, 0.01]])  # Of a calm clip and of one in a gale.
+    table, flaws = np.repeat(errors[:, :, None], 3, axis=2), np.zeros((4, 2, 2))
+    assert chosen_levels(table, [[100], [100]], flaws, 10.0, exact=False, first_held=3) == [0, 2, 3]
+    assert chosen_levels(table, [[100, 100]], flaws, 10.0, exact=False, first_held=3) == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("name", ["leafed", "fern", "grass"])
+def test_no_level_of_a_clip_of_the_samples_is_worse_than_the_one_before(name):
+    with athcodec.open(athcodec.sample_path(name)) as decoder:
+        for wind in (clip.name for clip in decoder.file.clips):
+            for before, after in zip(decoder.play(wind).levels, decoder.play(wind).levels[1:]):
+                assert after.max_error <= before.max_error and after.rms_error <= before.rms_error
 
 
 # ---- which levels are shown ----

@@ -507,7 +507,7 @@ class EncodingJob:
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
-        if self.options.ladder == LADDERS[DEFAULT_LADDER] and search.levels_need_own_bases():
+        if self._has_usual_ladder and search.levels_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
         unsearched = share * search.first_cost()
         short = self._in_short_segments()
@@ -629,12 +629,21 @@ class EncodingJob:
         still clip has one layer: a rest pose in layers takes up to two thirds more."""
         if self.source.still:
             return [1]
-        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, step_factors(self.source))
+        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, self._step_factors(bound))
         return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
+
+    @property
+    def _has_usual_ladder(self) -> bool:
+        return self.options.ladder == LADDERS[DEFAULT_LADDER]
+
+    def _step_factors(self, bound: float) -> tuple[float, float]:
+        return step_factors(self.source, self.options.ladder, bound)
 
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
         source = self.source.about(choice.reference)
-        layers = layers_of(source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
+        bound = choice.settings.bound
+        ratios, factors = self._layer_ratios(ath, bound), self._step_factors(bound)
+        layers = layers_of(source, prelude, choice, ratios, factors, hold_errors=not self._has_usual_ladder)
         return _Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: _Decided) -> Draft:
@@ -907,7 +916,7 @@ class EncodingJob:
             self.report("motion", 1 - len(missing) / count)
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
-        frames = [stop - start for start, stop in decided.source.segments]
+        frames = [[stop - start for start, stop in clip] for clip in decided.source.clip_range_segments]
         first_held = decided.layers.level_0.level_count - 1
         shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless, first_held)
         store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))

@@ -35,7 +35,7 @@ from athcodec.encoding.choices.joins import (
     end_of,
     seen,
 )
-from athcodec.encoding.choices.levels import SourceFrames
+from athcodec.encoding.choices.levels import MOST_JERK, SourceFrames
 from athcodec.encoding.features import Feature
 from athcodec.encoding.learned_modes import nested
 from athcodec.encoding.motion import LearnedModes, Plan, SegmentMotion, position_errors, release_memory, zeros
@@ -62,14 +62,16 @@ from athcodec.errors import BoundError
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
 STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.25), (0.8, 0.8)
+FEW_ROOTS = 4  # Up to so many roots a scene counts as one plant.
+MOTION_STEP, SURFACE_MOTION_STEP = 2.0, 1.0  # Largest step of the first layer of more, over the RMS motion.
 LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
-RMS = MEASURES.index("rms")
-LEVEL_TOLERANCE = 1.0  # Largest RMS error of a level, over that of the level before.
+LARGEST, RMS = MEASURES.index("max"), MEASURES.index("rms")
+LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
 FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
 MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
@@ -86,6 +88,7 @@ class Layer:
     modes: LearnedModes | None
     ratio: int = 1  # The layer's step over that of the last layer.
     rest: streams.CodedRest | None = None  # The content of REFINED_REST.
+    holds_error: bool = True  # Whether corrections hold its error even where a level jerks with them.
 
 
 @dataclass
@@ -115,9 +118,17 @@ class Layers:
         return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
 
 
-def step_factors(source: Source) -> tuple[float, float]:
-    """Return the steps of the first layer and of others before the last, over those of files of their errors."""
-    return LEAVES_STEP_FACTORS if source.sheet_like.any() else STEP_FACTORS
+def step_factors(source: Source, ladder: Sequence[float], bound: float) -> tuple[float, float]:
+    """Return the steps of the first layer and of others before the last, over those of files of their errors. Plants
+    side by side move little for the diagonal of all: at the usual step of the first layer they hardly would."""
+    has_leaves = source.sheet_like.any()
+    first, others = LEAVES_STEP_FACTORS if has_leaves else STEP_FACTORS
+    coarsest = max(_in_bounds(ladder, bound, source.seen.diagonal), default=0.0)
+    if coarsest > 0 and (source.hierarchy.branch_parent < 0).sum() > FEW_ROOTS:
+        has_surface = has_leaves or source.polygons is not None
+        motion = SURFACE_MOTION_STEP if has_surface else MOTION_STEP
+        first = min(first, motion * source.seen.rms_motion / (coarsest * bound))
+    return first, others
 
 
 def layer_ratios(
@@ -129,19 +140,24 @@ def layer_ratios(
     their own. Layers that are too far apart for one to refine the other have more between them. factors: step_factors.
     """
     errors: list[float] = []  # In bounds.
-    for error in ladder:
-        bounds = ROUNDED * error * diagonal / bound
-        if bounds >= LEAST_ABOVE_BOUND and (not errors or ROUNDED * errors[-1] >= LEAST_APART * bounds):
+    for bounds in _in_bounds(ladder, bound, diagonal):
+        if not errors or ROUNDED * errors[-1] >= LEAST_APART * bounds:
             errors.append(bounds)
     # Ratios are rounded down, so that layers hold what the ladder names.
-    ratios = [int(min(factors[i > 0] * bounds, MOST_RATIO**2)) for i, bounds in enumerate(errors)]
+    ratios = [max(1, int(min(factors[i > 0] * bounds, MOST_RATIO**2))) for i, bounds in enumerate(errors)]
     return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
 
 
-def _held_limit(source: Source, bound: float, layer: int, ratio: int) -> float | np.ndarray:
+def _in_bounds(ladder: Sequence[float], bound: float, diagonal: float) -> list[float]:
+    """Return the errors of a ladder over the bound, without those too close to it for a layer."""
+    errors = [ROUNDED * error * diagonal / bound for error in ladder]
+    return [error for error in errors if error >= LEAST_ABOVE_BOUND]
+
+
+def _held_limit(source: Source, bound: float, factor: float, ratio: int) -> float | np.ndarray:
     """Return what the positions of a layer before the last are held to: no error in the table exceeds the one that the
-    ladder names."""
-    error = ct.short_float_within(ratio / step_factors(source)[layer > 0] * bound)
+    ladder names. factor: of its step."""
+    error = ct.short_float_within(ratio / factor * bound)
     return np.minimum(source.limit(error), source.unweighted_limit(error))
 
 
@@ -153,8 +169,15 @@ def _between(ratio: int, finer: int) -> list[int]:
     return _between(ratio, middle) + _between(middle, finer)
 
 
-def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Sequence[int]) -> Layers:
-    """Return the layers for a choice; prelude: of the last layer."""
+def layers_of(
+    source: Source,
+    prelude: CodedPrelude,
+    choice: Choice,
+    ratios: Sequence[int],
+    factors: tuple[float, float],
+    hold_errors: bool,
+) -> Layers:
+    """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as in Layer."""
     settings = choice.settings
     rest, level_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
@@ -164,10 +187,11 @@ def layers_of(source: Source, prelude: CodedPrelude, choice: Choice, ratios: Seq
         of_layer = replace(
             choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
             step=qz.single(settings.step * ratio),
-            limit=settings.limit if ratio == 1 else _held_limit(source, settings.bound, i, ratio),
+            limit=settings.limit if ratio == 1 else _held_limit(source, settings.bound, factors[i > 0], ratio),
             layer=i,
         )
-        layers.append(Layer(plan, of_layer, _modes(plan, choice, of_layer, ratio), ratio, refined))
+        modes = _modes(plan, choice, of_layer, ratio)
+        layers.append(Layer(plan, of_layer, modes, ratio, refined, hold_errors or ratio == 1))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
     return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude, None), layers)
 
@@ -386,7 +410,7 @@ class CodedMotion:
         self._corrected: dict[int, Corrections] = {}  # What corrects levels.
         self.joins = [0] * layers.level_count
         self._source = SourceFrames(positions, shown_times, None, box, self._largest_bound, self._pool)
-        self._source_end = self._source.last_shown(positions)
+        self._source_alone, self._source_end = self._source, self._source.last_shown(positions)
         self._loops, self._before, self._after = loops, before, after
         self._may_join = Feature.JOINS not in layers.each[-1].settings.without
         self._layers = layers.each
@@ -450,6 +474,16 @@ class CodedMotion:
             if len(corrections.chunk) > most:
                 break
             self.errors[level] = self._set_last(layer, level, decoded, corrections)
+
+    def _keep_smooth(self, layer: Layer, level: int, positions: np.ndarray) -> None:
+        """Leave out corrections without which a level before the last layer's does not jerk. It is then shown, with an
+        error that is above that of its layer. positions: not corrected."""
+        if level not in self._corrected or layer.holds_error:
+            return
+        with self._corrected_as_shown(level, positions):
+            jerk = self._source_alone.flaws(positions, None, 0.0)[1]
+        if jerk > MOST_JERK and self._source_alone.flaws(positions, None, 0.0)[1] <= MOST_JERK:
+            self.errors[level] = self._set_last(layer, level, positions, Corrections.none(positions.shape))
 
     def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
         """Return the segment as level 0 shows it, which may have a rest pose of its own."""
@@ -525,6 +559,8 @@ class CodedMotion:
     def _finish(self, level: int, positions: np.ndarray, layer: Layer | None = None) -> None:
         """Add a level's end, join the level to the segment before if that is better, and add its flaws. positions: not
         corrected, which change; layer: the one that ends with the level."""
+        if layer is not None and layer.ratio > 1:
+            self._keep_smooth(layer, level, positions)
         if self._after is not None:
             with self._corrected_as_shown(level, positions):
                 shown = self._source.last_shown(positions)
@@ -604,8 +640,9 @@ class CodedMotion:
 
 
 class _EvenLevels:
-    """Errors of the levels of the first layer. The steps of maps move until no level's RMS exceeds that of the level
-    before: finer if that helps, else coarser at the level before, which need not be better than what follows.
+    """Errors of the levels of the first layer. The steps of maps move until no level's RMS or largest error exceeds
+    that of the level before: finer if that helps, else coarser at the level before, which need not be better than what
+    follows.
 
     shown: the segment with its maps, as each level but the last shows it.
     """
@@ -621,12 +658,12 @@ class _EvenLevels:
                 self._move(coarser, level, len(shown), 2.0**0.5, COARSER_MAPS)
 
     def _is_worse(self, level: int) -> bool:
-        return self.errors[level][RMS] > LEVEL_TOLERANCE * self.errors[level - 1][RMS]
+        return self._excess(level, level) > 0
 
     def _excess(self, first: int, last: int) -> float:
         """Return how far the errors of the levels from `first` to `last` exceed those before them."""
-        pairs = pairwise(error[RMS] for error in self.errors[first - 1 : last + 1])
-        return sum(max(0.0, after - LEVEL_TOLERANCE * before) for before, after in pairs)
+        pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
+        return sum(float(np.maximum(after - LEVEL_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
 
     def _move(self, level: int, worse: int, last: int, factor: float, most: int) -> None:
         """Move the steps of the maps of a level while `worse` exceeds the level before it and all levels from there to

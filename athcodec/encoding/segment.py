@@ -613,6 +613,10 @@ class Corrections:
     step: float
     shape: tuple[int, ...]
 
+    @classmethod
+    def none(cls, shape: tuple[int, ...]) -> Corrections:
+        return cls(np.zeros((0, 6), np.int32), 1.0, shape)
+
     @cached_property
     def chunk(self) -> bytes:
         """CORRECTIONS; empty if there are none."""

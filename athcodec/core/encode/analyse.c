@@ -6,6 +6,8 @@
 enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
 enum { WAVES = 8 }; /* waves that a row is projected on at once */
 
+static const double STANDING = 0.1; /* largest RMS motion of a foot that stands, over that of its plant */
+
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
 /* Uniform quantiser with a dead zone: zero below `dead_zone` steps, rounding biased towards zero by as much. */
@@ -323,17 +325,17 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
 /* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its
  * vertices relative to the attach point, in the predicted frame. A turn that they show no better than an error of
  * `step` does, such as the twist of a straight stem, stays as in the frame before. carried: the source, if the branches
- * on a root tell more; else 0. A rigid piece turns about its centre, so that an error of its attach point does not turn
- * it. */
+ * on a root tell more; else 0. about_centre: whether the piece turns about its centre, so that an error of its attach
+ * point does not turn it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
-                         const double *carried, double *omega)
+                         const double *carried, int about_centre, double *omega)
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
     double few[9][ATH_LANES], turned[9][ATH_LANES]; /* products and rotations of a rigid piece in a few frames */
     products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
-    if (rigid) rest_centre(plan, piece, a);
+    if (about_centre) rest_centre(plan, piece, a);
     double size2 = sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
     if (carried) add_carried(plan, T, piece, carried, size2, sums);
     double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
@@ -413,17 +415,30 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
         }
 }
 
+/* Returns whether a piece is a root whose first vertex, its foot, stands still while the others move. */
+static int stands_on_foot(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *source)
+{
+    double moved = 0.0, of_foot = 0.0;
+    if (piece->parent >= 0) return 0;
+    for (int32_t v = piece->first; v < piece->first + piece->count; v++) {
+        const double *x = source + (size_t)v * 3 * (size_t)T, *x0 = ath_rest_of(plan, v);
+        for (int32_t i = 0; i < 3 * T; i++) moved += (x[i] - x0[i / T]) * (x[i] - x0[i / T]);
+        if (v == piece->first) of_foot = moved;
+    }
+    return of_foot * (double)piece->count <= STANDING * STANDING * moved;
+}
+
 /* Codes the piece's own translation and rotation. local: room for its vertices. A rigid piece is turned first, so that
- * the one does not stand for the other. */
+ * the one does not stand for the other, unless it stands on its foot. */
 static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                            const ath_piece_before *before, ath_piece_rows *rows, const ath_scratch *scratch,
                            const double *source, const ath_rounding *rounding, double *local)
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
-    int rigid = (piece->flags & ATH_RIGID) != 0;
+    int floats = (piece->flags & ATH_RIGID) != 0 && !stands_on_foot(plan, T, piece, source);
     ath_attach(plan, motion, piece, scratch->at);
-    if (ath_has_shift(piece) && !rigid) {
+    if (ath_has_shift(piece) && !floats) {
         shift_of_first(plan, T, piece, scratch, source);
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
@@ -431,14 +446,14 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         to_local(T, piece, &scratch->at, source, local);
         ath_turning turning = ath_turning_of(plan, piece, base);
         int carries = turned_vertices(plan, piece) > piece->count;
-        fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, scratch->track);
+        fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, floats, scratch->track);
         ath_into_axes(T, &turning, scratch->track);
         if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
         code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
         ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
     }
-    if (ath_has_shift(piece) && rigid) {
+    if (ath_has_shift(piece) && floats) {
         shift_of_all(plan, T, piece, scratch, source);
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
@@ -530,12 +545,13 @@ void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
 }
 
 /* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
- * * w_r, track 3 the mean of e, `centre` the mean of w. */
-static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
-                         const double *source, double *tracks, double centre[3])
+ * * w_r, track 3 the mean of e, `centre` the mean of w, scratch->track e of the first vertex. Returns whether that
+ * vertex, the foot of a root, stands still while the others move. */
+static int node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                        const double *source, double *tracks, double centre[3])
 {
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
-    double *local = scratch->placed, weight = 1.0 / (double)node->count;
+    double *local = scratch->placed, weight = 1.0 / (double)node->count, moved = 0.0, of_foot = 0.0;
     memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
     centre[0] = centre[1] = centre[2] = 0.0;
     for (int32_t v = node->first; v < node->first + node->count; v++) {
@@ -546,7 +562,12 @@ static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, 
             for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
                 local[t] -= d[axis];
                 tracks[9 * T + t] += local[t] * weight;
+                moved += local[t] * local[t] * weight;
             }
+        if (v == node->first) {
+            memcpy(scratch->track, local, 3 * (size_t)T * sizeof *local);
+            of_foot = moved / weight;
+        }
         for (int32_t r = 0; r < node->rank; r++) {
             const double *w = node->whitening + 3 * r;
             double value = (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) * weight, *track = tracks + r * 3 * T;
@@ -554,18 +575,20 @@ static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, 
             for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
         }
     }
+    return of_foot <= STANDING * STANDING * moved;
 }
 
-/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, and e = s + Y w
- * for roots and loose parts. */
-static void fit_node(const ath_node *node, int free_base, int32_t T, double *tracks, const double centre[3])
+/* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, e = s + Y w for
+ * loose parts and roots. A root that stands on its foot turns about it: s is what little the foot moves. */
+static void fit_node(const ath_node *node, int free_base, const double *foot, int32_t T, double *tracks,
+                     const double centre[3])
 {
     double *shift = tracks + 9 * T, left = 1.0;
     for (int32_t r = 0; r < node->rank; r++) left -= centre[r] * centre[r];
     for (int32_t i = 0; i < 3 * T; i++) {
         double mean = shift[i];
         for (int32_t r = 0; r < node->rank; r++) mean -= tracks[3 * r * T + i] * centre[r];
-        shift[i] = free_base && left > 1e-6 ? mean / left : 0.0;
+        shift[i] = foot ? foot[i] : free_base && left > 1e-6 ? mean / left : 0.0;
         for (int32_t r = 0; r < node->rank; r++) tracks[3 * r * T + i] -= shift[i] * centre[r];
     }
 }
@@ -590,8 +613,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double *tracks = scratch->rows, centre[3];
     int free_base = ath_has_shift(piece);
     ath_attach(plan, motion, piece, scratch->at);
-    node_moments(plan, node, T, scratch, source, tracks, centre);
-    fit_node(node, free_base, T, tracks, centre);
+    int stands = node_moments(plan, node, T, scratch, source, tracks, centre) && piece->parent < 0;
+    fit_node(node, free_base, stands ? scratch->track : 0, T, tracks, centre);
     *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);

@@ -79,21 +79,27 @@ class SourceFrames:
 
 
 def chosen_levels(
-    errors: np.ndarray, frames: Sequence[int], flaws: np.ndarray, diagonal: float, exact: bool, first_held: int
+    errors: np.ndarray,
+    clip_frames: Sequence[Sequence[int]],
+    flaws: np.ndarray,
+    diagonal: float,
+    exact: bool,
+    first_held: int,
 ) -> list[int]:
-    """Return the best chain of levels up to the last in which no RMS and no largest error exceeds that before: the one
-    with most levels that hold errors, of those the longest, of those the one that begins with a coarser level.
+    """Return the best chain of levels up to the last in which no RMS and no largest error of any clip exceeds that
+    before: the one with most levels that hold errors, of those the longest, of those the one that begins with a coarser
+    level.
 
-    errors: (levels, segments, 3), of segments of so many frames. flaws: (levels, segments, 2) of SourceFrames.flaws.
-    exact: whether the last level is the source, which goes on from the level before. first_held: the first level that
-    ends a layer of precision, and so holds an error, as all after it do.
+    errors: (levels, segments, 3). clip_frames: the frames of each segment of each clip of the file. flaws: (levels,
+    segments, 2) of SourceFrames.flaws. exact: whether the last level is the source, which goes on from the level
+    before. first_held: the first level that ends a layer of precision, and so holds an error, as all after it do.
     """
 
     def rank(chain: list[int]) -> tuple[int, int, int]:
         return sum(level >= first_held for level in chain), len(chain), -chain[0]
 
     stored = np.vectorize(from_short_float, otypes=[float])(short_floats(errors))
-    measures = np.concatenate([_of_all(table, frames) for table in (errors, stored)], axis=1)
+    measures = np.concatenate([_of_clips(table, clip_frames) for table in (errors, stored)], axis=1)
     limits = MOST_AWAY * diagonal, MOST_JERK
     last = len(errors) - 1 - exact
     chains: dict[int, list[int]] = {last: list(range(last, len(errors)))}
@@ -103,6 +109,14 @@ def chosen_levels(
             if better:
                 chains[level] = [level, *max(better, key=rank)]
     return max(chains.values(), key=rank)
+
+
+def _of_clips(errors: np.ndarray, clip_frames: Sequence[Sequence[int]]) -> np.ndarray:
+    """Return the largest and the RMS error of each level in each clip, and over all clips, (levels, 2 + 2 * clips)."""
+    stops = np.cumsum([len(frames) for frames in clip_frames])[:-1]
+    parts = list(zip(np.split(errors, stops, axis=1), clip_frames))
+    everything = errors, [frames for of_clip in clip_frames for frames in of_clip]
+    return np.concatenate([_of_all(*part) for part in [everything, *parts]], axis=1)
 
 
 def _of_all(errors: np.ndarray, frames: Sequence[int]) -> np.ndarray:

@@ -18,7 +18,7 @@ from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
-from athcodec.encoding.choices.levels import SourceFrames
+from athcodec.encoding.choices.levels import MOST_AWAY, SourceFrames
 from athcodec.encoding.choices.rest import with_best_rest
 from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
@@ -29,6 +29,7 @@ from athcodec.encoding.settings import Choice, Settings
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.errors import BoundError
 from athcodec.files.threads import ranges
+from athcodec.motion.algebra import length
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
@@ -239,14 +240,16 @@ def code_predicted_segment(
 
     last = plan.level_count - 1
     chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
+    source = SourceFrames(positions, shown_times, None, box, settings.bound, plan.pool)
     coarse = level_0.pose(0, prelude.origin, prelude.dtype)
-    errors = [error(coarse)]
+    errors, away = [error(coarse)], source.flaws(coarse, None)[0]
     for moved in _with_maps(prelude, positions, errors[0][-1]):
         maps = streams.encode_affines(moved, 0)
         pose = moved.pose(0, prelude.origin, prelude.dtype)
-        with_maps = error(pose)
-        if len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
-            chunks[0, ct.AFFINES], errors[0], coarse = maps, with_maps, pose
+        with_maps, map_away = error(pose), source.flaws(pose, None)[0]
+        stays = map_away <= max(away, MOST_AWAY * length(box[1] - box[0]))
+        if stays and len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
+            chunks[0, ct.AFFINES], errors[0], away = maps, with_maps, map_away
             break
     errors.append(error(decoded))
     if errors[-1][0] > settings.largest_bound:
@@ -254,7 +257,6 @@ def code_predicted_segment(
     if exact is not None:
         chunks[last + 1, ct.EXACT] = streams.encode_exact(decoded, exact)
         errors.append((0.0, 0.0, 0.0))
-    away = SourceFrames(positions, shown_times, None, box, settings.bound, plan.pool).flaws(coarse, None)[0]
     flaws = [(away, 0.0)] + [(0.0, 0.0)] * (len(errors) - 1)
     return chunks, np.array(errors), np.zeros(len(errors), int), np.array(flaws)
 
