@@ -61,7 +61,7 @@ from athcodec.encoding.progress import (
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
-from athcodec.encoding.segment_samples import typical_segments
+from athcodec.encoding.segment_samples import spread_segments, typical_segments
 from athcodec.encoding.settings import Choice
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.start import still_choice
@@ -99,7 +99,7 @@ FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without co
 PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another that is coded in its place.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
-SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
+LONGEST_SHARE = 0.5  # Share of the work left that a search takes in the longest segments if it may be made again.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
 
 
@@ -481,14 +481,21 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         if self.options.ladder == LADDERS[DEFAULT_LADDER] and search.levels_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
-        unsearched = share * search.first_cost()
-        short = self._in_short_segments()
-        frames = short.source.coded_frames / len(short.source.segments)  # Fewer than a segment has where many are held.
-        if frames > SHORT_SEGMENT / 2 and short.source.segments != self.source.segments:
-            done = work.done
-            if search.jumps(short.source):
-                return short._decide(bound, work)
-            work.allowed += work.done - done  # What does not jump has all its work left.
+        shorter = search.shorter_segments() if self.options.segment_frames is None else None
+        if shorter is None:
+            return self._searched(search, share, work)
+        length, price = shorter
+        with work.trying("segments", LONGEST_SHARE):
+            longest = self._searched(search, share, work)
+        least = self._spread_bytes(longest)
+        if least < SEARCH_SAVES * price or not work.fits(0):
+            return longest
+        short = self._in_segments(length)._decide(bound, work)
+        return short if self._spread_bytes(short) < least else longest
+
+    def _searched(self, search: Search, share: float, work: Work) -> _Decided:
+        """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
+        bound, unsearched = search.trials.start.bound, share * search.first_cost()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
             search.keep_work_of_maps()
@@ -517,12 +524,19 @@ class EncodingJob:
         """Return the job of a clip whose levels move by series of their own, which prediction hardly suits."""
         return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()), predicts_as_usual=True)
 
-    def _in_short_segments(self) -> EncodingJob:
-        """Return the job in short segments unless their length is given."""
-        options = self.options
-        if options.segment_frames is None:
-            options = dataclasses.replace(options, segment_frames=SHORT_SEGMENT)
-        return dataclasses.replace(self, source=self.source.in_segments(options.segment_frames), options=options)
+    def _in_segments(self, frames: int) -> EncodingJob:
+        """Return the job in segments of at most so many frames."""
+        options = dataclasses.replace(self.options, segment_frames=frames)
+        return dataclasses.replace(self, source=self.source.in_segments(frames), options=options)
+
+    def _spread_bytes(self, decided: _Decided) -> float:
+        """Return the bytes of a file as far as the middle of the clip tells, coded with all that joins segments."""
+        frames = dict(spread_segments(decided.source))
+        total = float(decided.shared_bytes)
+        for coded in dataclasses.replace(self, report=silent).coded(decided, list(frames)):
+            decided.tried[coded.index] = coded
+            total += _segment_bytes(coded) * frames[coded.index] / decided.source.frames_of(coded.index)
+        return total
 
     def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
@@ -590,10 +604,7 @@ class EncodingJob:
                 positions = decided.source.positions(segment)
                 motion = self._motion(decided, segment, positions, self._exact(segment))
                 decided.tried[segment] = _finished((segment, motion))
-            coded = decided.tried[segment]
-            lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
-            front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
-            total += (front + sum(map(len, lossy))) * frames / decided.source.frames_of(segment)
+            total += _segment_bytes(decided.tried[segment]) * frames / decided.source.frames_of(segment)
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
@@ -890,6 +901,12 @@ class EncodingJob:
         shown = chosen_levels(errors, frames, flaws, self.seen.diagonal, self.options.lossless, first_held)
         store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))
         return errors[shown], joins[shown], shown
+
+
+def _segment_bytes(coded: CodedSegment) -> int:
+    """Return the bytes of a segment, those of exact positions aside."""
+    lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
+    return CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors) + sum(map(len, lossy))
 
 
 def _finished(begun: tuple[int, CodedMotion]) -> CodedSegment:
