@@ -14,7 +14,7 @@ import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -61,7 +61,7 @@ from athcodec.encoding.progress import (
 from athcodec.encoding.sample import is_small
 from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
-from athcodec.encoding.segment_samples import spread_segments, typical_segments
+from athcodec.encoding.segment_samples import typical_segments
 from athcodec.encoding.settings import Choice
 from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.start import still_choice
@@ -99,7 +99,6 @@ FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without co
 PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another that is coded in its place.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
-LONGEST_SHARE = 0.5  # Share of the work left that a search takes in the longest segments if it may be made again.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
 
 
@@ -262,7 +261,7 @@ MOST_LOST = 0.4  # Share of points that are far from their neighbours above whic
 
 
 @dataclass
-class _Decided:
+class Decided:
     """Settings that the streams of a file depend on, and what follows from them."""
 
     ath: Ath
@@ -456,7 +455,7 @@ class EncodingJob:
         except BoundError:
             return math.inf, False
 
-    def decide(self, bound: float) -> _Decided:
+    def decide(self, bound: float) -> Decided:
         """Search for settings."""
         self._check(bound)
         work = self._allowed_work(bound)
@@ -470,7 +469,7 @@ class EncodingJob:
         tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
-    def _decide(self, bound: float, work: Work) -> _Decided:
+    def _decide(self, bound: float, work: Work) -> Decided:
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -481,19 +480,21 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         if self.options.ladder == LADDERS[DEFAULT_LADDER] and search.levels_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
-        shorter = search.shorter_segments() if self.options.segment_frames is None else None
-        if shorter is None:
-            return self._searched(search, share, work)
-        length, price = shorter
-        with work.trying("segments", LONGEST_SHARE):
-            longest = self._searched(search, share, work)
-        least = self._spread_bytes(longest)
-        if least < SEARCH_SAVES * price or not work.fits(0):
-            return longest
-        short = self._in_segments(length)._decide(bound, work)
-        return short if self._spread_bytes(short) < least else longest
+        shorter = search.shorter_segments() if self.options.segment_frames is None else []
+        with work.trying("segments", 1 / (1 + len(shorter))):
+            best = self._searched(search, share, work)
+        least, coding = self.size(best) if shorter else 0, self._coding_work(bound, self.clip.frame_count)
+        for left, (length, price) in zip(range(len(shorter), 0, -1), shorter):
+            with work.trying("segments", 1 / left), suppress(BoundError):
+                if least >= SEARCH_SAVES * price and work.fits(coding):
+                    work.add(coding)
+                    job = self._in_segments(length)
+                    other = job._decide(bound, work)
+                    size = job.size(other)
+                    best, least = (other, size) if size < least else (best, least)
+        return best
 
-    def _searched(self, search: Search, share: float, work: Work) -> _Decided:
+    def _searched(self, search: Search, share: float, work: Work) -> Decided:
         """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
         bound, unsearched = search.trials.start.bound, share * search.first_cost()
         if math.isfinite(unsearched):
@@ -529,15 +530,6 @@ class EncodingJob:
         options = dataclasses.replace(self.options, segment_frames=frames)
         return dataclasses.replace(self, source=self.source.in_segments(frames), options=options)
 
-    def _spread_bytes(self, decided: _Decided) -> float:
-        """Return the bytes of a file as far as the middle of the clip tells, coded with all that joins segments."""
-        frames = dict(spread_segments(decided.source))
-        total = float(decided.shared_bytes)
-        for coded in dataclasses.replace(self, report=silent).coded(decided, list(frames)):
-            decided.tried[coded.index] = coded
-            total += _segment_bytes(coded) * frames[coded.index] / decided.source.frames_of(coded.index)
-        return total
-
     def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
         vertices, frames = self.clip.vertex_count, self.clip.frame_count
@@ -550,7 +542,7 @@ class EncodingJob:
         levels = int(self.source.hierarchy.branch_depth.max())
         return (MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * self.clip.vertex_count * frames
 
-    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> Decided:
         """Return the best of what a search has found: the first of it, and others for which there is work left."""
         trials = search.trials
         frames = sum(trials.source.frames_of(segment) for segment, _ in typical_segments(trials.source))
@@ -562,7 +554,7 @@ class EncodingJob:
         layered = [self._layered(trials.ath, choice, prelude) for choice in coded]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
-    def _is_short(self, decided: _Decided) -> bool:
+    def _is_short(self, decided: Decided) -> bool:
         """Return whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
         options = self.options
         if len(decided.layers.each) > 1 or decided.ath.height == 0 or options.tam is not None:
@@ -570,7 +562,7 @@ class EncodingJob:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float, work: Work) -> _Decided:
+    def _without_levels(self, bound: float, work: Work) -> Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
@@ -588,15 +580,15 @@ class EncodingJob:
     def _long_segments(self) -> Source:
         return self.source.in_segments(self.options.predicted_frames)
 
-    def _predicted(self, choice: Choice) -> _Decided:
+    def _predicted(self, choice: Choice) -> Decided:
         source = self._long_segments
         ath = one_map_each(source.seen)
         prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
         only = Layer(prelude.plan, choice.settings, None)
         layers = Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
-        return _Decided(ath, choice, prelude, layers, source)
+        return Decided(ath, choice, prelude, layers, source)
 
-    def _estimated_bytes(self, decided: _Decided) -> float:
+    def _estimated_bytes(self, decided: Decided) -> float:
         """Return the bytes of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(decided.source):
@@ -604,7 +596,10 @@ class EncodingJob:
                 positions = decided.source.positions(segment)
                 motion = self._motion(decided, segment, positions, self._exact(segment))
                 decided.tried[segment] = _finished((segment, motion))
-            total += _segment_bytes(decided.tried[segment]) * frames / decided.source.frames_of(segment)
+            coded = decided.tried[segment]
+            lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
+            front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
+            total += (front + sum(map(len, lossy))) * frames / decided.source.frames_of(segment)
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
@@ -615,12 +610,12 @@ class EncodingJob:
         ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, step_factors(self.source))
         return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
 
-    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
+    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> Decided:
         source = self.source.about(choice.reference)
         layers = layers_of(source, prelude, choice, self._layer_ratios(ath, choice.settings.bound))
-        return _Decided(ath, choice, prelude, layers, source)
+        return Decided(ath, choice, prelude, layers, source)
 
-    def draft(self, decided: _Decided) -> Draft:
+    def draft(self, decided: Decided) -> Draft:
         options = self.options
         if decided.choice.predicted is None:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
@@ -637,11 +632,11 @@ class EncodingJob:
             decided.ath.thresholds,
         )
 
-    def decided(self, draft: Draft) -> _Decided:
+    def decided(self, draft: Draft) -> Decided:
         """Return what the maker of the draft decided. Raises ClipError if it is not the same here."""
         return self._holding(draft.choice.settings.bound)._decided(draft)
 
-    def _decided(self, draft: Draft) -> _Decided:
+    def _decided(self, draft: Draft) -> Decided:
         settings = draft.choice.settings
         if draft.choice.predicted is not None:
             decided = self._predicted(draft.choice)
@@ -656,25 +651,27 @@ class EncodingJob:
             )
         return decided
 
-    def encode(self, bound: float, store: writing.ChunkStore) -> _Result:
-        decided = self.decide(bound)
-        return self.fill(store, decided, self.coded(decided, range(decided.segment_count)))
-
     def file_size(self, bound: float) -> float:
         """Return the bytes of the file at a bound; infinite if it cannot be kept."""
+        try:
+            return self.size(dataclasses.replace(self, report=silent).decide(bound))
+        except BoundError:
+            return math.inf
+
+    def size(self, decided: Decided) -> int:
+        """Return the bytes of a file. Raises BoundError."""
+        job = dataclasses.replace(self, report=silent)
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-            try:
-                result = dataclasses.replace(self, report=silent).encode(bound, writing.ChunkStore(spool))
-            except BoundError:
-                return math.inf
-        return result.store.size(result.header, result.errors)
+            coded = job.coded(decided, range(decided.segment_count))
+            result = job.fill(writing.ChunkStore(spool), decided, coded)
+            return result.store.size(result.header, result.errors)
 
     def write(
         self,
         path: str | PathLike[str] | None,
         out: BinaryIO,
         spool: IO[bytes],
-        decided: _Decided,
+        decided: Decided,
         coded: Iterable[CodedSegment],
     ) -> Summary:
         """Write the whole file into `out`, which is to become `path`."""
@@ -691,7 +688,7 @@ class EncodingJob:
         self.report("done", 1.0)
         return summary
 
-    def fill(self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
+    def fill(self, store: writing.ChunkStore, decided: Decided, coded: Iterable[CodedSegment]) -> _Result:
         """Add all chunks of a file to a store."""
         layers = decided.layers
         self._add_prelude(store, decided)
@@ -720,7 +717,7 @@ class EncodingJob:
         )
         return _Result(store, header, errors)
 
-    def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
+    def _clips(self, decided: Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
         return writing.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
@@ -757,7 +754,7 @@ class EncodingJob:
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
-    def _add_prelude(self, store: writing.ChunkStore, decided: _Decided) -> None:
+    def _add_prelude(self, store: writing.ChunkStore, decided: Decided) -> None:
         store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
         store.add(ct.REST, writing.pack_rest(decided.layers.rest))
         if decided.layers.source_rest:
@@ -797,7 +794,7 @@ class EncodingJob:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
-    def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
+    def coded(self, decided: Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Yield coded segments, as many at a time as there is memory for."""
         source = decided.source
         if len(source.segments) == 1 and decided.tried:
@@ -832,7 +829,7 @@ class EncodingJob:
 
     def _motion(
         self,
-        decided: _Decided,
+        decided: Decided,
         index: int,
         positions: np.ndarray,
         exact: np.ndarray | None,
@@ -859,7 +856,7 @@ class EncodingJob:
         return order
 
     @staticmethod
-    def _linked(decided: _Decided, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
+    def _linked(decided: Decided, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
         """Yield each segment with the ends that it goes on from, and with room for its own if the next one does."""
         goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
         ends = None
@@ -877,7 +874,7 @@ class EncodingJob:
         return self.source.exact(self.source.block(segment)) if self.options.lossless else None
 
     def _add_motion(
-        self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
+        self, store: writing.ChunkStore, decided: Decided, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray, list[int]]:
         """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of
         all they are. Raises ValueError unless each segment comes once."""
@@ -903,12 +900,6 @@ class EncodingJob:
         return errors[shown], joins[shown], shown
 
 
-def _segment_bytes(coded: CodedSegment) -> int:
-    """Return the bytes of a segment, those of exact positions aside."""
-    lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
-    return CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors) + sum(map(len, lossy))
-
-
 def _finished(begun: tuple[int, CodedMotion]) -> CodedSegment:
     """Return a segment whose first layer is coded. Its memory is freed, whoever holds it."""
     index, motion = begun
@@ -926,7 +917,7 @@ def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
 
 
 def _summary(
-    path: Path | None, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
+    path: Path | None, job: EncodingJob, decided: Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
 ) -> Summary:
     sizes: dict[str, int] = {}
     for chunk in chunks:

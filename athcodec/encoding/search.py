@@ -131,26 +131,26 @@ class Search:
         work.expected = work.expected or min(expected, work.allowed)
         return search
 
-    def shorter_segments(self) -> tuple[int, float] | None:
-        """Return the number of frames of shorter segments in which a file is smaller at first settings, and its bytes;
-        None: there are none. What jumps is seen in all waves of its segment, so segments are halved as long as that
-        makes waves smaller, and learned time bases tell whether these do as well in the longer ones."""
+    def shorter_segments(self) -> list[tuple[int, float]]:
+        """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
+        settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
+        smaller. Learned time bases may do as well in longer ones: the last length is the smallest with them, too."""
         trials = (self.of_sample or self).trials
-        length = max(stop - start for start, stop in trials.source.segments)
+        lengths = [max(stop - start for start, stop in trials.source.segments)]
         tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
-        while (length := -(-length // 2)) >= MIN_SEGMENT:
+        while (length := -(-lengths[-1] // 2)) >= MIN_SEGMENT:
             halves = trials.source.in_segments(length)
             if halves.coded_frames < MIN_SEGMENT * len(halves.segments):  # Most frames are held.
                 break
-            tried.append(trials.in_segments(halves, spread_samples(halves)))
-            if tried[-1].cost(tried[-1].start) >= tried[-2].cost(tried[-2].start):
-                tried.pop()
+            other = trials.in_segments(halves, spread_samples(halves))
+            if other.cost(other.start) >= tried[-1].cost(tried[-1].start):
                 break
+            lengths.append(length)
+            tried.append(other)
         if len(tried) == 1:
-            return None
-        costs = [min(one.costs([one.start, *learned_bases.candidates(one.start, one)])) for one in tried[::-1]]
-        best = tried[::-1][int(np.argmin(costs))]
-        return None if best is tried[0] else (best.source.segment_frames or 0, min(costs))
+            return []
+        costs = [min(one.costs([one.start, *learned_bases.candidates(one.start, one)])) for one in tried]
+        return list(zip(lengths, costs))[1 : int(np.argmin(costs)) + 1]
 
     def levels_need_own_bases(self) -> bool:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
