@@ -6,6 +6,7 @@ on one clip. The work itself is job.py's.
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import itertools
 import shutil
@@ -18,7 +19,7 @@ from typing import Any, BinaryIO, cast
 from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import Trial, best_branches
-from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Draft, EncodingJob, EncodingOptions, placed_clip
+from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Decided, Draft, EncodingJob, EncodingOptions, placed_clip
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.polygons import pack_places
@@ -26,7 +27,7 @@ from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress,
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
-from athcodec.errors import CoarseWarning
+from athcodec.errors import CoarseWarning, SourceWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.result import Found
@@ -54,13 +55,12 @@ def encode_clip(
     option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with keeping(clip.inputs):
         _check(target)  # Refused targets cost no work.
-        job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked))
         path = target if isinstance(target, (str, PathLike)) else None
         whole = tempfile.SpooledTemporaryFile(SPOOL_BYTES) if path is None else new_file(path)
         with whole as opened, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             out = cast(BinaryIO, opened)
+            job, bound, decided = _decided(clip, option, checked, _weighted_progress(clip, progress, option, checked))
             with job.refusing(bound):
-                decided = job.decide(bound)
                 summary = job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
             if path is None:
                 out.seek(0)
@@ -117,9 +117,9 @@ def draft(
     """
     option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with clip.watched():
-        job, bound = _begin(clip, option, checked, _weighted_progress(clip, progress, option, checked, draft=True))
-        with job.refusing(bound):
-            made = job.draft(job.decide(bound))
+        report = _weighted_progress(clip, progress, option, checked, draft=True)
+        job, bound, decided = _decided(clip, option, checked, report)
+        made = job.draft(decided)
     _object(job, option, bound)
     return made
 
@@ -192,6 +192,24 @@ def write(
     job = EncodingJob.resume(clip, draft, WeightedProgress(progress, {"motion": 1.0}))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         return job.write(path, out, spool, job.decided(draft), coded)
+
+
+def _decided(
+    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress
+) -> tuple[EncodingJob, float, Decided]:
+    """Return the job, its bound in scene units, and what is decided about the file. Trials estimate, so effort "best"
+    decides as "default" does, too, and keeps what makes the smaller file."""
+    job, bound = _begin(clip, option, options, report)
+    with job.refusing(bound):
+        decided = job.decide(bound)
+    if options.effort != "best" or option.target_size is not None:
+        return job, bound, decided
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SourceWarning)  # The first job has warned.
+        usual, _ = _begin(clip, option, dataclasses.replace(options, effort="default"), report)
+    with usual.refusing(bound):
+        made = usual.decide(bound)
+    return (usual, bound, made) if usual.size(made) <= job.size(decided) else (job, bound, decided)
 
 
 def _begin(

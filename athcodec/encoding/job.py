@@ -14,7 +14,7 @@ import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -100,7 +100,6 @@ FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without co
 PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another that is coded in its place.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
-SHORT_SEGMENT = 32  # Frames of the segments of what jumps.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
 
 
@@ -263,7 +262,7 @@ MOST_LOST = 0.4  # Share of points that are far from their neighbours above whic
 
 
 @dataclass
-class _Decided:
+class Decided:
     """Settings that the streams of a file depend on, and what follows from them."""
 
     ath: Ath
@@ -457,7 +456,7 @@ class EncodingJob:
         except BoundError:
             return math.inf, False
 
-    def decide(self, bound: float) -> _Decided:
+    def decide(self, bound: float) -> Decided:
         """Search for settings."""
         self._check(bound)
         holding = self._holding(bound)
@@ -480,7 +479,7 @@ class EncodingJob:
         takes no part in the search for settings."""
         return SplitSource.of(self.source, self.seen.ath(thresholds), bound)
 
-    def _of_choice(self, choice: Choice, thresholds: Thresholds) -> _Decided:
+    def _of_choice(self, choice: Choice, thresholds: Thresholds) -> Decided:
         """Return what follows from a choice for all branches."""
         bound = choice.settings.bound
         split = self._split(bound, thresholds)
@@ -498,7 +497,7 @@ class EncodingJob:
         tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
-    def _decide(self, bound: float, work: Work) -> _Decided:
+    def _decide(self, bound: float, work: Work) -> Decided:
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound)
         ratio = ratios[0]
@@ -509,14 +508,23 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         if self._has_usual_ladder and search.levels_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
-        unsearched = share * search.first_cost()
-        short = self._in_short_segments()
-        frames = short.source.coded_frames / len(short.source.segments)  # Fewer than a segment has where many are held.
-        if frames > SHORT_SEGMENT / 2 and short.source.segments != self.source.segments:
-            done = work.done
-            if search.jumps(short.source):
-                return short._decide(bound, work)
-            work.allowed += work.done - done  # What does not jump has all its work left.
+        shorter = search.shorter_segments() if self.options.segment_frames is None else []
+        with work.trying("segments", 1 / (1 + len(shorter))):
+            best = self._searched(search, share, work)
+        least, coding = self.size(best) if shorter else 0, self._coding_work(bound, self.clip.frame_count)
+        for left, (length, price) in zip(range(len(shorter), 0, -1), shorter):
+            with work.trying("segments", 1 / left), suppress(BoundError):
+                if least >= SEARCH_SAVES * price and work.fits(coding):
+                    work.add(coding)
+                    job = self._in_segments(length)
+                    other = job._decide(bound, work)
+                    size = job.size(other)
+                    best, least = (other, size) if size < least else (best, least)
+        return best
+
+    def _searched(self, search: Search, share: float, work: Work) -> Decided:
+        """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
+        bound, unsearched = search.trials.start.bound, share * search.first_cost()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
             search.keep_work_of_maps()
@@ -545,12 +553,10 @@ class EncodingJob:
         """Return the job of a clip whose levels move by series of their own, which prediction hardly suits."""
         return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()), predicts_as_usual=True)
 
-    def _in_short_segments(self) -> EncodingJob:
-        """Return the job in short segments unless their length is given."""
-        options = self.options
-        if options.segment_frames is None:
-            options = dataclasses.replace(options, segment_frames=SHORT_SEGMENT)
-        return dataclasses.replace(self, source=self.source.in_segments(options.segment_frames), options=options)
+    def _in_segments(self, frames: int) -> EncodingJob:
+        """Return the job in segments of at most so many frames."""
+        options = dataclasses.replace(self.options, segment_frames=frames)
+        return dataclasses.replace(self, source=self.source.in_segments(frames), options=options)
 
     def _allowed_work(self, bound: float) -> Work:
         """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
@@ -564,7 +570,7 @@ class EncodingJob:
         levels = int(self.source.hierarchy.branch_depth.max())
         return (MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * self.clip.vertex_count * frames
 
-    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> _Decided:
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> Decided:
         """Return the best of what a search has found: the first of it, and others for which there is work left."""
         trials = search.trials
         frames = sum(trials.source.frames_of(segment) for segment, _ in typical_segments(trials.source))
@@ -576,7 +582,7 @@ class EncodingJob:
         layered = [self._layered(trials.ath, choice, prelude) for choice in coded]
         return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
 
-    def _is_short(self, decided: _Decided) -> bool:
+    def _is_short(self, decided: Decided) -> bool:
         """Return whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
         options = self.options
         if len(decided.layers.each) > 1 or decided.ath.height == 0 or options.tam is not None:
@@ -584,7 +590,7 @@ class EncodingJob:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float, work: Work) -> _Decided:
+    def _without_levels(self, bound: float, work: Work) -> Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
@@ -602,15 +608,15 @@ class EncodingJob:
     def _long_segments(self) -> Source:
         return self.source.in_segments(self.options.predicted_frames)
 
-    def _predicted(self, choice: Choice) -> _Decided:
+    def _predicted(self, choice: Choice) -> Decided:
         source = self._long_segments
         ath = one_map_each(source.seen)
         prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
         only = Layer(prelude.plan, choice.settings, None)
         layers = Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
-        return _Decided(ath, choice, prelude, layers, source)
+        return Decided(ath, choice, prelude, layers, source)
 
-    def _estimated_bytes(self, decided: _Decided) -> float:
+    def _estimated_bytes(self, decided: Decided) -> float:
         """Return the bytes of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(decided.source):
@@ -639,14 +645,14 @@ class EncodingJob:
     def _step_factors(self, bound: float) -> tuple[float, float]:
         return step_factors(self.source, self.options.ladder, bound)
 
-    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> _Decided:
+    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> Decided:
         source = self.source.about(choice.reference)
         bound = choice.settings.bound
         ratios, factors = self._layer_ratios(ath, bound), self._step_factors(bound)
         layers = layers_of(source, prelude, choice, ratios, factors, hold_errors=not self._has_usual_ladder)
-        return _Decided(ath, choice, prelude, layers, source)
+        return Decided(ath, choice, prelude, layers, source)
 
-    def draft(self, decided: _Decided) -> Draft:
+    def draft(self, decided: Decided) -> Draft:
         options = self.options
         if decided.choice.predicted is None:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
@@ -663,11 +669,11 @@ class EncodingJob:
             decided.ath.thresholds,
         )
 
-    def decided(self, draft: Draft) -> _Decided:
+    def decided(self, draft: Draft) -> Decided:
         """Return what the maker of the draft decided. Raises ClipError if it is not the same here."""
         return self._holding(draft.choice.settings.bound)._decided(draft)
 
-    def _decided(self, draft: Draft) -> _Decided:
+    def _decided(self, draft: Draft) -> Decided:
         decided = self._of_choice(draft.choice, draft.thresholds)
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(
@@ -676,25 +682,27 @@ class EncodingJob:
             )
         return decided
 
-    def encode(self, bound: float, store: writing.ChunkStore) -> _Result:
-        decided = self.decide(bound)
-        return self.fill(store, decided, self.coded(decided, range(decided.segment_count)))
-
     def file_size(self, bound: float) -> float:
         """Return the bytes of the file at a bound; infinite if it cannot be kept."""
+        try:
+            return self.size(dataclasses.replace(self, report=silent).decide(bound))
+        except BoundError:
+            return math.inf
+
+    def size(self, decided: Decided) -> int:
+        """Return the bytes of a file. Raises BoundError."""
+        job = dataclasses.replace(self, report=silent)
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-            try:
-                result = dataclasses.replace(self, report=silent).encode(bound, writing.ChunkStore(spool))
-            except BoundError:
-                return math.inf
-        return result.store.size(result.header, result.errors)
+            coded = job.coded(decided, range(decided.segment_count))
+            result = job.fill(writing.ChunkStore(spool), decided, coded)
+            return result.store.size(result.header, result.errors)
 
     def write(
         self,
         path: str | PathLike[str] | None,
         out: BinaryIO,
         spool: IO[bytes],
-        decided: _Decided,
+        decided: Decided,
         coded: Iterable[CodedSegment],
     ) -> Summary:
         """Write the whole file into `out`, which is to become `path`."""
@@ -711,7 +719,7 @@ class EncodingJob:
         self.report("done", 1.0)
         return summary
 
-    def fill(self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]) -> _Result:
+    def fill(self, store: writing.ChunkStore, decided: Decided, coded: Iterable[CodedSegment]) -> _Result:
         """Add all chunks of a file to a store."""
         layers = decided.layers
         self._add_prelude(store, decided)
@@ -740,7 +748,7 @@ class EncodingJob:
         )
         return _Result(store, header, errors)
 
-    def _clips(self, decided: _Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
+    def _clips(self, decided: Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
         return writing.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
 
@@ -777,7 +785,7 @@ class EncodingJob:
                 seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
         return tuple(seams)
 
-    def _add_prelude(self, store: writing.ChunkStore, decided: _Decided) -> None:
+    def _add_prelude(self, store: writing.ChunkStore, decided: Decided) -> None:
         store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
         store.add(ct.REST, writing.pack_rest(decided.layers.rest))
         if decided.layers.source_rest:
@@ -817,7 +825,7 @@ class EncodingJob:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
-    def coded(self, decided: _Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
+    def coded(self, decided: Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Yield coded segments, as many at a time as there is memory for."""
         source = decided.source
         if len(source.segments) == 1 and decided.tried:
@@ -852,7 +860,7 @@ class EncodingJob:
 
     def _motion(
         self,
-        decided: _Decided,
+        decided: Decided,
         index: int,
         positions: np.ndarray,
         exact: np.ndarray | None,
@@ -879,7 +887,7 @@ class EncodingJob:
         return order
 
     @staticmethod
-    def _linked(decided: _Decided, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
+    def _linked(decided: Decided, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
         """Yield each segment with the ends that it goes on from, and with room for its own if the next one does."""
         goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
         ends = None
@@ -897,7 +905,7 @@ class EncodingJob:
         return self.source.exact(self.source.block(segment)) if self.options.lossless else None
 
     def _add_motion(
-        self, store: writing.ChunkStore, decided: _Decided, coded: Iterable[CodedSegment]
+        self, store: writing.ChunkStore, decided: Decided, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray, list[int]]:
         """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of
         all they are. Raises ValueError unless each segment comes once."""
@@ -940,7 +948,7 @@ def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
 
 
 def _summary(
-    path: Path | None, job: EncodingJob, decided: _Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
+    path: Path | None, job: EncodingJob, decided: Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
 ) -> Summary:
     sizes: dict[str, int] = {}
     for chunk in chunks:

@@ -22,11 +22,12 @@ from athcodec.encoding.features import Feature
 from athcodec.encoding.progress import ANALYSIS, LEARNING, START, TRIAL, Work, expected_trials
 from athcodec.encoding.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.segment import CodedPrelude, Source, branch_records
-from athcodec.encoding.segment_samples import samples_of
+from athcodec.encoding.segment_samples import samples_of, spread_samples
 from athcodec.encoding.settings import OF_SAMPLE, Choice, Settings
 from athcodec.encoding.start import first_settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.trials import Trials, distinct
+from athcodec.options import MIN_SEGMENT
 
 LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
@@ -36,7 +37,6 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
-SHORT_SHARE = 0.75  # Share of the bytes at which short segments are taken.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
 TIGHT = 2.0  # Work, in usual searches, below which time bases are tried before forms and rotations.
@@ -131,14 +131,26 @@ class Search:
         work.expected = work.expected or min(expected, work.allowed)
         return search
 
-    def jumps(self, short: Source) -> bool:
-        """Return whether a file is much smaller in short segments, the source in which is given: what jumps is seen in
-        all waves of its segment, and learned time bases do not always help."""
+    def shorter_segments(self) -> list[tuple[int, float]]:
+        """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
+        settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
+        smaller. Learned time bases may do as well in longer ones: the last length is the smallest with them, too."""
         trials = (self.of_sample or self).trials
-        in_short = Search(replace(self.trials, source=short, samples=samples_of(short)), self.effort, self.ratios)
-        most = in_short.first_cost() / SHORT_SHARE
-        apart = replace(trials)  # What a search chooses later may not depend on what was learned here.
-        return most < self.first_cost() and most < apart.cost(trials.start.in_learned_bases())
+        lengths = [max(stop - start for start, stop in trials.source.segments)]
+        tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
+        while (length := -(-lengths[-1] // 2)) >= MIN_SEGMENT:
+            halves = trials.source.in_segments(length)
+            if halves.coded_frames < MIN_SEGMENT * len(halves.segments):  # Most frames are held.
+                break
+            other = trials.in_segments(halves, spread_samples(halves))
+            if other.cost(other.start) >= tried[-1].cost(tried[-1].start):
+                break
+            lengths.append(length)
+            tried.append(other)
+        if len(tried) == 1:
+            return []
+        costs = [min(one.costs([one.start, *learned_bases.candidates(one.start, one)])) for one in tried]
+        return list(zip(lengths, costs))[1 : int(np.argmin(costs)) + 1]
 
     def levels_need_own_bases(self) -> bool:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer

@@ -149,7 +149,7 @@ class Source:
 
     def in_segments(self, frames: int | None) -> Source:
         """Return the source in segments of at most so many frames."""
-        return self._changed(segment_frames=frames)
+        return self._changed(segment_frames=frames, whole=None)
 
     def holding(self, tolerance: float) -> Source:
         """Return the source with frames left out that differ by at most so much from the last one that is coded."""

@@ -11,9 +11,10 @@ import numpy as np
 from athcodec.encoding.motion import squared_bends
 from athcodec.encoding.sample import PlantSample
 from athcodec.encoding.segment import Source
-from athcodec.options import DEFAULT_SEGMENT
+from athcodec.options import DEFAULT_SEGMENT, MAX_SEGMENT
 
 SAMPLES = 3  # Largest number of segments that stand for several clips.
+SPAN = MAX_SEGMENT  # Largest number of frames of a clip on which lengths of segments are compared.
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,29 @@ def typical_segments(source: Source) -> list[tuple[int, int]]:
         np.argsort([_moved(source, segment) for segment in middles], kind="stable"), min(SAMPLES, len(middles))
     )
     return [(middles[group[len(group) // 2]], int(lengths[group].sum())) for group in groups]
+
+
+def spread_samples(source: Source) -> list[SegmentSample]:
+    """Return the segments of `spread_segments` with their positions."""
+    return [
+        SegmentSample(source.positions(segment), frames, source.is_whole_loop(segment), segment)
+        for segment, frames in spread_segments(source)
+    ]
+
+
+def spread_segments(source: Source) -> list[tuple[int, int | float]]:
+    """Return the segments of the middle SPAN frames of a clip, or of a few of several clips. Each has the number of
+    frames of the file that it stands for. Other lengths of segments are compared on these frames, nearly all alike."""
+    spread: list[tuple[int, int | float]] = []
+    for middle, frames in typical_segments(source):
+        starts, segments = np.array(source.clip_range_starts), source.segments
+        clip_range = int(np.searchsorted(starts, middle, side="right")) - 1
+        first, count = int(starts[clip_range]), len(source.clip_range_segments[clip_range])
+        low = (segments[first][0] + segments[first + count - 1][1] - SPAN) // 2
+        chosen = [one for one in range(first, first + count) if low <= sum(segments[one]) // 2 < low + SPAN]
+        scale = frames / sum(map(source.frames_of, chosen))
+        spread += [(one, scale * source.frames_of(one)) for one in chosen]
+    return spread
 
 
 def usual_change(samples: Sequence[SegmentSample]) -> float:

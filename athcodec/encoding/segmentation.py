@@ -6,7 +6,7 @@ from athcodec._native import PIECE_VERTICES
 from athcodec.options import DEFAULT_SEGMENT, MAX_SEGMENT
 
 SEGMENT_BYTES = 128 << 20  # Largest number of bytes of a segment's float32 positions.
-SMALL_BYTES = 32 << 20  # Bytes of float32 positions up to which a clip may be one segment of MAX_SEGMENT frames.
+SMALL_BYTES = 32 << 20  # Bytes of float32 positions up to which segments are longer than DEFAULT_SEGMENT.
 
 
 def decoding_bytes(vertex_count: int, frames: int) -> int:
@@ -18,10 +18,10 @@ def split_segments(
     frame_count: int, vertex_count: int, limit: int | None = None, memory: int = 2 << 30
 ) -> list[tuple[int, int]]:
     """Return balanced runs of at most `limit` frames, fewer if a run's float32 positions exceed 128 MiB or a decoder
-    needs more than `memory` bytes. None: DEFAULT_SEGMENT, or all of a short and small clip."""
+    needs more than `memory` bytes. None: MAX_SEGMENT if such a run is small, else DEFAULT_SEGMENT."""
     if limit is None:
-        short = frame_count <= MAX_SEGMENT and 12 * vertex_count * frame_count <= SMALL_BYTES
-        limit = MAX_SEGMENT if short else DEFAULT_SEGMENT
+        longest = -(-frame_count // -(-frame_count // MAX_SEGMENT))
+        limit = MAX_SEGMENT if 12 * vertex_count * longest <= SMALL_BYTES else DEFAULT_SEGMENT
     limit = max(1, min(limit, SEGMENT_BYTES // (12 * vertex_count)))
     while limit > 1 and decoding_bytes(vertex_count, limit) > memory:
         limit -= 1

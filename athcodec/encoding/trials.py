@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Lock
 
 import numpy as np
@@ -31,7 +31,7 @@ from athcodec.encoding.segment import (
     thread_count,
     time_components,
 )
-from athcodec.encoding.segment_samples import SegmentSample
+from athcodec.encoding.segment_samples import SegmentSample, usual_change
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.survey import Ath
 from athcodec.encoding.time_bases import TimeComponents
@@ -78,6 +78,16 @@ class Trials:
     def middle(self) -> int:
         """Number of the sample between the calm and the wild ones."""
         return len(self.samples) // 2
+
+    def in_segments(self, source: Source, samples: Sequence[SegmentSample]) -> Trials:
+        """Return trials on the same plant in other segments, which are these if they are on the same positions. Rest
+        poses are coded once for both."""
+        if [id(sample.positions) for sample in samples] == [id(sample.positions) for sample in self.samples]:
+            return self
+        change = usual_change(samples) if source.has_seams else math.inf
+        other = replace(self, source=source, start=replace(self.start, usual_change=change), samples=samples)
+        other._preludes, other._seen_preludes = self._preludes, self._seen_preludes
+        return other
 
     def without(self, feature: Feature) -> bool:
         """Return whether the file does without a feature."""
