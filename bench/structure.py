@@ -1,7 +1,7 @@
 """What the encoder finds of the structure of scenes: found against true branches, scene against parts, and so on.
 
-The scenes are those of bench/scenes. Sizes are of positions alone in a single layer (`--attributes none --ladder none`);
-the columns of default options say what a user of `athcodec encode` gets and waits for.
+The scenes are those of bench/scenes. Sizes are of positions alone in a single layer (`--attributes none --ladder
+none`); the columns of default options say what a user of `athcodec encode` gets and waits for.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import athcodec
 from athcodec import MotionClip
 from bench.clips import add_effort, add_rel_error
 from bench.scenes import SCENES, Scene
+from bench.scenes.assembly import bare
 from bench.tables import table
 
 PARTS = 8  # Plants of a scene that are encoded alone, where it has more; their sum is extrapolated.
@@ -151,8 +152,6 @@ def _default_row(scene: Scene, rel_error: float, effort: str) -> dict[str, Any]:
 
 
 def _turning_row(scene: Scene, turning: int, rel_error: float, effort: str) -> dict[str, Any]:
-    from bench.scenes.assembly import bare
-
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
     standing = len(_encoded(bare(scene.standing), **options)[0])
     return {
