@@ -104,11 +104,8 @@ def _figures(clip: MotionClip, without: MotionClip, rel_error: float) -> dict[st
 
 def _shown(rows: Results) -> Results:
     hidden = {"depends", "command", "commit", "bound"}
-    return [
-        {name: value for name, value in row.items() if name not in hidden}
-        | {"found / true": row["found"] / row["true"]}
-        for row in rows
-    ]
+    kept = [{name: value for name, value in row.items() if name not in hidden} for row in rows]
+    return [row | {"found / true": row["found"] / row["true"]} for row in kept]
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
