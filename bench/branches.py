@@ -118,8 +118,8 @@ def table_text(contents: Mapping[str, Any]) -> str:
             more = sum(ratio > LIMIT for ratio in ratios.values())
             worst = max(ratios, key=lambda clip: ratios[clip])
             parts.append(
-                f"{len(ratios)} {what}: {_percent(median(ratios.values()))} in the median, {_percent(ratios[worst])} at "
-                f"most (`{worst}`), above {100 * LIMIT - 100:.0f} % in {more}"
+                f"{len(ratios)} {what}: {_percent(median(ratios.values()))} in the median, {_percent(ratios[worst])} "
+                f"at most (`{worst}`), above {100 * LIMIT - 100:.0f} % in {more}"
             )
     made_by = f"`python -m bench branches`, commits {commits(rows)}"
     return f"More bytes on branches that are found than on true ones ({made_by}): {'; '.join(parts)}.\n"
