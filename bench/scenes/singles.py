@@ -99,7 +99,7 @@ def cloth_leaf(seed: int, frames: int, along: int = 40, across: int = 17) -> Sce
     degree = np.bincount(np.concatenate([a, b]), minlength=len(rest))[:, None]
     steps, settle = 24, 30
     seconds = np.arange((settle + frames) * steps) / (FPS * steps)
-    air = np.stack([gusts(rng, seconds, np.array([[0.0, 0.0, 0.0]]), fastest=2.0)[:, 0] for _ in range(3)], axis=1)
+    air = np.stack([gusts(rng, seconds, np.array([[0.0, 0.0, 0.0]]), fastest=1.0)[:, 0] for _ in range(3)], axis=1)
     air = air * [0.8, 1.2, 1.2] + [1.5, 0.0, 0.0]
     place, before = rest.copy(), rest.copy()
     held = number[:2].ravel()
@@ -109,9 +109,9 @@ def cloth_leaf(seed: int, frames: int, along: int = 40, across: int = 17) -> Sce
         normal = np.cross(np.gradient(grid, axis=0), np.gradient(grid, axis=1)).reshape(-1, 3)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         speed = (place - before) * FPS * steps
-        ripple = 1.0 + 0.5 * np.sin(9.0 * rest[:, :1] + 8.0 * rest[:, 2:] - 7.0 * step / (FPS * steps))
+        ripple = 1.0 + 0.3 * np.sin(9.0 * rest[:, :1] + 8.0 * rest[:, 2:] - 3.0 * step / (FPS * steps))
         force = 6.0 * ((wind * ripple - speed) * normal).sum(axis=1, keepdims=True) * normal - [0.0, 9.81, 0.0]
-        place, before = place + 0.999 * (place - before) + force / (FPS * steps) ** 2, place
+        place, before = place + 0.97 * (place - before) + force / (FPS * steps) ** 2, place
         for _ in range(6):
             apart = place[a] - place[b]
             now = np.linalg.norm(apart, axis=1)
