@@ -14,8 +14,11 @@ from pathlib import Path
 
 from bench import tables
 
-_NAMES = "data rd report sample sizes features levels progressive speed memory decode picture viewer gallery wrappings"
-VERBS = {name: import_module(f"bench.{name}") for name in _NAMES.split()}
+_NAMES = (
+    "data rd report sample sizes features levels structure split branches",
+    "progressive speed memory decode picture viewer gallery wrappings",
+)
+VERBS = {name: import_module(f"bench.{name}") for name in " ".join(_NAMES).split()}
 
 
 def main(argv: Sequence[str]) -> int:

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import compare, features, rd, shown
+from bench import branches, compare, features, rd, shown
 from bench.store import read
 from bench.tables import table
 
 README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
+FORMATS = rd.ROOT / "docs" / "formats.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +36,8 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         file = rd.RESULTS / f"{name}.json"
         if file.exists():
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
+    if branches.RESULTS.exists():
+        yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
     yield README, "overview", compare.overview_text(read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign"))
     yield README, "picture", picture_text()
     yield from shown.sections()

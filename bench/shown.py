@@ -98,6 +98,19 @@ def _decoding(tables: dict[str, list[Row]]) -> list[Row]:
     return list(found.values())
 
 
+def _structure(tables: dict[str, list[Row]]) -> list[Row]:
+    defaults = {row["scene"]: row for row in tables["Default options"]}
+    rows = []
+    for row in tables["Found against true branches and against parts"]:
+        whole = defaults[row["scene"]]
+        named = {name: row[name] for name in ("scene", "roots, branches", "found ones", "true", "found")}
+        ratios = {"/ true": row["found / true"], "/ parts": row["found / parts"]}
+        rows.append(
+            named | ratios | {"default": whole["bytes"], "seconds": whole["seconds"], "levels": whole["levels"]}
+        )
+    return rows
+
+
 BENCHMARKS = "docs/benchmarks.md"
 SHOWN = {
     "sizes": Shown(BENCHMARKS, "sizes", _sizes),
@@ -107,6 +120,23 @@ SHOWN = {
     "host": Shown("docs/command-line.md", "sizes", _host),
     "ladders": Shown("docs/command-line.md", "progressive", _ladders),
     "levels": Shown(BENCHMARKS, "levels", _levels),
+    "structure": Shown(BENCHMARKS, "structure", _structure),
+    "split": Shown(
+        BENCHMARKS,
+        "split",
+        picked(
+            "Split against welded",
+            clip="clip",
+            faces="faces",
+            order="order",
+            vertices="vertices",
+            places="places",
+            split="split",
+            welded="welded",
+            over_limit="/ limit",
+            decoding="decoding",
+        ),
+    ),
     "prefixes": Shown(BENCHMARKS, "progressive", _prefixes),
     "decoding": Shown(BENCHMARKS, "decode", _decoding),
     "speed": Shown(

@@ -38,17 +38,7 @@ def shape_keys(path: Path, seed: int) -> None:
     plant = grow(NODES, 2, 4.0, seed)
     tree = _tree(plant)
     _finish(tree, plant, rng)
-    points = np.array([vertex.co for vertex in tree.data.vertices])
-    tree.shape_key_add(name="Basis")
-    for side in range(4):
-        key = tree.shape_key_add(name=f"wind {side}")
-        wind = np.array([np.cos(side * np.pi / 2), np.sin(side * np.pi / 2), 0.0])
-        reach = np.hypot(points[:, 0], points[:, 1])
-        bend = 0.1 * np.maximum(points[:, 2], 0) ** 1.5 + 0.1 * reach * np.sin(3.0 * reach + side)
-        moved = points + bend[:, None] * wind - np.array([0, 0, 0.02]) * (bend**2)[:, None]
-        key.data.foreach_set("co", moved.astype(np.float32).ravel())
-        key.slider_min = -1.0
-        _noise(key, "value", -1, 1.0, 12.0 + 5 * side, rng)
+    _bend(tree, rng)
     _save(path, bpy.ops.wm.alembic_export, start=1, end=FRAMES)
 
 
@@ -83,6 +73,163 @@ def grass(path: Path, seed: int, blades: int) -> None:
     _save(path, bpy.ops.wm.usd_export, export_animation=True)
 
 
+def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
+    """A flower that opens by shape keys, one for each whorl of petals; flat faces, whose corners a GLB has apart."""
+    rng = np.random.default_rng(seed)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    rows, columns = 11, 7
+    along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    number = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+
+    def petal(angle: float, size: float, opened: float, curl: float) -> np.ndarray:
+        """Points of a petal that leans outwards by an angle, and the more the farther it is from its foot."""
+        lean = np.radians(10 + 70 * opened) * along + np.radians(25) * opened + curl * along**2
+        step = size / (rows - 1)
+        out, up = np.cumsum(np.sin(lean) * step, axis=0), np.cumsum(np.cos(lean) * step, axis=0)
+        wide = size * 0.45 * np.sin(np.pi * (0.08 + 0.88 * along)) * across
+        cup = (0.35 - 0.3 * opened) * across**2 * size * 0.4 * along
+        points = np.stack([0.04 + out - cup * np.cos(lean), wide, up + cup * np.sin(lean)], axis=-1).reshape(-1, 3)
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        return points @ turn.T
+
+    places = [(whorl, 2 * np.pi * (k + 0.5 * whorl) / petals) for whorl in range(whorls) for k in range(petals)]
+    sizes, curls = 1.0 + rng.normal(0, 0.06, len(places)), rng.normal(0, 0.1, len(places))
+
+    def shape(opened: Sequence[float]) -> np.ndarray:
+        parts = [
+            petal(angle, size * (1 - 0.15 * whorl), opened[whorl], curl)
+            for (whorl, angle), size, curl in zip(places, sizes, curls)
+        ]
+        return np.concatenate(parts)
+
+    faces = np.concatenate([quads + len(number.ravel()) * k for k in range(len(places))])
+    mesh = bpy.data.meshes.new("flower")
+    mesh.from_pydata(shape([0.0] * whorls).tolist(), [], faces.tolist())
+    thing = bpy.data.objects.new("flower", mesh)
+    bpy.context.collection.objects.link(thing)
+    thing.shape_key_add(name="Basis")
+    for whorl in range(whorls):
+        first = 5 + 18 * whorl + int(rng.integers(0, 8))
+        for part, much in (("half", 0.45), ("open", 1.0)):
+            key = thing.shape_key_add(name=f"{part} {whorl}")
+            moved = shape([much if other == whorl else 0.0 for other in range(whorls)])
+            key.data.foreach_set("co", moved.astype(np.float32).ravel())
+            half = ((1, 0.0), (first, 0.0), (first + 25, 1.0), (first + 55, 0.0))
+            for frame, value in half if part == "half" else ((1, 0.0), (first + 25, 0.0), (first + 55, 1.0)):
+                key.value = value
+                key.keyframe_insert("value", frame=frame)
+    mesh.shade_flat()
+    _save(path, bpy.ops.export_scene.gltf, export_format="GLB", export_yup=True)
+
+
+def forest(path: Path, seed: int, trees: int, nodes: int) -> None:
+    """Trees beside each other, each an object with shapes and winds of its own."""
+    rng = np.random.default_rng(seed)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    side = int(np.ceil(np.sqrt(trees)))
+    for number in range(trees):
+        plant = grow(nodes, 2, 4.0 * rng.uniform(0.7, 1.3), seed + number)
+        tree = _bark(plant, f"tree {number}")
+        _finish(tree, plant, rng)
+        _bend(tree, rng)
+        row, column = divmod(number, side)
+        tree.location = (1.6 * row + rng.normal(0, 0.3), 1.6 * column + rng.normal(0, 0.3), 0.0)
+    _save(path, bpy.ops.wm.alembic_export, start=1, end=FRAMES)
+
+
+def terrain(path: Path, seed: int, nodes: int, side: int) -> None:
+    """A tree that sways on ground that stands still, as two meshes of a GLB."""
+    rng = np.random.default_rng(seed)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side, size=14.0)
+    ground = bpy.context.object
+    ground.name = "ground"
+    hills = bpy.data.textures.new("hills", "CLOUDS")
+    hills.noise_scale = 2.5
+    push = ground.modifiers.new("hills", "DISPLACE")
+    push.texture, push.strength = hills, 1.0
+    bpy.ops.object.modifier_apply(modifier="hills")
+    ground.data.shade_smooth()
+    plant = grow(nodes, 2, 4.0, seed)
+    tree = _bark(plant, "tree")
+    _finish(tree, plant, rng)
+    _bend(tree, rng)
+    _save(path, bpy.ops.export_scene.gltf, export_format="GLB", export_yup=True)
+
+
+def turntable(path: Path, seed: int, nodes: int) -> None:
+    """A tree that sways on a table that turns once."""
+    rng = np.random.default_rng(seed)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    plant = grow(nodes, 2, 4.0, seed)
+    tree = _bark(plant, "tree")
+    _finish(tree, plant, rng)
+    _bend(tree, rng)
+    table = bpy.data.objects.new("table", None)
+    bpy.context.collection.objects.link(table)
+    tree.parent = table
+    for frame, angle in ((1, 0.0), (FRAMES, 2 * np.pi)):
+        table.rotation_euler = (0.0, 0.0, angle)
+        table.keyframe_insert("rotation_euler", frame=frame)
+    _save(path, bpy.ops.wm.alembic_export, start=1, end=FRAMES)
+
+
+def cloth(path: Path, seed: int, width: float, rows: int, columns: int) -> None:
+    """A leaf of cloth that is held at its stalk, in wind and turbulence."""
+    rng = np.random.default_rng(seed)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    half = width / 2 * np.sin(np.pi * (0.05 + 0.92 * along)) ** 0.7
+    points = np.stack([along, half * across, 0.1 * np.abs(across) * half], axis=-1).reshape(-1, 3)
+    number = np.arange(rows * columns).reshape(rows, columns)
+    quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    mesh = bpy.data.meshes.new("leaf")
+    mesh.from_pydata(points.tolist(), [], quads.tolist())
+    leaf = bpy.data.objects.new("leaf", mesh)
+    bpy.context.collection.objects.link(leaf)
+    stalk = leaf.vertex_groups.new(name="stalk")
+    stalk.add(number[:3].ravel().tolist(), 1.0, "REPLACE")
+    blade = leaf.modifiers.new("cloth", "CLOTH")
+    settings = blade.settings
+    settings.quality, settings.vertex_group_mass = 10, stalk.name
+    settings.mass, settings.air_damping = 0.3, 2.0
+    settings.tension_stiffness = settings.compression_stiffness = settings.shear_stiffness = 40.0
+    settings.bending_stiffness, settings.bending_damping = 8.0, 2.0
+    blade.collision_settings.use_collision = blade.collision_settings.use_self_collision = False
+    blade.point_cache.frame_start, blade.point_cache.frame_end = 1, FRAMES
+    for kind, strength in (("WIND", 250.0), ("TURBULENCE", 120.0)):
+        bpy.ops.object.effector_add(type=kind, location=(-2.0, *rng.normal(0, 0.5, 2)), rotation=(0.0, 1.3, 0.0))
+        field = bpy.context.object.field
+        field.strength, field.seed = strength, int(rng.integers(1, 100))
+        if kind == "TURBULENCE":
+            field.size, field.flow = 0.6, 0.0
+        else:
+            field.noise = 2.0
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, FRAMES
+    for frame in range(1, FRAMES + 1):  # The simulation runs from frame to frame; the export reads its cache.
+        scene.frame_set(frame)
+    bpy.ops.object.select_all(action="DESELECT")
+    leaf.select_set(True)
+    _save(path, bpy.ops.wm.alembic_export, start=1, end=FRAMES, selected=True)
+
+
+def _bend(tree: Any, rng: np.random.Generator) -> None:
+    """Give a tree four shapes, bent by wind from four sides, and key their values."""
+    points = np.array([vertex.co for vertex in tree.data.vertices])
+    tree.shape_key_add(name="Basis")
+    for side in range(4):
+        key = tree.shape_key_add(name=f"wind {side}")
+        wind = np.array([np.cos(side * np.pi / 2), np.sin(side * np.pi / 2), 0.0])
+        reach = np.hypot(points[:, 0], points[:, 1])
+        bend = 0.1 * np.maximum(points[:, 2], 0) ** 1.5 + 0.1 * reach * np.sin(3.0 * reach + side)
+        moved = points + bend[:, None] * wind - np.array([0, 0, 0.02]) * (bend**2)[:, None]
+        key.data.foreach_set("co", moved.astype(np.float32).ravel())
+        key.slider_min = -1.0
+        _noise(key, "value", -1, 1.0, 12.0 + 5 * side, rng)
+
+
 def _z_up(points: np.ndarray) -> np.ndarray:
     return (points * [1, 1, -1])[:, [0, 2, 1]]
 
@@ -90,9 +237,15 @@ def _z_up(points: np.ndarray) -> np.ndarray:
 def _tree(plant: Plant) -> Any:
     """An empty scene with the skeleton of a tree under a skin modifier."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    mesh = bpy.data.meshes.new("tree")
+    return _bark(plant, "tree")
+
+
+def _bark(plant: Plant, name: str) -> Any:
+    """The skeleton of a tree under a skin modifier, beside what is there."""
+    mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(_z_up(plant.position).tolist(), plant.edges.tolist(), [])
-    tree = bpy.data.objects.new("tree", mesh)
+    tree = bpy.data.objects.new(name, mesh)
+    bpy.ops.object.select_all(action="DESELECT")
     bpy.context.collection.objects.link(tree)
     bpy.context.view_layer.objects.active = tree
     tree.select_set(True)

@@ -1,6 +1,7 @@
 """Stems as the elastic rods of the physics engine MuJoCo (1D flexes, which replaced its cables), in turbulent wind.
 
-MuJoCo has no file format for motion: these clips are HDF5, and a stem is a branch.
+MuJoCo has no file format for motion: these clips are HDF5, and a stem is a branch; those of fields and hedges are NumPy
+archives of a mesh, or of points, whose stems nothing names.
 """
 
 from __future__ import annotations
@@ -11,9 +12,13 @@ import mujoco
 import numpy as np
 
 import athcodec
+from bench.scenes import stems as covers
+from bench.trees.ride import smallest_turns
 from bench.trees.wind import Wind
 
-FRAMES, FPS, STEPS = 200, 30.0, 8  # Steps: of the engine in a frame.
+FRAMES, SIDE_BY_SIDE = 200, 80  # Frames of single plants, and of many beside each other.
+GROUP = 8  # Rods of one model.
+FPS, STEPS = 30.0, 8  # Steps: of the engine in a frame.
 RADIUS, WIDTH, DENSITY = 0.002, 0.012, 600.0  # Metres, kg/m3. Width: what the wind sees, with leaves.
 
 
@@ -27,6 +32,32 @@ def grass(path: Path, seed: int, stems: int) -> None:
     _write(path, points, "0 1", 4e8, Wind(3.5, 1.0, length=0.8, seed=seed))
 
 
+def field(path: Path, seed: int, stems: int, apart: float, speed: float, has_faces: bool) -> None:
+    """Blades of a crop in rows, `apart` metres from each other, as ribbons of pairs of vertices."""
+    rng = np.random.default_rng(seed)
+    level, side = np.linspace(0, 1, 12)[:, None], int(np.ceil(np.sqrt(stems)))
+    row, column = np.divmod(np.arange(stems), side)
+    feet = apart * (np.stack([row, 0 * row, column], axis=1) - [side / 2, 0, side / 2])
+    feet = (feet + rng.normal(0, 0.3 * apart, feet.shape) * [1, 0, 1])[:, None]
+    lean = rng.normal(0, 0.15, (stems, 1, 3)) * [1, 0, 1]
+    rods = feet + rng.uniform(0.6, 0.9, (stems, 1, 1)) * (level * [0, 1, 0] + level**2 * lean)
+    moved = _in_groups(rods, 6e8, Wind(speed, 1.0, length=1.2, seed=seed))
+    width = 0.008 * np.sqrt(1.02 - level[:, 0])
+    _write_mesh(path, *covers.ribbons(_stems(moved), rng.uniform(0, 2 * np.pi, stems), width), has_faces)
+
+
+def hedge(path: Path, seed: int, stems: int, sides: int) -> None:
+    """Stems of a hedge as tubes, 40 to a metre, that grow through each other."""
+    rng = np.random.default_rng(seed)
+    level = np.linspace(0, 1, 12)[:, None]
+    feet = rng.uniform(-0.5, 0.5, (stems, 1, 3)) * [stems / 40, 0, 0.4]
+    lean = rng.normal(0, 0.3, (stems, 1, 3)) * [1, 0, 1]
+    rods = feet + rng.uniform(0.8, 1.3, (stems, 1, 1)) * (level * [0, 1, 0] + level**2 * lean)
+    moved = _in_groups(rods, 8e9, Wind(3.0, 1.0, length=1.5, seed=seed))
+    radius = rng.uniform(0.004, 0.008, (stems, 1)) * np.linspace(1, 0.4, 12)
+    _write_mesh(path, *covers.tubes(_stems(moved), radius, sides), has_faces=True)
+
+
 def vine(path: Path, seed: int, joints: int) -> None:
     """Three vines that hang between posts."""
     rng = np.random.default_rng(seed)
@@ -38,6 +69,42 @@ def vine(path: Path, seed: int, joints: int) -> None:
 
 
 def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) -> None:
+    moved = _moved(rods, pins, young, wind, FRAMES)
+    clip = athcodec.MotionClip(
+        moved.reshape(FRAMES, -1, 3).astype(np.float32),
+        np.arange(FRAMES) / FPS,
+        np.repeat(np.arange(len(rods)), rods.shape[1]),
+        np.full(len(rods), -1),
+        rest=rods.reshape(-1, 3).astype(np.float32),
+        metadata={"unit": "m", "up_axis": "y", "fps": FPS},
+    )
+    athcodec.write_hdf5(clip, path)
+
+
+def _write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, has_faces: bool) -> None:
+    """A NumPy archive of (T, S, n, 3) positions, whose stems all have the (F, 4) faces."""
+    frames, count, size, _ = positions.shape
+    numbers = (faces + size * np.arange(count)[:, None, None]).reshape(-1, 4).astype(np.int32)
+    arrays = {"faces": numbers} if has_faces else {}
+    np.savez(path, positions=positions.reshape(frames, -1, 3).astype(np.float32), fps=FPS, **arrays)
+
+
+def _stems(moved: np.ndarray) -> covers.Stems:
+    """What covers need, of (T, S, P, 3) rods: the smallest turns of their pieces from their first directions."""
+    along = np.gradient(moved, axis=2)
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    heading = along[0, :, 0]
+    return covers.Stems(moved, smallest_turns(heading[:, None], along), heading)
+
+
+def _in_groups(rods: np.ndarray, young: float, wind: Wind) -> np.ndarray:
+    """The same of rods that stand in the ground, a few at a time: no rod touches another, and few are solved faster."""
+    groups = np.array_split(rods, -(-len(rods) // GROUP))
+    return np.concatenate([_moved(group, "0 1", young, wind, SIDE_BY_SIDE) for group in groups], axis=1)
+
+
+def _moved(rods: np.ndarray, pins: str, young: float, wind: Wind, frame_count: int) -> np.ndarray:
+    """(T, S, P, 3) nodes of rods in the wind."""
     count = rods.shape[1]
     lengths = np.linalg.norm(np.diff(rods, axis=1), axis=2)
     elements = " ".join(f"{i} {i + 1}" for i in range(count - 1))
@@ -58,7 +125,7 @@ def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) ->
     piece = np.gradient(np.concatenate([np.zeros((len(rods), 1)), lengths.cumsum(axis=1)], axis=1), axis=1).ravel()
     bodies, frames = model.flex_vertbodyid, []
     before = state.flexvert_xpos.copy()
-    for step in range((FRAMES - 1) * STEPS + 1):
+    for step in range((frame_count - 1) * STEPS + 1):
         if step % STEPS == 0:
             frames.append(state.flexvert_xpos.astype(np.float32))
         blown = wind.at(state.flexvert_xpos, state.time) - (state.flexvert_xpos - before) / model.opt.timestep
@@ -66,12 +133,4 @@ def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) ->
         drag = 0.6 * WIDTH * piece[:, None] * np.linalg.norm(blown, axis=1, keepdims=True) * blown
         state.xfrc_applied[bodies, :3] = drag
         mujoco.mj_step(model, state)
-    clip = athcodec.MotionClip(
-        np.array(frames),
-        np.arange(FRAMES) / FPS,
-        np.repeat(np.arange(len(rods)), count),
-        np.full(len(rods), -1),
-        rest=rods.reshape(-1, 3).astype(np.float32),
-        metadata={"unit": "m", "up_axis": "y", "fps": FPS},
-    )
-    athcodec.write_hdf5(clip, path)
+    return np.array(frames).reshape(frame_count, *rods.shape)

@@ -36,8 +36,8 @@ BLADE = np.array([[0, 0, 0], [0.3, 0, 0.5], [0, 0.05, 1], [-0.3, 0, 0.5]])
 SIDES = np.array([[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]])
 
 
-def sequence(path: Path, plant: str, seed: int) -> None:
-    """Numbered files beginning with `path`."""
+def sequence(path: Path, plant: str, seed: int, is_split: bool = False) -> None:
+    """Numbered files beginning with `path`; split: each triangle has vertices of its own, as flat shading needs."""
     grammar = PLANTS[plant]
     word = _derived(grammar)
     chance = np.random.default_rng(seed).normal(1, 0.12, len(word))
@@ -45,6 +45,8 @@ def sequence(path: Path, plant: str, seed: int) -> None:
     for frame in range(FRAMES):
         points, faces = _mesh(grammar, word, chance, grammar.steps * (0.15 + 0.95 * frame / (FRAMES - 1)))
         mesh = trimesh.Trimesh(points, faces, process=False)
+        if is_split:
+            mesh.unmerge_vertices()
         numbered = path.with_name(path.name.replace("0000", f"{frame:04}"))
         options = {"vertex_normal": False} if path.suffix == ".ply" else {"include_normals": False, "digits": 6}
         mesh.export(numbered, **options)

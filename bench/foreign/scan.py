@@ -19,8 +19,9 @@ from bench.trees.wind import Wind
 FRAMES, FPS = 150, 30.0
 
 
-def skeleton(path: Path, seed: int, nodes: int) -> None:
-    """Numbered VTU files beginning with `path`, of line cells, as a script around meshio writes them."""
+def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
+    """Numbered VTU files beginning with `path`, of line cells, as a script around meshio writes them; the plant
+    stands on a table that makes so many turns."""
     rng = np.random.default_rng(seed)
     plant = grow(nodes, 3, 9.0, seed)
     points, quads = tubes(plant, 8)
@@ -39,6 +40,7 @@ def skeleton(path: Path, seed: int, nodes: int) -> None:
     wind = Wind(6.0, 9.0, seed=seed)
     for frame in range(FRAMES):
         moved = _swayed(rest, order, parent, wind, frame / FPS)
+        moved = Rotation.from_rotvec([0, 2 * np.pi * turns * frame / FRAMES, 0]).apply(moved) if turns else moved
         mesh = meshio.Mesh(moved.astype(np.float32), [("line", edges)])
         mesh.write(path.with_name(path.name.replace("0000", f"{frame:04}")))
 

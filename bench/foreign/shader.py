@@ -58,9 +58,43 @@ class _Tree:
         return points * length / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
 
 
+class _Willow(_Tree):
+    """Leaves alone, on a crown that is not there, each a strip of pairs of vertices that hangs and flutters."""
+
+    def __init__(self, leaves: int, pairs: int, height: float, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        plant = grow(400, 3, height, seed)
+        node = np.sort(rng.choice(np.flatnonzero(plant.foliage > 0), leaves))
+        foot = plant.position[node] + rng.normal(0, 0.02 * height, (leaves, 3))
+        down = rng.normal(0, 0.4, (leaves, 3)) + [0.0, -1.0, 0.0]
+        side = np.cross(down, rng.normal(size=(leaves, 3)))
+        down, side = (part / np.linalg.norm(part, axis=1, keepdims=True) for part in (down, side))
+        level = np.linspace(0, 1, pairs)[:, None]
+        spine = foot[:, None] + 0.03 * height * rng.uniform(0.7, 1.3, (leaves, 1, 1)) * level * down[:, None]
+        across = 0.0025 * height * np.sin(np.pi * (0.08 + 0.86 * level)) * side[:, None]
+        self.points = np.stack([spine - across, spine + across], axis=2).reshape(-1, 3)
+        quads = 2 * np.arange(pairs - 1)[:, None] + [0, 1, 3, 2]
+        self.faces = (2 * pairs * np.arange(leaves)[:, None, None] + quads).reshape(-1, 4).astype(np.int32)
+        size = 2 * pairs
+        phase = np.repeat(rng.random(leaves), size)
+        edge = np.tile(np.repeat(level[:, 0] ** 2, 2), leaves)
+        swing = np.repeat(np.hypot(*foot[:, [0, 2]].T) / height, size)
+        self.colours = np.round(255 * np.stack([edge, phase, np.minimum(swing, 1)], axis=1)) / 255  # As bytes.
+        self.normals = np.repeat(np.cross(side, down), size, axis=0)
+        self.height = height
+
+
 def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames: int) -> None:
     """A GLB with a morph target for every frame, as tools that bake a shader write it for engines without one."""
-    tree = _Tree(nodes, orders, height, seed)
+    _write(path, _Tree(nodes, orders, height, seed), "tree", frames)
+
+
+def willow(path: Path, seed: int, leaves: int, pairs: int, height: float, frames: int) -> None:
+    """The same of leaves alone."""
+    _write(path, _Willow(leaves, pairs, height, seed), "leaves", frames)
+
+
+def _write(path: Path, tree: _Tree, name: str, frames: int) -> None:
     triangles = np.concatenate([tree.faces[:, :3], tree.faces[:, [0, 2, 3]]])
     times = np.arange(frames) / FPS
     targets = [tree.at(seconds) - tree.points for seconds in times]
@@ -83,8 +117,8 @@ def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames
     document = {
         "asset": {"version": "2.0"},
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "tree", "mesh": 0}],
-        "meshes": [{"name": "tree", "primitives": [primitive], "weights": [0] * frames}],
+        "nodes": [{"name": name, "mesh": 0}],
+        "meshes": [{"name": name, "primitives": [primitive], "weights": [0] * frames}],
         "animations": [{"name": "wind", "samplers": [{"input": 3, "output": 4}], "channels": [channel]}],
         "buffers": [{"byteLength": starts[-1]}],
         "bufferViews": [
