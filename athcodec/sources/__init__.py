@@ -19,16 +19,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
-from athcodec.motion.frames import Frames
 from athcodec.motion.positions import Order, parse_order
-from athcodec.motion.units import METRES, METRES_PER_UNIT, checked_axis, checked_unit, metres_of, size_of, stated_scene
+from athcodec.motion.scene import in_scene
+from athcodec.motion.units import checked_axis, checked_unit, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
@@ -349,7 +347,7 @@ def read(
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         clip.metadata |= _stated(clip.metadata, path, unit=unit, up_axis=up_axis)
-        return _in_axes(_in_units(clip, unit), up_axis)
+        return in_scene(clip, unit, up_axis)
 
 
 def _warn_of_frames(path: str | PathLike[str]) -> None:
@@ -484,49 +482,6 @@ def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: st
             )
             scene[name] = None
     return scene
-
-
-def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
-    if unit is None:
-        return clip
-    metres = metres_of(clip.metadata)
-    factor = 1.0 if metres is None or clip.metadata.get("unit") == unit else metres / METRES[unit]
-    clip.metadata.pop(METRES_PER_UNIT, None)
-    return _mapped(clip, np.eye(3) * factor, unit=unit)
-
-
-def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
-    """Turned by the right angle that takes its up axis to the wanted one."""
-    if up_axis is None:
-        return clip
-    stated = clip.metadata.get("up_axis") or up_axis
-    before, after = "xyz".find(stated), "xyz".find(up_axis)
-    if before < 0:
-        raise ClipError(f"up_axis: got a clip with {stated!r}, expected x, y or z to turn it to {up_axis!r}")
-    turn = np.eye(3)
-    if before != after:
-        third = 3 - before - after
-        turn = np.zeros((3, 3))
-        turn[after, before], turn[before, after], turn[third, third] = 1.0, -1.0, 1.0
-    return _mapped(clip, turn, up_axis=up_axis)
-
-
-def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip:
-    clip.metadata |= metadata
-    if np.array_equal(matrix, np.eye(3)):
-        return clip
-    if "normals" in clip.attributes:
-        turned = clip.attributes["normals"] @ (matrix / np.cbrt(np.linalg.det(matrix))).T
-        clip.attributes["normals"] = turned.astype(clip.attributes["normals"].dtype)
-    source, dtype = clip.positions, clip.dtype
-    positions = Frames(
-        lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
-        clip.frame_count,
-        clip.vertex_count,
-        dtype,
-    )
-    rest = (clip.rest @ matrix.T).astype(clip.rest_dtype)
-    return clip.replace(positions=positions, rest=rest, rest_given=clip.rest_given)
 
 
 def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> MotionClip:

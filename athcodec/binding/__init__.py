@@ -1,0 +1,321 @@
+"""A plant's motion on another mesh: `athcodec.onto`.
+
+chains.py makes frames along the stems of the plant, surface.py finds what hangs together in the mesh, search.py where
+on the plant each piece hangs, and moving.py moves it. scene.py looks for the unit and the up axis of a mesh that lies
+elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from athcodec.arrays import Source, clip_of
+from athcodec.binding.chains import Chains
+from athcodec.binding.moving import MovingPoints
+from athcodec.binding.scene import far_share, fitting_scene
+from athcodec.binding.search import Marks, bind
+from athcodec.binding.surface import MeshPoints
+from athcodec.decoding.array_like import ArrayLike
+from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.indexing import split_index
+from athcodec.errors import ClipError
+from athcodec.files.atomic import FileId
+from athcodec.files.shown import counted
+from athcodec.metrics import ErrorMeter
+from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.frames import Frames
+from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH
+from athcodec.motion.scene import in_scene
+from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, stated_scene
+
+FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
+MOST_FAR = 0.5  # Share of far vertices above which a mesh is refused.
+OF_PLANT = ("unit", "up_axis", METRES_PER_UNIT, "fps", "start_frame", STRENGTH, HEADING, BLEND, OWN)
+OF_MESH = ("animations", "presence")  # What the mesh's metadata say of the frames that it had.
+
+
+@dataclass(frozen=True)
+class OntoReport:
+    """What `onto` did with a mesh; lengths are in the plant's unit.
+
+    Attributes
+    ----------
+    vertex_count : int
+        Vertices of the mesh.
+    far_count : int
+        Vertices that are further from the plant than `far_limit` in the rest pose.
+    far_limit : float
+        A tenth of the diagonal of the plant's rest pose.
+    furthest : float
+        Largest distance of a vertex from the plant.
+    card_count : int
+        Connected pieces, such as leaves, that each move as a whole.
+    joint_count : int
+        Vertices that more than one branch moves.
+    unit : str
+        The plant's unit, "" where it states none.
+    frame_count : int
+        Frames that were compared with the mesh's own motion; 0 without any.
+    max_error, rms_error : float or None
+        Largest distance and root mean square of the distances from the mesh's own motion; None without any.
+    not_compared : str
+        Why a mesh with motion of its own was not compared; else "".
+    """
+
+    vertex_count: int
+    far_count: int
+    far_limit: float
+    furthest: float
+    card_count: int
+    joint_count: int
+    unit: str = ""
+    frame_count: int = 0
+    max_error: float | None = None
+    rms_error: float | None = None
+    not_compared: str = ""
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        text = (
+            f"{counted(self.vertex_count, 'vertex', 'vertices')} on the plant, {counted(self.card_count, 'piece')} of "
+            f"them whole, {self.joint_count:,} at joints; {self.far_count:,} further away than {self.far_limit:.3g}"
+            f"{unit}, the furthest {self.furthest:.3g}{unit}"
+        )
+        if self.max_error is not None:
+            text += (
+                f"; off the mesh's own motion by up to {self.max_error:.3g}{unit}, RMS {self.rms_error:.3g}{unit}, in "
+                f"{counted(self.frame_count, 'frame')}"
+            )
+        return text + (f"; {self.not_compared}" if self.not_compared else "")
+
+
+class OntoMesh(ArrayLike):
+    """A mesh that moves with an .ath file, a read-only array of shape (frames, vertices, 3); a context manager.
+
+    Indices mean what they mean for a NumPy array and move only the frames that they need. Positions come in the order
+    of the mesh's vertices, in the unit and axes of the plant. `onto` makes it.
+
+    Attributes
+    ----------
+    clip : MotionClip
+        The mesh with its new motion, its faces and all its attributes: what `write` and `encode` take. Its frames are
+        computed when they are read.
+    """
+
+    def __init__(self, view: ClipView, mesh: MotionClip, opened: ExitStack):
+        self._view, self._mesh, self._opened = view, mesh, opened
+        chains = Chains(view)
+        marks, self._limit = Marks(chains), FAR * chains.diagonal
+        rest = np.asarray(mesh.rest, np.float64)
+        _refuse_far_mesh(marks, rest, self._limit, view.metadata, mesh.metadata)
+        points = MeshPoints(rest, mesh.polygons, mesh.edges)
+        self._points, self._binding = points, bind(chains, points, marks)
+        offset = rest - points.place[points.of_vertex]
+        self._moving = MovingPoints(chains, self._binding, points.place, points.of_vertex, offset)
+        self.clip = self._moved_clip()
+
+    def __repr__(self) -> str:
+        frames, vertices, _ = self.shape
+        return f"<OntoMesh: {counted(frames, 'frame')} of {counted(vertices, 'vertex', 'vertices')}, {self.dtype}>"
+
+    def __enter__(self) -> OntoMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the mesh's file; the plant's stays open."""
+        self._opened.close()
+
+    # ---- the array ----
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Frames, vertices and 3."""
+        return self._view.frame_count, self._mesh.vertex_count, 3
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the positions, float32 or float64 as in the .ath file."""
+        return self._view.dtype
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Any:
+        frames, of_frames = split_index(index, self.shape[0])
+        shown = np.empty((len(frames), *self.shape[1:]), self.dtype)
+        runs = np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) != 1) + 1) if len(frames) else ()
+        for run in runs:
+            shown[run] = self._block(int(frames[run[0]]), int(frames[run[-1]]) + 1)
+        return shown[of_frames]
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        for _, block in self.clip.blocks():
+            yield from block
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
+        if copy is False:
+            raise ValueError("OntoMesh: got copy=False; expected None or True, because the array is computed")
+        return np.asarray(self[:], dtype)
+
+    def _block(self, start: int, stop: int) -> np.ndarray:
+        return self._moving.move(self._view.block(start, stop)).astype(self.dtype, copy=False)
+
+    # ---- what is known of it ----
+
+    @cached_property
+    def report(self) -> OntoReport:
+        """How the mesh lies on the plant. Where it has motion of its own, the first look at the report moves all
+        frames to compare them."""
+        of_vertex = self._points.of_vertex
+        distance = self._binding.distance[of_vertex]
+        known = {
+            "vertex_count": self._mesh.vertex_count,
+            "far_count": int((distance > self._limit).sum()),
+            "far_limit": self._limit,
+            "furthest": float(distance.max()),
+            "card_count": self._binding.card_count,
+            "joint_count": int(self._binding.is_shared[of_vertex].sum()),
+            "unit": str(self._view.metadata.get("unit") or ""),
+        }
+        return OntoReport(**known, **self._errors())
+
+    def _errors(self) -> dict[str, Any]:
+        """Return the figures against the mesh's own motion, as far as it has any in the plant's frames."""
+        mesh, view = self._mesh, self._view
+        if mesh.frame_count == 1 or stands_still(mesh):
+            return {}
+        first = view.first_frame if mesh.frame_count != view.frame_count else 0
+        if mesh.frame_count not in (view.frame_count, view.decoder.frame_count):
+            frames = f"{mesh.frame_count:,} against {view.frame_count:,}"
+            return {"not_compared": f"the mesh's own motion has other frames ({frames}) and was not compared"}
+        meter = ErrorMeter()
+        for start, block in self.clip.blocks():
+            meter.add(mesh.block(first + start, first + start + len(block)), block)
+        return {"frame_count": meter.frame_count, "max_error": meter.max_error, "rms_error": meter.rms_error}
+
+    def _moved_clip(self) -> MotionClip:
+        view, mesh = self._view, self._mesh
+        of_plant = {name: view.metadata[name] for name in OF_PLANT if name in view.metadata}
+        of_mesh = {name: value for name, value in mesh.metadata.items() if name not in (*OF_PLANT, *OF_MESH)}
+        return mesh.replace(
+            positions=Frames(self._block, view.frame_count, mesh.vertex_count, self.dtype),
+            time=view.time,
+            clip_ranges=view.clip_ranges,
+            metadata=of_mesh | of_plant,
+            rest_given=True,
+            unchanged=_Unchanged(mesh, view.inputs),
+        )
+
+
+class _Unchanged:
+    """Whether the mesh's file is as it was, and the files that the moved mesh is read from."""
+
+    def __init__(self, mesh: MotionClip, inputs: frozenset[FileId]):
+        self._mesh, self.files = mesh, mesh.inputs | inputs
+
+    def __call__(self) -> bool:
+        return self._mesh.unchanged is None or self._mesh.unchanged()
+
+
+def onto(
+    motion: Decoder | ClipView, mesh: Source, *, unit: str | None = None, up_axis: str | None = None, **options: Any
+) -> OntoMesh:
+    """Let a mesh in the rest pose of a plant move as the plant does.
+
+    Every vertex of the mesh hangs on the nearest place along a stem, or on two or three where stems join. It keeps its
+    offset from there in a frame that turns with the stem. Connected pieces that grow beside a stem, such as leaves,
+    move as a whole. A stem that grows by more than a tenth takes its girth and its leaves with it.
+
+    Parameters
+    ----------
+    motion : Decoder or ClipView
+        The plant: an opened .ath file, at the level that it shows.
+    mesh : str, path-like, MotionClip or array
+        The mesh: a file of any format that `read` knows, of which the rest pose, or else the first frame, is the
+        plant's rest pose. An array (vertices, 3) or (frames, vertices, 3) can have `faces` beside it.
+    unit : {"m", "cm", "mm", "km", "in", "ft"}, optional
+        The unit of the mesh, in place of what it states. The mesh is brought to that of the plant.
+    up_axis : {"x", "y", "z"}, optional
+        The up axis of the mesh, in place of what it states.
+    **options
+        What an array does not say, as for `encode`: faces.
+
+    Returns
+    -------
+    OntoMesh
+        Positions (frames, V, 3) in the plant's unit and axes, with a `report`, and as a `clip` for `write`. Close it,
+        or use it in a ``with`` statement; the motion stays open.
+
+    Raises
+    ------
+    ClipError
+        If most vertices are further from the plant than a tenth of its diagonal, or the mesh is no usable clip.
+    NeedsHostMesh
+        If the file has no rest pose, and no `host_mesh` was passed to `open`.
+    MissingExtra
+        If scipy is missing, or what reads the mesh.
+    OSError
+        If the mesh cannot be read.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass"), clip="gale") as grass:
+    ...     blades = athcodec.onto(grass, grass.file.rest[::2])
+    ...     blades.shape, blades.report.far_count
+    ((150, 700, 3), 0)
+    """
+    view = ClipView(motion) if isinstance(motion, Decoder) else motion
+    stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
+    opened = ExitStack()
+    with opened:
+        clip = _read_mesh(mesh, opened, {name: value for name, value in stated.items() if value}, options)
+        return OntoMesh(view, _in_scene_of(view, clip), opened.pop_all())
+
+
+def _read_mesh(mesh: Source, opened: ExitStack, stated: dict[str, str], options: dict[str, Any]) -> MotionClip:
+    """Return a mesh with the unit and axis that the caller states in place of those that it has."""
+    # A path takes them for what a file lacks; they also let a file with an unknown unit be read.
+    clip, _ = opened.enter_context(clip_of(mesh, **options))
+    metadata = {name: value for name, value in clip.metadata.items() if "unit" not in stated or name != METRES_PER_UNIT}
+    return clip.replace(metadata=metadata | stated)
+
+
+def _in_scene_of(view: ClipView, mesh: MotionClip) -> MotionClip:
+    """Return a mesh in the unit and axes of a plant, as far as both state theirs."""
+    scene: dict[str, str] = {}
+    for name in ("unit", "up_axis"):
+        with suppress(ClipError):  # A plant may have a unit that nothing can be brought to.
+            scene |= stated_scene({name: view.metadata.get(name)})
+    return in_scene(mesh, scene.get("unit"), scene.get("up_axis"))
+
+
+def _refuse_far_mesh(marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, Any], mesh: dict[str, Any]) -> None:
+    """Raise ClipError if most vertices are far from the plant; the message names the unit or axis that fits."""
+    share = far_share(marks, rest, limit)
+    if share <= MOST_FAR:
+        return
+    fitting = fitting_scene(marks, rest, limit, plant, mesh)
+    text = (
+        f"onto: {share:.0%} of the mesh's vertices are further from the plant than {limit:.3g}, a tenth of its diagonal"
+    )
+    if fitting is None:
+        raise ClipError(
+            f"{text}, and no other unit or up axis brings it there; expected a mesh of this plant in its rest pose"
+        )
+    options = {name: value for name, value in zip(("unit", "up_axis"), fitting) if value}
+    raise ClipError(
+        text,
+        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in options.items())}",
+        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in options.items()),
+    )
