@@ -208,7 +208,9 @@ class OntoMesh(ArrayLike):
         view, mesh = self._view, self._mesh
         of_plant = {name: view.metadata[name] for name in OF_PLANT if name in view.metadata}
         of_mesh = {name: value for name, value in mesh.metadata.items() if name not in (*OF_PLANT, *OF_MESH)}
+        branches = {} if mesh.has_branches else self._branches()
         return mesh.replace(
+            **branches,
             positions=Frames(self._block, view.frame_count, mesh.vertex_count, self.dtype),
             time=view.time,
             clip_ranges=view.clip_ranges,
@@ -216,6 +218,22 @@ class OntoMesh(ArrayLike):
             rest_given=True,
             unchanged=_Unchanged(mesh, view.inputs),
         )
+
+    def _branches(self) -> dict[str, np.ndarray]:
+        """Return the plant's branches as those of the mesh, as far as they move any of it."""
+        branch, along = self._moving.branch_of_points()
+        parent = self._view.decoder.file.hierarchy.branch_parent
+        is_used = np.bincount(branch, minlength=len(parent)) > 0
+        # The nearest branch below that is used; parents come before their children.
+        below = np.full(len(parent), -1)
+        for each in np.flatnonzero(parent >= 0).tolist():
+            below[each] = parent[each] if is_used[parent[each]] else below[parent[each]]
+        number = np.append(np.cumsum(is_used) - 1, -1)
+        vertex_branch = number[branch[self._points.of_vertex]]
+        order = np.lexsort((along[self._points.of_vertex], vertex_branch))
+        stem_index = np.empty(len(order), np.int64)
+        stem_index[order] = np.arange(len(order)) - np.searchsorted(vertex_branch[order], vertex_branch[order])
+        return {"vertex_branch": vertex_branch, "branch_parent": number[below[is_used]], "stem_index": stem_index}
 
 
 class _Unchanged:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from athcodec.binding.chains import Chains
@@ -47,6 +45,18 @@ class MovingPoints:
             self._tables.append((binding.point[rows], of_row[rows], off[rows], binding.weight[rows]))
         self._count = len(place)
 
+    def branch_of_points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the branch, in file order, that moves each point most, and how far along it the point hangs, in
+        elements; (P,) each."""
+        branch, along = np.zeros(self._count, np.int64), np.zeros(self._count)
+        largest = np.zeros(self._count)
+        for point, place, _, weight in self._tables:
+            more = weight > largest[point]
+            some, of = point[more], place[more]
+            branch[some], largest[some] = self._chains.element_branch[self._element[of]], weight[more]
+            along[some] = self._element[of] + self._share[of]
+        return branch, along
+
     @property
     def block_length(self) -> int:
         """Frames to move at once."""
@@ -57,12 +67,6 @@ class MovingPoints:
         """Return the vertices (k, V, 3) float64 for frames (k, N, 3) of the plant."""
         length = self.block_length
         return np.concatenate([self._moved(frames[start : start + length]) for start in range(0, len(frames), length)])
-
-    def blocks(self, frames: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the vertices a few frames at a time."""
-        length = self.block_length
-        for start in range(0, len(frames), length):
-            yield self._moved(frames[start : start + length])
 
     def _moved(self, frames: np.ndarray) -> np.ndarray:
         pose = self._chains.pose(frames)

@@ -19,6 +19,7 @@ AROUND = 0.5  # Length of the mean offset from a stem over the mean length of of
 ONE_STEM = 2.0  # Mean distance of a piece from its branch over that from the nearest branches, for a piece on one stem.
 ONE_SURFACE = 0.6  # Share of a piece's points that are nearest to one branch that is a surface.
 LARGEST_CARD = 0.5  # Extent of a piece over the plant's diagonal, above which it is no leaf.
+SMALL_CARD = 0.1  # The same extent, below which a piece between several stems is a leaf and no wood.
 ROUNDS = 6  # Rounds in which weights spread over the mesh where the branches of neighbours differ.
 SHARES = 3  # Branches that move a point, at most.
 LEAST_WEIGHT = 0.02
@@ -163,16 +164,21 @@ class _Search:
         extent = np.linalg.norm(high - low, axis=1)
         sample = order[np.arange(len(order)) - first[piece] < LOOKED_AT]
         nearest = _Pairs(chains, mesh.place[sample], self.near_branch[sample, 0])
-        near, around = _means(mesh.piece[sample], nearest, mesh.piece_count)
+        near, around = _mean_offsets(mesh.piece[sample], nearest.offset, mesh.piece_count)
         best, mean, best_around = self._best_stems(sample)
         mode, mode_share = _modes(mesh.piece[sample], self.near_branch[sample, 0], mesh.piece_count)
         on_line = chains.is_line[mode]
         whole = np.where(on_line, (mean <= ONE_STEM * near) & (best_around < AROUND), mode_share >= ONE_SURFACE)
-        is_card = ~whole & (around >= AROUND) & (extent <= LARGEST_CARD * chains.diagonal)
+        # A card hangs by its point that is nearest to the plant, and lies to one side of the place where it hangs.
+        foot = order[np.lexsort((self.near[order, 0], piece))][first[:-1]]
+        hangs = _Pairs(chains, mesh.place[foot], self.near_branch[foot, 0])
+        from_foot = mesh.place[sample] - (mesh.place[foot] - hangs.offset)[mesh.piece[sample]]
+        aside = _mean_offsets(mesh.piece[sample], from_foot, mesh.piece_count)[1]
+        size = extent / chains.diagonal
+        is_card = (around >= AROUND) & (size <= LARGEST_CARD) | (aside >= AROUND) & (size <= SMALL_CARD)
+        is_card &= ~whole
         self.branch[order] = np.where(whole, np.where(on_line, best, mode), -1)[piece]
-        # A card hangs by its point that is nearest to the plant.
-        by_distance = order[np.lexsort((self.near[order, 0], piece))]
-        self.foot[order] = np.where(is_card, by_distance[first[:-1]], -1)[piece]
+        self.foot[order] = np.where(is_card, foot, -1)[piece]
         self.card_count = int(is_card.sum())
 
     def _best_stems(self, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -199,7 +205,7 @@ class _Search:
         number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
         points = by_piece[starts[key[row] // branches] + number]
         pairs = _Pairs(self.chains, mesh.place[points], key[row] % branches)
-        far, off = _means(row, pairs, len(key))
+        far, off = _mean_offsets(row, pairs.offset, len(key))
         order = np.lexsort((far, key // branches))
         pieces, first = np.unique(key[order] // branches, return_index=True)
         chosen = order[first]
@@ -272,12 +278,12 @@ def _largest(weights):
     return type(coo)((data, (row, col)), weights.shape).tocsr()
 
 
-def _means(group: np.ndarray, pairs: _Pairs, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each group of pairs the mean distance, and the length of the mean offset over it, 1 without any."""
+def _mean_offsets(group: np.ndarray, offset: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each group of offsets (n, 3) their mean length, and the length of their mean over that."""
     size = np.maximum(np.bincount(group, minlength=count), 1)
-    distance = np.bincount(group, pairs.distance, count) / size
-    off = np.stack([np.bincount(group, pairs.offset[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
-    return distance, np.linalg.norm(off, axis=1) / np.where(distance > 0, distance, np.inf)
+    length = np.bincount(group, np.linalg.norm(offset, axis=1), count) / size
+    mean = np.stack([np.bincount(group, offset[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
+    return length, np.linalg.norm(mean, axis=1) / np.where(length > 0, length, np.inf)
 
 
 def _modes(group: np.ndarray, label: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
