@@ -19,7 +19,7 @@ import numpy.typing as npt
 from athcodec.arrays import Source, clip_of
 from athcodec.binding.chains import Chains
 from athcodec.binding.moving import MovingPoints
-from athcodec.binding.scene import far_share, fitting_scene
+from athcodec.binding.scene import COVERS, Fit
 from athcodec.binding.search import Marks, bind
 from athcodec.binding.surface import MeshPoints
 from athcodec.decoding.array_like import ArrayLike
@@ -38,6 +38,7 @@ from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, s
 
 FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
 MOST_FAR = 0.5  # Share of far vertices above which a mesh is refused.
+DEFAULT_SCENE = {"unit": "m", "up_axis": "y"}
 OF_PLANT = ("unit", "up_axis", METRES_PER_UNIT, "fps", "start_frame", STRENGTH, HEADING, BLEND, OWN)
 OF_MESH = ("animations", "presence")  # What the mesh's metadata say of the frames that it had.
 
@@ -110,12 +111,14 @@ class OntoMesh(ArrayLike):
         computed when they are read.
     """
 
-    def __init__(self, view: ClipView, mesh: MotionClip, opened: ExitStack):
+    def __init__(
+        self, view: ClipView, mesh: MotionClip, plant: dict[str, str], taken: dict[str, str], opened: ExitStack
+    ):
         self._view, self._mesh, self._opened = view, mesh, opened
         chains = Chains(view)
         marks, self._limit = Marks(chains), FAR * chains.diagonal
         rest = np.asarray(mesh.rest, np.float64)
-        _refuse_far_mesh(marks, rest, self._limit, view.metadata, mesh.metadata)
+        _refuse_far_mesh(marks, rest, self._limit, plant, taken)
         points = MeshPoints(rest, mesh.polygons, mesh.edges)
         self._points, self._binding = points, bind(chains, points, marks)
         offset = rest - points.place[points.of_vertex]
@@ -195,8 +198,9 @@ class OntoMesh(ArrayLike):
         mesh, view = self._mesh, self._view
         if mesh.frame_count == 1 or stands_still(mesh):
             return {}
-        first = view.first_frame if mesh.frame_count != view.frame_count else 0
-        if mesh.frame_count not in (view.frame_count, view.decoder.frame_count):
+        is_whole = mesh.frame_count == view.decoder.frame_count and len(view.clip_ranges) == 1
+        first = view.first_frame if is_whole else 0
+        if not is_whole and (mesh.frame_count != view.frame_count or not _same_times(mesh.time, view.time)):
             frames = f"{mesh.frame_count:,} against {view.frame_count:,}"
             return {"not_compared": f"the mesh's own motion has other frames ({frames}) and was not compared"}
         meter = ErrorMeter()
@@ -236,6 +240,11 @@ class OntoMesh(ArrayLike):
         return {"vertex_branch": vertex_branch, "branch_parent": number[below[is_used]], "stem_index": stem_index}
 
 
+def _same_times(times: np.ndarray, others: np.ndarray) -> bool:
+    """Whether frames are at the same times, within half a frame."""
+    return len(times) == 1 or bool((np.abs(times - others) < 0.5 * np.abs(np.diff(others)).min()).all())
+
+
 class _Unchanged:
     """Whether the mesh's file is as it was, and the files that the moved mesh is read from."""
 
@@ -263,9 +272,10 @@ def onto(
         The mesh: a file of any format that `read` knows, of which the rest pose, or else the first frame, is the
         plant's rest pose. An array (vertices, 3) or (frames, vertices, 3) can have `faces` beside it.
     unit : {"m", "cm", "mm", "km", "in", "ft"}, optional
-        The unit of the mesh, in place of what it states. The mesh is brought to that of the plant.
+        The unit of the mesh, in place of what it states. The mesh is brought to that of the plant, or to metres where
+        the plant states none.
     up_axis : {"x", "y", "z"}, optional
-        The up axis of the mesh, in place of what it states.
+        The up axis of the mesh, in place of what it states; likewise.
     **options
         What an array does not say, as for `encode`: faces.
 
@@ -296,44 +306,63 @@ def onto(
     view = ClipView(motion) if isinstance(motion, Decoder) else motion
     stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
     opened = ExitStack()
-    with opened:
-        clip = _read_mesh(mesh, opened, {name: value for name, value in stated.items() if value}, options)
-        return OntoMesh(view, _in_scene_of(view, clip), opened.pop_all())
+    try:
+        clip, _ = opened.enter_context(clip_of(mesh, **options))
+        return OntoMesh(view, *_in_scene_of(view, clip, stated), opened)
+    except BaseException:
+        opened.close()
+        raise
 
 
-def _read_mesh(mesh: Source, opened: ExitStack, stated: dict[str, str], options: dict[str, Any]) -> MotionClip:
-    """Return a mesh with the unit and axis that the caller states in place of those that it has."""
-    # A path takes them for what a file lacks; they also let a file with an unknown unit be read.
-    clip, _ = opened.enter_context(clip_of(mesh, **options))
-    metadata = {name: value for name, value in clip.metadata.items() if "unit" not in stated or name != METRES_PER_UNIT}
-    return clip.replace(metadata=metadata | stated)
+def _in_scene_of(
+    view: ClipView, mesh: MotionClip, stated: dict[str, str | None]
+) -> tuple[MotionClip, dict[str, str], dict[str, str]]:
+    """Return a mesh in the unit and axes of a plant, and the unit and the axis of the plant and those that the mesh
+    was taken to have.
 
-
-def _in_scene_of(view: ClipView, mesh: MotionClip) -> MotionClip:
-    """Return a mesh in the unit and axes of a plant, as far as both state theirs."""
-    scene: dict[str, str] = {}
-    for name in ("unit", "up_axis"):
+    What the caller states goes before what the mesh states. A plant that states none is in metres and y up, where the
+    caller states those of the mesh; else the mesh is taken to be as the plant is.
+    """
+    plant, taken = dict(DEFAULT_SCENE), dict(DEFAULT_SCENE)
+    metadata = dict(mesh.metadata)
+    for name, option in stated.items():
+        known: dict[str, str] = {}
         with suppress(ClipError):  # A plant may have a unit that nothing can be brought to.
-            scene |= stated_scene({name: view.metadata.get(name)})
-    return in_scene(mesh, scene.get("unit"), scene.get("up_axis"))
+            known = stated_scene({name: view.metadata.get(name)})
+        plant |= known
+        taken[name] = plant[name]
+        if option:
+            metadata = {key: value for key, value in metadata.items() if key != METRES_PER_UNIT or name != "unit"}
+            metadata[name] = option
+        if known or option:
+            mesh = mesh.replace(metadata=metadata)
+            taken |= stated_scene({name: metadata.get(name)})
+            mesh = in_scene(mesh, **{"unit": None, "up_axis": None} | {name: plant[name]})
+            metadata = dict(mesh.metadata)
+    return mesh, plant, taken
 
 
-def _refuse_far_mesh(marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, Any], mesh: dict[str, Any]) -> None:
+def _refuse_far_mesh(
+    marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], taken: dict[str, str]
+) -> None:
     """Raise ClipError if most vertices are far from the plant; the message names the unit or axis that fits."""
-    share = far_share(marks, rest, limit)
-    if share <= MOST_FAR:
+    fit = Fit(marks, rest, limit)
+    if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
         return
-    fitting = fitting_scene(marks, rest, limit, plant, mesh)
-    text = (
-        f"onto: {share:.0%} of the mesh's vertices are further from the plant than {limit:.3g}, a tenth of its diagonal"
-    )
-    if fitting is None:
-        raise ClipError(
-            f"{text}, and no other unit or up axis brings it there; expected a mesh of this plant in its rest pose"
+    scene = fit.better_scene(plant, taken)
+    text = f"onto: {fit.mesh_far:.0%} of the mesh is further from the plant than {limit:.3g}, a tenth of its diagonal"
+    if fit.mesh_far <= MOST_FAR:
+        # A mesh of a part of the plant covers little of it as well, but no other unit makes it cover more.
+        if not scene:
+            return
+        text = (
+            f"onto: {fit.plant_far:.0%} of the plant is further from the mesh than {limit:.3g}, a tenth of its diagonal"
         )
-    options = {name: value for name, value in zip(("unit", "up_axis"), fitting) if value}
+    if not scene:
+        text += ", and no other unit or up axis brings it there"
+        raise ClipError(f"{text}; expected a mesh of this plant in its rest pose")
     raise ClipError(
         text,
-        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in options.items())}",
-        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in options.items()),
+        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in scene.items())}",
+        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in scene.items()),
     )

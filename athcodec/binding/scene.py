@@ -7,48 +7,61 @@ from collections.abc import Iterator
 import numpy as np
 
 from athcodec.binding.search import Marks
+from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.scene import axis_turn
-from athcodec.motion.units import AXES, METRES, metres_of
+from athcodec.motion.units import AXES, METRES
 
 FITS = 0.1  # Share of vertices far from the plant, below which a unit and an axis are named.
+COVERS = 0.5  # Share of the plant that is far from the mesh, above which another unit is looked for.
 SAMPLE = 4096  # Vertices that are tried.
 
 
-def far_share(marks: Marks, points: np.ndarray, limit: float) -> float:
-    """Return the share of points (V, 3) that are further from the plant than a length."""
-    return float((marks.distance(points) > limit).mean())
+class Fit:
+    """How a mesh lies on a plant.
 
-
-def fitting_scene(marks: Marks, points: np.ndarray, limit: float, plant: dict, mesh: dict) -> tuple[str, str] | None:
-    """Return the unit and the up axis of a mesh in which it would lie on the plant, or None.
-
-    `points` (V, 3) are the mesh as it was taken, in the plant's unit and axes; `plant` and `mesh` are the metadata of
-    both. A unit or axis that needs no change is "".
+    Parameters
+    ----------
+    marks : Marks
+        The plant.
+    points : (V, 3) array
+        The mesh, as it was taken, in the plant's unit and axes.
+    limit : float
+        The distance from which a point is far.
     """
-    points = points[:: max(1, len(points) // SAMPLE)]
-    best, found = FITS, None
-    for unit, factor in _factors(plant, mesh):
-        for axis, turn in _turns(plant, mesh):
-            share = far_share(marks, factor * points @ turn.T, limit)
-            if (unit or axis) and share < best:
-                best, found = share, (unit, axis)
-    return found
+
+    def __init__(self, marks: Marks, points: np.ndarray, limit: float):
+        self._marks, self._limit = marks, limit
+        self._points = points[:: max(1, len(points) // SAMPLE)]
+        self._plant = marks.tree.data[:: max(1, len(marks.branch) // SAMPLE)]
+        self.mesh_far, self.plant_far = self._far_shares(self._points)
+
+    def _far_shares(self, points: np.ndarray) -> tuple[float, float]:
+        """Return the share of the mesh that is far from the plant, and that of the plant that is far from the mesh."""
+        back = scipy_module("spatial").cKDTree(points).query(self._plant)[0]
+        return tuple(float((each > self._limit).mean()) for each in (self._marks.distance(points), back))
+
+    def better_scene(self, plant: dict[str, str], taken: dict[str, str]) -> dict[str, str]:
+        """Return the "unit" and the "up_axis" of the mesh with which it would lie on the plant, as far as they are not
+        those that it was taken to have; empty for none. `plant` has those of the plant."""
+        best, scene = np.inf, {}
+        for unit, factor in _factors(taken["unit"]):
+            for axis, turn in _turns(plant["up_axis"], taken["up_axis"]):
+                mesh_far, plant_far = self._far_shares(factor * self._points @ turn.T)
+                if mesh_far < FITS and plant_far < COVERS and mesh_far + plant_far < best:
+                    best, scene = mesh_far + plant_far, {"unit": unit, "up_axis": axis}
+        return {name: value for name, value in scene.items() if value != taken[name]}
 
 
-def _factors(plant: dict, mesh: dict) -> Iterator[tuple[str, float]]:
-    yield "", 1.0
-    metres = metres_of(plant) or 1.0
-    taken = metres_of(mesh) or metres
+def _factors(taken: str) -> Iterator[tuple[str, float]]:
+    """Yield units, and the factor on a mesh that was taken to be in another one."""
     for unit, length in METRES.items():
-        if length != taken:
-            yield unit, length / taken
+        yield unit, length / METRES[taken]
 
 
-def _turns(plant: dict, mesh: dict) -> Iterator[tuple[str, np.ndarray]]:
-    yield "", np.eye(3)
-    up = plant.get("up_axis") or "y"
-    taken = mesh.get("up_axis") or up
+def _turns(up: str, taken: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield up axes, and the turn of a mesh that was taken to have another one and turned from there to `up`."""
+    if up not in AXES:  # An axis that points down is not converted.
+        yield taken, np.eye(3)
+        return
     for axis in AXES:
-        if axis != taken and up in AXES and taken in AXES:
-            # Back to the axes of the file, and from there as if its up axis were the other one.
-            yield axis, axis_turn(axis, up) @ axis_turn(taken, up).T
+        yield axis, axis_turn(axis, up) @ axis_turn(taken, up).T

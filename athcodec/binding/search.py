@@ -20,6 +20,8 @@ ONE_STEM = 2.0  # Mean distance of a piece from its branch over that from the ne
 ONE_SURFACE = 0.6  # Share of a piece's points that are nearest to one branch that is a surface.
 LARGEST_CARD = 0.5  # Extent of a piece over the plant's diagonal, above which it is no leaf.
 SMALL_CARD = 0.1  # The same extent, below which a piece between several stems is a leaf and no wood.
+FLAT = 0.05  # Variance of a flat piece across its plane over the smaller one within it.
+BLADE = 0.15  # Mean distance of a flat piece from its stem over its extent, above which it is a leaf across the stem.
 ROUNDS = 6  # Rounds in which weights spread over the mesh where the branches of neighbours differ.
 SHARES = 3  # Branches that move a point, at most.
 LEAST_WEIGHT = 0.02
@@ -175,7 +177,15 @@ class _Search:
         from_foot = mesh.place[sample] - (mesh.place[foot] - hangs.offset)[mesh.piece[sample]]
         aside = _mean_offsets(mesh.piece[sample], from_foot, mesh.piece_count)[1]
         size = extent / chains.diagonal
-        is_card = (around >= AROUND) & (size <= LARGEST_CARD) | (aside >= AROUND) & (size <= SMALL_CARD)
+        # A flat piece that is wide for its distance from the stem is a leaf across it, and no blade along it.
+        flat = _flatness(mesh.piece[sample], mesh.place[sample], mesh.piece_count) < FLAT
+        across = on_line & flat & (mean > BLADE * extent)
+        whole &= ~across
+        is_card = (
+            across & (size <= LARGEST_CARD)
+            | (around >= AROUND) & (size <= LARGEST_CARD)
+            | (aside >= AROUND) & (size <= SMALL_CARD)
+        )
         is_card &= ~whole
         self.branch[order] = np.where(whole, np.where(on_line, best, mode), -1)[piece]
         self.foot[order] = np.where(is_card, foot, -1)[piece]
@@ -284,6 +294,16 @@ def _mean_offsets(group: np.ndarray, offset: np.ndarray, count: int) -> tuple[np
     length = np.bincount(group, np.linalg.norm(offset, axis=1), count) / size
     mean = np.stack([np.bincount(group, offset[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
     return length, np.linalg.norm(mean, axis=1) / np.where(length > 0, length, np.inf)
+
+
+def _flatness(group: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
+    """Return for each group of points (n, 3) the smallest of its variances along axes over the middle one, else 1."""
+    size = np.maximum(np.bincount(group, minlength=count), 1)
+    mean = np.stack([np.bincount(group, points[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
+    off = points - mean[group]
+    moments = [[np.bincount(group, off[:, i] * off[:, j], count) for i in range(3)] for j in range(3)]
+    variance = np.linalg.eigvalsh(np.array(moments).transpose(2, 0, 1))
+    return np.where(variance[:, 1] > 0, variance[:, 0] / np.where(variance[:, 1] > 0, variance[:, 1], 1.0), 1.0)
 
 
 def _modes(group: np.ndarray, label: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
