@@ -14,7 +14,9 @@ from pathlib import Path
 
 from bench import tables
 
-_NAMES = "data rd report sample sizes features levels progressive speed memory decode picture viewer gallery wrappings"
+_NAMES = (
+    "data rd report sample sizes features levels progressive speed memory decode picture viewer gallery wrappings onto"
+)
 VERBS = {name: import_module(f"bench.{name}") for name in _NAMES.split()}
 
 
