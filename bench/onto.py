@@ -23,8 +23,11 @@ from athcodec.metrics import ErrorMeter
 from athcodec.metrics.shape import edges_of
 from athcodec.sources.gltf_scene import Scene
 from bench import data
-from bench.clips import add_rel_error
-from bench.tables import table
+from bench.clips import REL_ERROR, add_rel_error
+from bench.tables import ROOT, table
+from bench.trees.leaves import SPECIES, Leaves
+from bench.trees.mesh import Tubes
+from bench.trees.ride import Skeleton
 
 CANOPIES = ("canopy_15k_200f", "canopy_67k_200f")
 ARMATURE = "blender_armature_tree"
@@ -32,12 +35,18 @@ TAIL = 0.999  # Quantile of edges whose stretch is stated.
 MOST_STRETCH = 0.02  # Stretch of edges at that quantile.
 JOINT = 1.0  # Distance of points of two pieces at a joint in the rest pose, in lengths of a median edge.
 OPEN = 1e-3  # Widest opening of a joint, over the plant's diagonal, less that in the mesh's own motion.
+PICTURE = ROOT / "bench" / "results" / "onto.svg"
+DRAWN = "canopy_1k_60f"
+LODS = (("LOD 0", 6, 120), ("LOD 1", 4, 60), ("LOD 2", 3, 20))  # Sides of tubes, and leaves.
+WIDTH, HEIGHT, MARGIN, CAPTION = 210, 430, 12, 44  # Of a panel, in pixels.
+WOOD, LEAF, FADED = np.array([112, 84, 58]), np.array([96, 148, 66]), "#c9cfd6"
+LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
 NOTE = """
 Bytes of the skeleton's file and of the mesh's own file, both within the bound of their diagonals, the mesh without
 other attributes than faces. Errors in metres against the mesh's own motion, of wood and of leaves; size: the diagonal
 of the mesh. Stretch: |length / length at rest - 1| of edges at 99.9 %, as the mesh moves with the skeleton and in its
-own motion. Gap: by how much points of two pieces of wood that touch at rest come apart at most, in both. Seconds: to
-bind the mesh, and to move a frame.
+own motion. Gap: by how much a stem and one that grows on it come apart at most where they touch at rest, in both.
+Seconds: to bind the mesh, and to move a frame.
 """
 
 
@@ -56,9 +65,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "clips", nargs="*", default=(*CANOPIES, ARMATURE), metavar="CLIP", help="names of canopies, or " + ARMATURE
     )
     add_rel_error(parser)
+    parser.add_argument(
+        "--picture",
+        type=Path,
+        metavar="FILE.svg",
+        help=f"only draw a skeleton and three meshes that it moves, as {PICTURE.relative_to(ROOT)} shows them",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    if args.picture:
+        args.picture.write_text(drawn())
+        return {
+            "tables": [table("Picture", [{"file": args.picture.name, "bytes": args.picture.stat().st_size}])],
+            "broken": [],
+        }
     rows, broken = [], []
     for name in args.clips:
         row = measured(case_of(name), args.rel_error)
@@ -195,15 +216,93 @@ def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _joints(case: Case, edge: float) -> np.ndarray:
-    """Return pairs of vertices of different pieces of wood that nearly touch at rest, (J, 2): for each vertex the
-    nearest one of another piece."""
+    """Return pairs of vertices that nearly touch at rest, (J, 2): of a stem and of one that grows on it. A mesh that
+    names no branches has none."""
     from scipy.spatial import cKDTree
 
-    points = MeshPoints(case.mesh.rest, case.mesh.polygons, None)
-    wood = np.flatnonzero(case.is_wood)
-    piece = points.piece[points.of_vertex[wood]]
+    mesh, wood = case.mesh, np.flatnonzero(case.is_wood)
+    if not mesh.has_branches:
+        return np.empty((0, 2), np.int64)
+    branch, parent = mesh.vertex_branch[wood], mesh.branch_parent
     near, other = cKDTree(case.mesh.rest[wood]).query(case.mesh.rest[wood], k=min(32, len(wood)))
-    near = np.where(piece[other] == piece[:, None], np.inf, near)
+    joined = (parent[branch[other]] == branch[:, None]) | (parent[branch][:, None] == branch[other])
+    near = np.where(joined, near, np.inf)
     best = near.argmin(axis=1)
     rows = np.flatnonzero(near[np.arange(len(wood)), best] < JOINT * edge)
     return np.stack([wood[rows], wood[other[rows, best[rows]]]], axis=1)
+
+
+# ---- the picture ----
+
+
+def drawn() -> str:
+    """Return an SVG of a skeleton in the wind, and of three meshes that move by its file."""
+    skeleton = data.RECIPES[DRAWN].skeleton()
+    encoded = athcodec.encode(skeleton, rel_error=REL_ERROR, exact_rest=True)
+    with athcodec.open(encoded) as plant:
+        frame = int(np.square(np.asarray(plant) - skeleton.rest).sum(axis=(1, 2)).argmax())
+        at_rest, moved = skeleton.rest, plant[frame]
+        edges = skeleton.edges
+        panels = [
+            (
+                _lines(at_rest, edges, FADED) + _lines(moved, edges, "#20303c"),
+                "skeleton",
+                f"{len(moved):,} nodes, {len(encoded) / 1000:.1f} kB",
+            )
+        ]
+        for name, sides, leaves in LODS:
+            mesh, faces, wood = _lod(skeleton, sides, leaves)
+            with athcodec.onto(plant, mesh, faces=faces) as moving:
+                shape = _lines(at_rest, edges, FADED) + _polygons(moving[frame], faces, wood)
+            panels.append((shape, name, f"{len(mesh):,} vertices"))
+    low, high = np.minimum(at_rest, moved).min(axis=0), np.maximum(at_rest, moved).max(axis=0)
+    scale = min(HEIGHT / (high[1] - low[1]), WIDTH / (high[0] - low[0])) * 0.92
+    middle = (low[0] + high[0]) / 2
+    parts = []
+    for number, (shape, name, detail) in enumerate(panels):
+        left = MARGIN + number * (WIDTH + MARGIN) + WIDTH / 2
+        parts.append(
+            f'<g transform="translate({left:.0f} {MARGIN + HEIGHT:.0f})">'
+            f'<g transform="scale({scale:.4g} {-scale:.4g}) translate({-middle:.4g} {-low[1]:.4g})">{shape}</g>'
+            f'<text y="20">{name}</text><text y="36" class="small">{detail}</text></g>'
+        )
+    total = len(panels) * (WIDTH + MARGIN) + MARGIN
+    style = (
+        f"path{{fill:none;stroke-width:{1 / scale:.4g};stroke-linejoin:round}}text{{font:13px sans-serif;"
+        "text-anchor:middle;fill:#202c38}.small{font-size:11px}"
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {MARGIN + HEIGHT + CAPTION}">'
+        f'<style>{style}</style><rect width="100%" height="100%" fill="#fff"/>{"".join(parts)}</svg>\n'
+    )
+
+
+def _lod(clip: athcodec.MotionClip, sides: int, leaves: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a mesh around a skeleton at rest, (V, 3), its quads, and which of these are wood."""
+    skeleton = Skeleton.of(clip, 1)
+    tubes = Tubes(skeleton, sides)
+    cards = Leaves(skeleton, SPECIES["broadleaf"], leaves, np.random.default_rng(3))
+    points = np.concatenate([tubes.at(skeleton.rest), cards.at(skeleton.rest, cards.unturned())])
+    faces = np.concatenate([tubes.faces, tubes.count + cards.faces])
+    return points, faces, np.arange(len(faces)) < len(tubes.faces)
+
+
+def _lines(points: np.ndarray, edges: np.ndarray, colour: str) -> str:
+    ends = points[edges, :2].reshape(-1, 4).tolist()
+    way = "".join(f"M{x:.3f} {y:.3f}L{to_x:.3f} {to_y:.3f}" for x, y, to_x, to_y in ends)
+    return f'<path stroke="{colour}" d="{way}"/>'
+
+
+def _polygons(points: np.ndarray, faces: np.ndarray, wood: np.ndarray) -> str:
+    """Return polygons in front view, far ones first."""
+    corners = points[faces].astype(np.float64)
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    lit = 0.65 + 0.35 * np.abs(normal @ LIGHT)
+    colours = np.where(wood[:, None], WOOD, LEAF) * lit[:, None]
+    texts = []
+    for face in np.argsort(corners[:, :, 2].mean(axis=1)).tolist():
+        colour = "#" + "".join(f"{round(part):02x}" for part in colours[face])
+        place = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners[face, :, :2])
+        texts.append(f'<polygon fill="{colour}" points="{place}"/>')
+    return "".join(texts)

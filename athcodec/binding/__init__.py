@@ -7,6 +7,8 @@ elsewhere.
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -26,7 +28,7 @@ from athcodec.decoding.array_like import ArrayLike
 from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.indexing import split_index
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, CoarseWarning
 from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter
@@ -37,6 +39,7 @@ from athcodec.motion.scene import in_scene
 from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, stated_scene
 
 FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
+COARSE_REST = 2.0  # Error of the plant's rest pose over that of its motion, above which a mesh lies on it badly.
 MOST_FAR = 0.5  # Share of far vertices above which a mesh is refused.
 DEFAULT_SCENE = {"unit": "m", "up_axis": "y"}
 OF_PLANT = ("unit", "up_axis", METRES_PER_UNIT, "fps", "start_frame", STRENGTH, HEADING, BLEND, OWN)
@@ -304,14 +307,36 @@ def onto(
     ((150, 700, 3), 0)
     """
     view = ClipView(motion) if isinstance(motion, Decoder) else motion
+    _warn_of_rest(view)
     stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
     opened = ExitStack()
     try:
-        clip, _ = opened.enter_context(clip_of(mesh, **options))
+        # Only a mesh may be a single pose; elsewhere an array without frames is taken for a mistake.
+        source = np.asarray(mesh)[None] if _is_pose(mesh) and "axes" not in options else mesh
+        clip, _ = opened.enter_context(clip_of(source, **options))
         return OntoMesh(view, *_in_scene_of(view, clip, stated), opened)
     except BaseException:
         opened.close()
         raise
+
+
+def _is_pose(mesh: Source) -> bool:
+    is_array = not isinstance(mesh, (str, os.PathLike, MotionClip, Decoder, ClipView))
+    return is_array and len(getattr(mesh, "shape", None) or np.shape(mesh)) == 2
+
+
+def _warn_of_rest(view: ClipView) -> None:
+    """Warn of a plant whose rest pose, which the mesh is to lie on, is known less exactly than its motion."""
+    file = view.decoder.file
+    if file.rest_error <= COARSE_REST * file.max_error_bound:
+        return
+    unit = f" {view.metadata['unit']}" if view.metadata.get("unit") else ""
+    warnings.warn(
+        f"{file.name}: the rest pose is off by up to {file.rest_error:.3g}{unit}, and the mesh lies on it no better; "
+        "encode the plant with --exact-rest (exact_rest=True)",
+        CoarseWarning,
+        stacklevel=3,
+    )
 
 
 def _in_scene_of(

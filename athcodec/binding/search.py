@@ -142,7 +142,7 @@ class _Search:
         parent = chains.hierarchy.branch_parent
         self.parent = np.where(chains.is_line[np.maximum(parent, 0)] & (parent >= 0), parent, -1)
         self.branch = np.full(len(mesh.place), -1)  # The branch of points whose piece is on one.
-        self.foot = np.full(len(mesh.place), -1)  # The point that a card hangs by, for all its points.
+        self.foot = np.full(len(mesh.place), -1)  # The point that its card hangs by, of each point of one.
         self.card_count = 0
 
     def result(self) -> Binding:
@@ -171,8 +171,10 @@ class _Search:
         mode, mode_share = _modes(mesh.piece[sample], self.near_branch[sample, 0], mesh.piece_count)
         on_line = chains.is_line[mode]
         whole = np.where(on_line, (mean <= ONE_STEM * near) & (best_around < AROUND), mode_share >= ONE_SURFACE)
-        # A card hangs by its point that is nearest to the plant, and lies to one side of the place where it hangs.
+        # A card hangs by a point that it shares with its twig, or else by its point nearest to the plant. It lies
+        # to one side of that place.
         foot = order[np.lexsort((self.near[order, 0], piece))][first[:-1]]
+        foot[mesh.shared[:, 0]] = mesh.shared[:, 1]
         hangs = _Pairs(chains, mesh.place[foot], self.near_branch[foot, 0])
         from_foot = mesh.place[sample] - (mesh.place[foot] - hangs.offset)[mesh.piece[sample]]
         aside = _mean_offsets(mesh.piece[sample], from_foot, mesh.piece_count)[1]
@@ -232,7 +234,8 @@ class _Search:
     def _of_cards(self) -> tuple[np.ndarray, ...]:
         points = np.flatnonzero((self.branch < 0) & (self.foot >= 0))
         feet, of = np.unique(self.foot[points], return_inverse=True)
-        pairs = _Pairs(self.chains, self.mesh.place[feet], self.near_branch[feet, 0])
+        branch = np.where(self.branch[feet] >= 0, self.branch[feet], self.near_branch[feet, 0])
+        pairs = _Pairs(self.chains, self.mesh.place[feet], branch)
         return points, pairs.element[of], pairs.share[of], np.ones(len(points))
 
     def _of_points(self, points: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -27,6 +27,8 @@ class MeshPoints:
         shares one point with its twig is a piece of its own, and that point is the twig's.
     piece_count : int
         Number of pieces.
+    shared : (S, 2) int64
+        Pieces with each point that they share with the larger piece which has it.
     """
 
     def __init__(self, rest: np.ndarray, polygons: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None):
@@ -35,6 +37,7 @@ class MeshPoints:
         places = Places.of_labels(grid)
         self.of_vertex, self.place = places.of_vertex, rest[places.first]
         self.piece, self.piece_count = np.full(len(self.place), -1), 0
+        self.shared = np.empty((0, 2), np.int64)
         links = [np.empty((0, 2), np.int64)]
         if edges is not None:
             links.append(self.of_vertex[edges].astype(np.int64))
@@ -58,5 +61,10 @@ class MeshPoints:
         faces = np.bincount(piece, minlength=number)
         first = np.argsort(faces[piece[face]], kind="stable")
         self.piece[corners[first]] = piece[face[first]]
-        kept, self.piece[self.piece >= 0] = np.unique(self.piece[self.piece >= 0], return_inverse=True)
+        in_face = self.piece >= 0
+        kept, self.piece[in_face] = np.unique(self.piece[in_face], return_inverse=True)
         self.piece_count = len(kept)
+        renumbered = np.full(number, -1)
+        renumbered[kept] = np.arange(len(kept))
+        pairs = np.unique(np.stack([renumbered[piece[face]], corners], axis=1), axis=0)
+        self.shared = pairs[(pairs[:, 0] >= 0) & (pairs[:, 0] != self.piece[pairs[:, 1]])]
