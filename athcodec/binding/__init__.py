@@ -72,6 +72,13 @@ class OntoReport:
         Largest distance and root mean square of the distances from the mesh's own motion; None without any.
     not_compared : str
         Why a mesh with motion of its own was not compared; else "".
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     report = athcodec.onto(grass, grass.file.rest).report
+    ...     type(report) is athcodec.OntoReport, report.vertex_count, report.max_error is None
+    (True, 1400, True)
     """
 
     vertex_count: int
@@ -112,6 +119,13 @@ class OntoMesh(ArrayLike):
     clip : MotionClip
         The mesh with its new motion, its faces and all its attributes: what `write` and `encode` take. Its frames are
         computed when they are read.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     with athcodec.onto(grass.at_level(1), grass.file.rest[:280], faces=grass.file.faces[:120]) as some:
+    ...         type(some) is athcodec.OntoMesh, some[::50].shape, some.clip
+    (True, (3, 280, 3), MotionClip(150 frames, 280 vertices, 20 branches, float32))
     """
 
     def __init__(
