@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.picture:
-        args.picture.write_text(drawn())
+        args.picture.write_text(drawn(), "utf-8")
         return {
             "tables": [table("Picture", [{"file": args.picture.name, "bytes": args.picture.stat().st_size}])],
             "broken": [],
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         rows.append(row)
         if row["stretch"] > MOST_STRETCH + row["own stretch"]:
             broken.append(f"{name}: edges stretch by {row['stretch']:g}, their own by {row['own stretch']:g}")
-        if row["gap"] > row["own gap"] + OPEN * row["size"]:
+        if row["gap"] is not None and row["gap"] > row["own gap"] + OPEN * row["size"]:
             broken.append(f"{name}: joints open by {row['gap']:g}, their own by {row['own gap']:g}")
     return {"tables": [table(f"Onto, bound {args.rel_error:g}", rows, NOTE)], "broken": broken}
 
@@ -207,7 +207,8 @@ class _Figures:
         stretch, own = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
         row: dict[str, Any] = {"wood max": wood.max_error, "wood RMS": wood.rms_error}
         row |= {"leaves max": leaves.max_error, "leaves RMS": leaves.rms_error}
-        return row | {"stretch": stretch, "own stretch": own, "gap": self._gaps[0], "own gap": self._gaps[1]}
+        gaps = self._gaps if len(self._joints) else (None, None)
+        return row | {"stretch": stretch, "own stretch": own, "gap": gaps[0], "own gap": gaps[1]}
 
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:

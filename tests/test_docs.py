@@ -42,9 +42,10 @@ def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """The files that the examples start from."""
+    from test_usd import add_grid, add_leaves, new_stage  # here, because USD takes long to import
+
     from bench.trees.mesh import Tubes
     from bench.trees.ride import Skeleton
-    from test_usd import add_grid, add_leaves, new_stage  # here, because USD takes long to import
 
     folder = tmp_path_factory.mktemp("examples")
     shutil.copy(sample_path(), folder / "tree.h5")
@@ -73,7 +74,9 @@ def files(tmp_path_factory):
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf", "onto") else [])
+        pytest.param(
+            page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf", "onto") else []
+        )
         for page in PAGES
         if blocks(page, "sh", "python")
     ],

@@ -294,6 +294,20 @@ def test_decode_says_how_the_mesh_lies_and_refuses_what_makes_no_sense(files, ca
     assert "missing.h5" in capsys.readouterr().err
 
 
+def test_levels_of_detail_that_are_numbered_like_frames_are_read_one_by_one(files):
+    with opened((files / "stem.ath").read_bytes()) as plant, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for number, rings in enumerate((21, 11, 5)):
+            points, quads = tube(0.0, LENGTH, 0.05, rings)
+            mesh = MotionClip(points[None].astype(np.float32), [0.0], faces=quads, metadata=dict(SCENE))
+            for suffix in (".obj", ".glb"):
+                athcodec.write(mesh, files / f"lod{suffix}").files[0].rename(files / f"lod{number}{suffix}")
+        for number, rings in enumerate((21, 11, 5)):
+            for suffix in (".obj", ".glb"):
+                with athcodec.onto(plant, files / f"lod{number}{suffix}") as moving:
+                    assert moving.shape == (FRAMES, rings * SIDES, 3)
+
+
 def test_a_mesh_without_branches_gets_those_that_move_it(fork):
     trunk, quads = tube(0.0, LENGTH, 0.05, 21)
     side, side_quads = tube(0.05, 0.9, 0.03, 10, axis=2, centre=(0.0, 1.0))

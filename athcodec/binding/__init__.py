@@ -287,14 +287,15 @@ def onto(
         The plant: an opened .ath file, at the level that it shows.
     mesh : str, path-like, MotionClip or array
         The mesh: a file of any format that `read` knows, of which the rest pose, or else the first frame, is the
-        plant's rest pose. An array (vertices, 3) or (frames, vertices, 3) can have `faces` beside it.
+        plant's rest pose; files that are numbered like it are not read. An array (vertices, 3) or (frames, vertices, 3)
+        can have `faces` beside it.
     unit : {"m", "cm", "mm", "km", "in", "ft"}, optional
         The unit of the mesh, in place of what it states. The mesh is brought to that of the plant, or to metres where
         the plant states none.
     up_axis : {"x", "y", "z"}, optional
         The up axis of the mesh, in place of what it states; likewise.
     **options
-        What an array does not say, as for `encode`: faces.
+        What an array does not say, as for `encode`: faces; for a path, options of `read`.
 
     Returns
     -------
@@ -325,18 +326,24 @@ def onto(
     stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
     opened = ExitStack()
     try:
-        # Only a mesh may be a single pose; elsewhere an array without frames is taken for a mistake.
-        source = np.asarray(mesh)[None] if _is_pose(mesh) and "axes" not in options else mesh
-        clip, _ = opened.enter_context(clip_of(source, **options))
+        clip = _opened_mesh(mesh, opened, options)
         return OntoMesh(view, *_in_scene_of(view, clip, stated), opened)
     except BaseException:
         opened.close()
         raise
 
 
-def _is_pose(mesh: Source) -> bool:
-    is_array = not isinstance(mesh, (str, os.PathLike, MotionClip, Decoder, ClipView))
-    return is_array and len(getattr(mesh, "shape", None) or np.shape(mesh)) == 2
+def _opened_mesh(mesh: Source, opened: ExitStack, options: dict[str, Any]) -> MotionClip:
+    """Return a mesh as a clip; a file is closed with `opened`."""
+    if isinstance(mesh, (str, os.PathLike)):
+        from athcodec.sources import read  # The sources take long to import.
+
+        # Levels of detail are numbered as frames are.
+        return opened.enter_context(read(mesh, alone=True, **options))
+    if not isinstance(mesh, (MotionClip, Decoder, ClipView)) and "axes" not in options:
+        # A mesh may be a single pose; elsewhere an array without frames is taken for a mistake.
+        mesh = np.asarray(mesh)[None] if len(getattr(mesh, "shape", None) or np.shape(mesh)) == 2 else mesh
+    return opened.enter_context(clip_of(mesh, **options))[0]
 
 
 def _warn_of_rest(view: ClipView) -> None:

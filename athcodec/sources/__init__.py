@@ -117,6 +117,8 @@ class ReadOptions:
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
         refused.
+    alone : bool, optional
+        Whether the named file is read by itself, without files that are numbered like it: lod1.obj beside lod0.obj.
     max_memory : int or str, optional
         Bytes of memory that reading the source may take, or text such as "500MB"; 4 GiB by default: what of it is
         held, and what one frame or one file of it takes besides.
@@ -138,6 +140,7 @@ class ReadOptions:
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
     allow_outside: bool = False
+    alone: bool = False
     max_memory: int = MAX_MEMORY
 
     def __post_init__(self) -> None:
@@ -311,7 +314,7 @@ def read(
         Likewise: a clip with another up axis is turned.
     **options
         Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
-        allow_outside, max_memory.
+        allow_outside, alone, max_memory.
 
     Returns
     -------
@@ -342,7 +345,7 @@ def read(
         clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
-        if clip.frame_count == 1 and not kind.has_series:
+        if clip.frame_count == 1 and not kind.has_series and not wanted.alone:
             _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
