@@ -316,3 +316,15 @@ def test_a_mesh_without_branches_gets_those_that_move_it(fork):
         clip = moving.clip
         assert clip.branch_parent.tolist() == [-1, 0]
         assert set(clip.vertex_branch[: len(trunk)]) == {0} and set(clip.vertex_branch[len(trunk) :]) == {1}
+
+
+@pytest.mark.tools
+def test_a_canopy_s_mesh_moves_by_the_beams_that_carried_it(tmp_path, monkeypatch):
+    from bench.onto import case_of, measured
+
+    monkeypatch.setenv("ATHCODEC_BENCH_DATA", str(tmp_path))
+    row = measured(case_of("canopy_1k_60f"), 1e-4)
+    assert row["far"] == 0 and row["whole pieces"] == 80  # All leaves, and no wood.
+    assert row["skeleton bytes"] < row["mesh bytes"] / 4
+    assert row["wood RMS"] < 1e-3 and row["wood max"] < 1e-2
+    assert row["stretch"] < 0.02 + row["own stretch"] and row["gap"] < row["own gap"] + 1e-3 * row["size"]

@@ -23,6 +23,7 @@ WINDING = 4.0  # Length of the path through a branch's vertices over its extent,
 GROWTH = 0.1  # Stretch of a stem, as a share of its length, above which its girth and its leaves grow with it.
 PRIOR = 1e-3  # Weight, over that of a fit, of the rotation of the whole branch, which decides where the fit is free.
 NO_LENGTH = 1e-9  # Share of the plant's diagonal below which two nodes coincide.
+LEAST_LENGTH = 1e-30  # The same length of a plant that is a point.
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Chains:
         self.hierarchy: Hierarchy = file.hierarchy
         self.vertex_rest = np.asarray(view.rest, np.float64)
         self.diagonal = float(np.linalg.norm(np.ptp(self.vertex_rest, axis=0)))
+        self._least = max(NO_LENGTH * self.diagonal, LEAST_LENGTH)
         self.error = float(view.max_error)
         self.branch_of = _branch_in_file_order(self.hierarchy)
         links, has_faces = _links(view)
@@ -135,7 +137,7 @@ class Chains:
         self.first_element = np.searchsorted(self.element_branch, np.arange(hierarchy.branch_count + 1))
         chord = self.rest[self.end] - self.rest[self.start]
         self.length = np.linalg.norm(chord, axis=1)
-        usable = self.length > NO_LENGTH * self.diagonal
+        usable = self.length > self._least
         self.length = np.where(usable, self.length, 0.0)
         tangent = self._tangents(self.rest[None])[0]
         direction = chord / np.where(usable, self.length, 1.0)[:, None]
@@ -210,7 +212,7 @@ class Chains:
         before, after = np.maximum(self.before, 0), np.maximum(self.after, 0)
         into = np.where((self.before >= 0)[:, None], centre - centre[:, before], 0.0)
         out = np.where((self.after >= 0)[:, None], centre[:, after] - centre, 0.0)
-        least = NO_LENGTH * self.diagonal
+        least = self._least
         into_length, out_length = (np.linalg.norm(each, axis=2, keepdims=True) for each in (into, out))
         there, goes_on = into_length > least, out_length > least
         into = np.where(there, into / np.maximum(into_length, least), 0.0)
@@ -249,7 +251,7 @@ class Chains:
         at_rest = np.bincount(ends, np.tile(self.length[lines], 2) * weight, minlength=count)
         now = np.stack([np.bincount(ends, np.tile(row, 2) * weight, minlength=count) for row in length])
         stretch = np.where(at_rest > 0, now / np.where(at_rest > 0, at_rest, 1.0), 1.0)
-        slack = GROWTH + 4 * self.error / np.maximum(at_rest, NO_LENGTH * max(self.diagonal, NO_LENGTH))
+        slack = GROWTH + 4 * self.error / np.maximum(at_rest, self._least)
         return stretch / np.clip(stretch, np.maximum(1 - slack, 1e-30), 1 + slack)
 
     def _fit_surfaces(self, frames: np.ndarray, centre: np.ndarray, turn: np.ndarray, size: np.ndarray) -> None:
@@ -260,7 +262,7 @@ class Chains:
         rest_off, off = rest - self.rest[of], now - centre[:, of]
         spread = np.add.reduceat((rest_off**2).sum(axis=1), self._starts)
         now_spread = np.add.reduceat((off**2).sum(axis=2), self._starts, axis=1)
-        least = (NO_LENGTH * self.diagonal) ** 2
+        least = self._least**2
         size[:] = np.where(spread > least, np.sqrt(now_spread / np.where(spread > least, spread, 1.0)), 1.0)
         # Moments of one slice about its centre; those of several add up, with those of their centres.
         moment = np.add.reduceat(off[..., :, None] * rest_off[:, None, :], self._starts, axis=1)

@@ -61,7 +61,7 @@ class MovingPoints:
     def block_length(self) -> int:
         """Frames to move at once."""
         rows = NUMBERS_OF_PLACE * len(self._element) + 16 * self._count + 6 * len(self._of_vertex)
-        return max(1, 4 * BLOCK_NUMBERS // (rows + 3 * self._chains.hierarchy.vertex_count))
+        return max(1, 4 * BLOCK_NUMBERS // (rows + 24 * self._chains.hierarchy.vertex_count))
 
     def move(self, frames: np.ndarray) -> np.ndarray:
         """Return the vertices (k, V, 3) float64 for frames (k, N, 3) of the plant."""

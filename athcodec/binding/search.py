@@ -178,16 +178,12 @@ class _Search:
         hangs = _Pairs(chains, mesh.place[foot], self.near_branch[foot, 0])
         from_foot = mesh.place[sample] - (mesh.place[foot] - hangs.offset)[mesh.piece[sample]]
         aside = _mean_offsets(mesh.piece[sample], from_foot, mesh.piece_count)[1]
-        size = extent / chains.diagonal
         # A flat piece that is wide for its distance from the stem is a leaf across it, and no blade along it.
         flat = _flatness(mesh.piece[sample], mesh.place[sample], mesh.piece_count) < FLAT
         across = on_line & flat & (mean > BLADE * extent)
         whole &= ~across
-        is_card = (
-            across & (size <= LARGEST_CARD)
-            | (around >= AROUND) & (size <= LARGEST_CARD)
-            | (aside >= AROUND) & (size <= SMALL_CARD)
-        )
+        is_card = (across | (around >= AROUND)) & (extent <= LARGEST_CARD * chains.diagonal)
+        is_card |= (aside >= AROUND) & (extent <= SMALL_CARD * chains.diagonal)
         is_card &= ~whole
         self.branch[order] = np.where(whole, np.where(on_line, best, mode), -1)[piece]
         self.foot[order] = np.where(is_card, foot, -1)[piece]
