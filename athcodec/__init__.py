@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # Type checkers and the reference look here for what __getattr__ returns.
     from athcodec import errors, metrics
+    from athcodec.binding import OntoMesh, OntoReport, onto
     from athcodec.comparison import Comparison, compare
     from athcodec.compression import encode
     from athcodec.decoding.ath_file import AthFile
@@ -31,6 +32,8 @@ __all__ = [
     "Decoder",
     "Found",
     "MotionClip",
+    "OntoMesh",
+    "OntoReport",
     "Summary",
     "Thresholds",
     "build_ath",
@@ -42,6 +45,7 @@ __all__ = [
     "join",
     "looped",
     "metrics",
+    "onto",
     "open",
     "read",
     "read_hdf5",
@@ -53,6 +57,7 @@ __all__ = [
 ]
 # Names by module. Importing the package loads none of them, so that a command or a program pays for what it uses.
 _LAZY = {
+    "binding": ("OntoMesh", "OntoReport", "onto"),
     "encoding.survey": ("Ath", "build_ath"),
     "motion.thresholds": ("Thresholds",),
     "decoding.ath_file": ("AthFile",),

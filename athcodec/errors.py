@@ -60,7 +60,7 @@ class GuessWarning(SourceWarning):
 
 class CoarseWarning(UserWarning):
     """An error is so large a part of the plant that little of its motion may be left: that of a bound which was asked
-    for, or that of a skeleton."""
+    for, or that of a skeleton; or a rest pose is less exact than the motion, and a mesh is to lie on it."""
 
 
 class BoundError(AthError, ValueError):

@@ -16,7 +16,7 @@ from bench import tables
 
 _NAMES = (
     "data rd report sample sizes features levels structure split branches",
-    "progressive speed memory decode picture viewer gallery wrappings",
+    "progressive speed memory decode picture viewer gallery wrappings onto",
 )
 VERBS = {name: import_module(f"bench.{name}") for name in " ".join(_NAMES).split()}
 

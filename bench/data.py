@@ -64,12 +64,19 @@ class Canopy:
     seed: int
     version: int = 1  # goes up when the code below bench/trees gives other leaves or beams
 
-    def make(self) -> athcodec.MotionClip:
+    def skeleton(self) -> athcodec.MotionClip:
+        """Return the beams that were simulated, which carry the mesh."""
         plant = grow(self.nodes, self.orders, self.height, self.seed)
-        wind = Wind(self.wind_speed, self.height, seed=self.seed)
         described = {"wind_speed": self.wind_speed, "leaves": self.species}
-        tree = plant.clip(bend(plant, wind, self.frames, FPS), np.arange(self.frames) / FPS, FPS, **described)
-        return dress(tree, wind, self.frames, self.leaves, self.seed, self.species)
+        moved = bend(plant, self._wind, self.frames, FPS)
+        return plant.clip(moved, np.arange(self.frames) / FPS, FPS, **described)
+
+    def make(self) -> athcodec.MotionClip:
+        return dress(self.skeleton(), self._wind, self.frames, self.leaves, self.seed, self.species)
+
+    @property
+    def _wind(self) -> Wind:
+        return Wind(self.wind_speed, self.height, seed=self.seed)
 
     def __str__(self) -> str:
         return f"{self.height:g} m tree as a mesh: bark tubes and {self.leaves:,} {self.species} leaves in wind"

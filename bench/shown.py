@@ -111,8 +111,19 @@ def _structure(tables: dict[str, list[Row]]) -> list[Row]:
     return rows
 
 
+def _onto(tables: dict[str, list[Row]]) -> list[Row]:
+    return [
+        {name: row[name] for name in ("clip", "nodes", "vertices", "frames")}
+        | {"skeleton's file": row["skeleton bytes"], "mesh's own file": row["mesh bytes"], "diagonal": row["size"]}
+        | {"wood, RMS": row["wood RMS"], "wood, max": row["wood max"], "leaves, RMS": row["leaves RMS"]}
+        | {name: row[name] for name in ("stretch", "own stretch", "gap", "own gap")}
+        for row in tables["Onto"]
+    ]
+
+
 BENCHMARKS = "docs/benchmarks.md"
 SHOWN = {
+    "onto": Shown("docs/onto.md", "onto", _onto),
     "sizes": Shown(BENCHMARKS, "sizes", _sizes),
     "wrappings": Shown(
         BENCHMARKS, "wrappings", picked("Wrappings", file="file", bytes="bytes", largest_error="max error")

@@ -44,6 +44,9 @@ def files(tmp_path_factory):
     """The files that the examples start from."""
     from test_usd import add_grid, add_leaves, new_stage  # here, because USD takes long to import
 
+    from bench.trees.mesh import Tubes
+    from bench.trees.ride import Skeleton
+
     folder = tmp_path_factory.mktemp("examples")
     shutil.copy(sample_path(), folder / "tree.h5")
     with read_hdf5(sample_path()) as clip:
@@ -57,6 +60,10 @@ def files(tmp_path_factory):
             )
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
+        for number, sides in enumerate((8, 5, 3)):
+            tubes = Tubes(Skeleton.of(clip, 1), sides)
+            lod = athcodec.MotionClip(tubes.at(clip.rest)[None], [0.0], faces=tubes.faces, metadata={"unit": "m"})
+            athcodec.write(lod, folder / f"lod{number}.glb")
     stage = new_stage(folder / "forest.usda")
     add_grid(stage)
     add_leaves(stage)
@@ -67,7 +74,9 @@ def files(tmp_path_factory):
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf") else [])
+        pytest.param(
+            page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf", "onto") else []
+        )
         for page in PAGES
         if blocks(page, "sh", "python")
     ],

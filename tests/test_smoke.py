@@ -148,6 +148,7 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "decode": "CLIP --rounds 1 --seeks 1",
     "picture": "CLIP --out OUT",
     "wrappings": "--help",
+    "onto": "--picture OUT",
 }
 
 

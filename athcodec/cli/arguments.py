@@ -467,6 +467,22 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="the clip to decode; without it glTF holds all of a file that has several, as animations of their names",
     )
+    verb.add_argument(
+        "--onto",
+        metavar="MESH",
+        help="write this mesh, a file of any format that is read, moved as the plant moves: its rest pose, or else its "
+        "first frame, is the plant's rest pose; it keeps its faces and attributes",
+    )
+    for name, kind, checked, choices in (
+        ("unit", "UNIT", checked_unit, METRES),
+        ("up-axis", "AXIS", checked_axis, AXES),
+    ):
+        verb.add_argument(
+            f"--onto-{name}",
+            metavar=kind,
+            type=_argument(checked),
+            help=f"{name.replace('-', ' ')} of that mesh, in place of what it states: {', '.join(choices)}",
+        )
     _host_mesh_argument(verb)
     _gltf_motion_argument(
         verb, "of a GLB with several motions (ATH_motion), the one of this name; to a GLB, by default, all"

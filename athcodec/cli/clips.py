@@ -31,6 +31,7 @@ from athcodec.sources.branches import find_or_load
 from athcodec.sources.numbering import each_once
 
 if TYPE_CHECKING:
+    from athcodec.binding import OntoMesh
     from athcodec.exporters.gltf_into import Into
 
 ROUNDING = 1e-6
@@ -119,6 +120,16 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
         names = ", ".join(clip.name for clip in decoder.file.clips)
         raise ClipError(f"--frames: got several clips, {names}; expected one of them with --clip")
     return ClipView(decoder, level, all_clips=True)
+
+
+def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
+    """Return the mesh of --onto as it moves with a plant; close it."""
+    with naming(args.onto), warnings.catch_warnings():
+        warnings.simplefilter("ignore", SourceWarning)  # said below
+        warnings.simplefilter("always", GuessWarning)
+        moving = athcodec.onto(view, args.onto, unit=args.onto_unit, up_axis=args.onto_up_axis)
+    _say_not_read(moving.clip, args.onto)
+    return moving
 
 
 def with_sources(

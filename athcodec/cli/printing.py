@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from athcodec.decoding.file_tables import Level
     from athcodec.encoding import Seam
     from athcodec.exporters import Written
+    from athcodec.motion.clip import MotionClip
 
 JUMP = 3
 """How many times the ways from frame to frame are what the way over a loop's seam should not be."""
@@ -96,7 +97,7 @@ def print_demo(facts: dict[str, Any], diagonal: float) -> None:
     echo(size_of(facts))
 
 
-def written_facts(written: Written, motion: ClipView, level: Level) -> dict[str, Any]:
+def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> dict[str, Any]:
     """The files that are there now, and what their format costs."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
     facts = {name: written.facts[name] for name in ("animation", "instances", "max_error") if name in written.facts}

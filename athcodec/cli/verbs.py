@@ -8,8 +8,9 @@ import os
 import shlex
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext, suppress
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +25,7 @@ from athcodec.cli.clips import (
     clip_to_encode,
     gltf_to_fill,
     measure_against,
+    mesh_onto,
     motions_of,
     naming,
     open_file,
@@ -241,25 +243,34 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
     from athcodec.exporters import format_to_write
     from athcodec.sources import listed
 
-    check_output(args.output, args.input, args.host_mesh, suffix="" if args.format else None)
+    check_output(args.output, args.input, args.host_mesh, args.onto, suffix="" if args.format else None)
+    if args.onto is None and (args.onto_unit or args.onto_up_axis):
+        raise ClipError("--onto-unit, --onto-up-axis: got no mesh, expected one with --onto")
     format_to_write(args.output, args.format)  # An unknown one is refused before there is work.
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
         names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
         decoders = [opened.enter_context(open_file(args.input, args.stats, gltf_motion=name, **how)) for name in names]
         motions = [view_to_decode(decoder, args) for decoder in decoders]
-        written = _write_decoded(motions, args)
+        moving = None if args.onto is None else opened.enter_context(mesh_onto(motions[0], args))
+        shown = motions if moving is None else [moving.clip]
+        written = _write_decoded(shown, args)
         for decoder, motion in zip(decoders, motions):
             if decoder.file.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
         results = [
-            written_facts(written, motion, decoder.levels[motion.level]) for decoder, motion in zip(decoders, motions)
+            written_facts(written, clip, decoder.levels[motion.level])
+            for decoder, motion, clip in zip(decoders, motions, shown)
         ]
+        if moving is not None:
+            results[0]["onto"] = {"file": args.onto} | asdict(moving.report)
         if args.json and not quiet:
             print_motions(results)
         elif not quiet:
             for result in results:
                 print_written(result)
+            if moving is not None:
+                echo(f"{args.onto}: {moving.report}.")
         rounding, level_error = written.facts.get("rounding", 0.0), decoders[0].levels[motions[0].level].max_error
         if rounding > ROUNDING_SHARE * level_error:
             say(
@@ -275,10 +286,10 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
 def _goes_back(args: argparse.Namespace) -> bool:
     """Whether a GLB with motions is to be written as a copy of it, with morph targets."""
     is_gltf = (args.format or Path(args.output).suffix.lower()) in ("gltf", ".glb")
-    return is_gltf and args.animation != "joints" and args.rig is None and not args.instances
+    return is_gltf and args.onto is None and args.animation != "joints" and args.rig is None and not args.instances
 
 
-def _write_decoded(motions: list[ClipView], args: argparse.Namespace) -> Written:
+def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Namespace) -> Written:
     """In the format that is asked for; several are those of a GLB, to go back into it."""
     from athcodec import exporters
     from athcodec.files.gltf.motion import GltfMotion

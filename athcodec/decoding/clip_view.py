@@ -107,6 +107,11 @@ class ClipView:
         return sum(len(frames) for _, frames in self._runs)
 
     @property
+    def first_frame(self) -> int:
+        """Number of the view's first frame in the whole clip."""
+        return self._runs[0][1].start
+
+    @property
     def max_error(self) -> float:
         """The largest distance of any vertex in any frame of its clips at this level from the source, scene units."""
         return max(decoder.levels[self.level].max_error for decoder, _ in self._runs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -19,6 +20,9 @@ from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
 from athcodec.motion.units import LengthLike, length_of, scene_unit
+
+CUBE_CORNER = 3**0.5 / 2  # Largest distance of a point from the nearest one of a cubic lattice, in its steps.
+_SOURCE_REST = struct.Struct("<Bf")  # Is_Exact and Rest_Step of FORMAT.md.
 
 
 class StaticData(FileTables):
@@ -213,6 +217,19 @@ class StaticData(FileTables):
                 pose = self._as_rest(self.core.rest(level))
             self._rest_read = level, pose
         return pose.copy()
+
+    @property
+    def rest_error(self) -> float:
+        """How far a vertex of `rest` may be from the source's rest pose where that is stored apart from the reference
+        pose, scene units; 0 if it is exact or is the reference pose, which is within the bound."""
+        chunk = self.find(ct.SOURCE_REST)
+        if chunk is None or self.rest_is_missing:
+            return 0.0
+        head = bytes(self.payload(chunk)[: _SOURCE_REST.size])
+        if len(head) < _SOURCE_REST.size:
+            raise BadChunk(f"{chunk}: got {len(head)} bytes; expected at least {_SOURCE_REST.size}")
+        is_exact, step = _SOURCE_REST.unpack(head)
+        return 0.0 if is_exact else step * CUBE_CORNER
 
     def _as_rest(self, pose: np.ndarray) -> np.ndarray:
         """Return a pose in the source's type; numbers beyond float32 become infinite, as FORMAT.md rounds."""

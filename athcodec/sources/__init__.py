@@ -19,16 +19,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
-from athcodec.motion.frames import Frames
 from athcodec.motion.positions import Order, parse_order
-from athcodec.motion.units import METRES, METRES_PER_UNIT, checked_axis, checked_unit, metres_of, size_of, stated_scene
+from athcodec.motion.scene import in_scene
+from athcodec.motion.units import checked_axis, checked_unit, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
@@ -119,6 +117,8 @@ class ReadOptions:
     allow_outside : bool, optional
         Whether a source may name files outside of its own folder: XDMF, VTK, .series, HDF5 and USD; by default that is
         refused.
+    alone : bool, optional
+        Whether the named file is read by itself, without files that are numbered like it: lod1.obj beside lod0.obj.
     max_memory : int or str, optional
         Bytes of memory that reading the source may take, or text such as "500MB"; 4 GiB by default: what of it is
         held, and what one frame or one file of it takes besides.
@@ -140,6 +140,7 @@ class ReadOptions:
     skip: Collection[str] = ()
     root: int | Sequence[int] | None = None
     allow_outside: bool = False
+    alone: bool = False
     max_memory: int = MAX_MEMORY
 
     def __post_init__(self) -> None:
@@ -313,7 +314,7 @@ def read(
         Likewise: a clip with another up axis is turned.
     **options
         Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
-        allow_outside, max_memory.
+        allow_outside, alone, max_memory.
 
     Returns
     -------
@@ -344,12 +345,12 @@ def read(
         clip: MotionClip = kind.function("read_clip", __name__)(path, wanted)
     lost = {kind: names for kind, names in clip.not_read.items() if kind not in NO_SHAPES}
     with closing_on_failure(clip):
-        if clip.frame_count == 1 and not kind.has_series:
+        if clip.frame_count == 1 and not kind.has_series and not wanted.alone:
             _warn_of_frames(path)
         if lost:
             warnings.warn(f"{os.fspath(path)}: not read: {listed(lost)}", SourceWarning, stacklevel=2)
         clip.metadata |= _stated(clip.metadata, path, unit=unit, up_axis=up_axis)
-        return _in_axes(_in_units(clip, unit), up_axis)
+        return in_scene(clip, unit, up_axis)
 
 
 def _warn_of_frames(path: str | PathLike[str]) -> None:
@@ -484,49 +485,6 @@ def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: st
             )
             scene[name] = None
     return scene
-
-
-def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
-    if unit is None:
-        return clip
-    metres = metres_of(clip.metadata)
-    factor = 1.0 if metres is None or clip.metadata.get("unit") == unit else metres / METRES[unit]
-    clip.metadata.pop(METRES_PER_UNIT, None)
-    return _mapped(clip, np.eye(3) * factor, unit=unit)
-
-
-def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
-    """Turned by the right angle that takes its up axis to the wanted one."""
-    if up_axis is None:
-        return clip
-    stated = clip.metadata.get("up_axis") or up_axis
-    before, after = "xyz".find(stated), "xyz".find(up_axis)
-    if before < 0:
-        raise ClipError(f"up_axis: got a clip with {stated!r}, expected x, y or z to turn it to {up_axis!r}")
-    turn = np.eye(3)
-    if before != after:
-        third = 3 - before - after
-        turn = np.zeros((3, 3))
-        turn[after, before], turn[before, after], turn[third, third] = 1.0, -1.0, 1.0
-    return _mapped(clip, turn, up_axis=up_axis)
-
-
-def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip:
-    clip.metadata |= metadata
-    if np.array_equal(matrix, np.eye(3)):
-        return clip
-    if "normals" in clip.attributes:
-        turned = clip.attributes["normals"] @ (matrix / np.cbrt(np.linalg.det(matrix))).T
-        clip.attributes["normals"] = turned.astype(clip.attributes["normals"].dtype)
-    source, dtype = clip.positions, clip.dtype
-    positions = Frames(
-        lambda start, stop: (np.asarray(source[start:stop], np.float64) @ matrix.T).astype(dtype),
-        clip.frame_count,
-        clip.vertex_count,
-        dtype,
-    )
-    rest = (clip.rest @ matrix.T).astype(clip.rest_dtype)
-    return clip.replace(positions=positions, rest=rest, rest_given=clip.rest_given)
 
 
 def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> MotionClip:

@@ -23,7 +23,7 @@ from athcodec.errors import GuessWarning
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
 from athcodec.motion.clip import DEFAULT_FPS
-from athcodec.sources import SERIES, ReadOptions
+from athcodec.sources import SERIES, ReadOptions, is_pattern
 from athcodec.sources.index_files import index_of, is_index, list_of, read_index
 from athcodec.sources.numbering import NumberedFiles, files_to_read, numbered_files
 from athcodec.sources.timing import numbered_times, plain_number, times_in_seconds
@@ -204,6 +204,8 @@ def series_of(path: FilePath, options: ReadOptions) -> Series:
     path = Path(path)
     if is_index(path):
         index = read_index(path, path.parent, options.allow_outside, Budget(options.max_memory))
+    elif options.alone and not is_pattern(path):
+        return Series(((path,),), path.stem, ("",), None, None, None)
     else:
         files = numbered_files(path)
         index = index_of(path, files.paths, options.allow_outside, options.max_memory)

@@ -192,4 +192,6 @@ def scipy_module(name: str) -> Any:
     try:
         return importlib.import_module(f"scipy.{name}")
     except ImportError:
-        raise MissingExtra('finding branches: needs scipy: pip install "athcodec[hierarchy]"') from None
+        raise MissingExtra(
+            'branches, and places of a mesh on a plant: needs scipy: pip install "athcodec[hierarchy]"'
+        ) from None

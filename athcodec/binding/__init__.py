@@ -1,0 +1,414 @@
+"""A plant's motion on another mesh: `athcodec.onto`.
+
+chains.py makes frames along the stems of the plant, surface.py finds what hangs together in the mesh, search.py where
+on the plant each piece hangs, and moving.py moves it. scene.py looks for the unit and the up axis of a mesh that lies
+elsewhere.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from athcodec.arrays import Source, clip_of
+from athcodec.binding.chains import Chains
+from athcodec.binding.moving import MovingPoints
+from athcodec.binding.scene import COVERS, Fit
+from athcodec.binding.search import Marks, bind
+from athcodec.binding.surface import MeshPoints
+from athcodec.decoding.array_like import ArrayLike
+from athcodec.decoding.clip_view import ClipView
+from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.indexing import split_index
+from athcodec.errors import ClipError, CoarseWarning
+from athcodec.files.atomic import FileId
+from athcodec.files.shown import counted
+from athcodec.metrics import ErrorMeter
+from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.frames import Frames
+from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH
+from athcodec.motion.scene import in_scene
+from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, stated_scene
+
+FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
+COARSE_REST = 2.0  # Error of the plant's rest pose over that of its motion, above which a mesh lies on it badly.
+MOST_FAR = 0.5  # Share of far vertices above which a mesh is refused.
+DEFAULT_SCENE = {"unit": "m", "up_axis": "y"}
+OF_PLANT = ("unit", "up_axis", METRES_PER_UNIT, "fps", "start_frame", STRENGTH, HEADING, BLEND, OWN)
+OF_MESH = ("animations", "presence")  # What the mesh's metadata say of the frames that it had.
+
+
+@dataclass(frozen=True)
+class OntoReport:
+    """What `onto` did with a mesh; lengths are in the plant's unit.
+
+    Attributes
+    ----------
+    vertex_count : int
+        Vertices of the mesh.
+    far_count : int
+        Vertices that are further from the plant than `far_limit` in the rest pose.
+    far_limit : float
+        A tenth of the diagonal of the plant's rest pose.
+    furthest : float
+        Largest distance of a vertex from the plant.
+    card_count : int
+        Connected pieces, such as leaves, that each move as a whole.
+    joint_count : int
+        Vertices that more than one branch moves.
+    unit : str
+        The plant's unit, "" where it states none.
+    frame_count : int
+        Frames that were compared with the mesh's own motion; 0 without any.
+    max_error, rms_error : float or None
+        Largest distance and root mean square of the distances from the mesh's own motion; None without any.
+    not_compared : str
+        Why a mesh with motion of its own was not compared; else "".
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     report = athcodec.onto(grass, grass.file.rest).report
+    ...     type(report) is athcodec.OntoReport, report.vertex_count, report.max_error is None
+    (True, 1400, True)
+    """
+
+    vertex_count: int
+    far_count: int
+    far_limit: float
+    furthest: float
+    card_count: int
+    joint_count: int
+    unit: str = ""
+    frame_count: int = 0
+    max_error: float | None = None
+    rms_error: float | None = None
+    not_compared: str = ""
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        text = (
+            f"{counted(self.vertex_count, 'vertex', 'vertices')} on the plant, {counted(self.card_count, 'piece')} of "
+            f"them whole, {self.joint_count:,} at joints; {self.far_count:,} further away than {self.far_limit:.3g}"
+            f"{unit}, the furthest {self.furthest:.3g}{unit}"
+        )
+        if self.max_error is not None:
+            text += (
+                f"; off the mesh's own motion by up to {self.max_error:.3g}{unit}, RMS {self.rms_error:.3g}{unit}, in "
+                f"{counted(self.frame_count, 'frame')}"
+            )
+        return text + (f"; {self.not_compared}" if self.not_compared else "")
+
+
+class OntoMesh(ArrayLike):
+    """A mesh that moves with an .ath file, a read-only array of shape (frames, vertices, 3); a context manager.
+
+    Indices mean what they mean for a NumPy array and move only the frames that they need. Positions come in the order
+    of the mesh's vertices, in the unit and axes of the plant. `onto` makes it.
+
+    Attributes
+    ----------
+    clip : MotionClip
+        The mesh with its new motion, its faces and all its attributes: what `write` and `encode` take. Its frames are
+        computed when they are read.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass")) as grass:
+    ...     with athcodec.onto(grass.at_level(1), grass.file.rest[:280], faces=grass.file.faces[:120]) as some:
+    ...         type(some) is athcodec.OntoMesh, some[::50].shape, some.clip
+    (True, (3, 280, 3), MotionClip(150 frames, 280 vertices, 20 branches, float32))
+    """
+
+    def __init__(
+        self, view: ClipView, mesh: MotionClip, plant: dict[str, str], taken: dict[str, str], opened: ExitStack
+    ):
+        self._view, self._mesh, self._opened = view, mesh, opened
+        chains = Chains(view)
+        marks, self._limit = Marks(chains), FAR * chains.diagonal
+        rest = np.asarray(mesh.rest, np.float64)
+        _refuse_far_mesh(marks, rest, self._limit, plant, taken)
+        points = MeshPoints(rest, mesh.polygons, mesh.edges)
+        self._points, self._binding = points, bind(chains, points, marks)
+        offset = rest - points.place[points.of_vertex]
+        self._moving = MovingPoints(chains, self._binding, points.place, points.of_vertex, offset)
+        self.clip = self._moved_clip()
+
+    def __repr__(self) -> str:
+        frames, vertices, _ = self.shape
+        return f"<OntoMesh: {counted(frames, 'frame')} of {counted(vertices, 'vertex', 'vertices')}, {self.dtype}>"
+
+    def __enter__(self) -> OntoMesh:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the mesh's file; the plant's stays open."""
+        self._opened.close()
+
+    # ---- the array ----
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Frames, vertices and 3."""
+        return self._view.frame_count, self._mesh.vertex_count, 3
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Type of the positions, float32 or float64 as in the .ath file."""
+        return self._view.dtype
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, index: Any) -> Any:
+        frames, of_frames = split_index(index, self.shape[0])
+        shown = np.empty((len(frames), *self.shape[1:]), self.dtype)
+        runs = np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) != 1) + 1) if len(frames) else ()
+        for run in runs:
+            shown[run] = self._block(int(frames[run[0]]), int(frames[run[-1]]) + 1)
+        return shown[of_frames]
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        for _, block in self.clip.blocks():
+            yield from block
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
+        if copy is False:
+            raise ValueError("OntoMesh: got copy=False; expected None or True, because the array is computed")
+        return np.asarray(self[:], dtype)
+
+    def _block(self, start: int, stop: int) -> np.ndarray:
+        return self._moving.move(self._view.block(start, stop)).astype(self.dtype, copy=False)
+
+    # ---- what is known of it ----
+
+    @cached_property
+    def report(self) -> OntoReport:
+        """How the mesh lies on the plant. Where it has motion of its own, the first look at the report moves all
+        frames to compare them."""
+        of_vertex = self._points.of_vertex
+        distance = self._binding.distance[of_vertex]
+        known = {
+            "vertex_count": self._mesh.vertex_count,
+            "far_count": int((distance > self._limit).sum()),
+            "far_limit": self._limit,
+            "furthest": float(distance.max()),
+            "card_count": self._binding.card_count,
+            "joint_count": int(self._binding.is_shared[of_vertex].sum()),
+            "unit": str(self._view.metadata.get("unit") or ""),
+        }
+        return OntoReport(**known, **self._errors())
+
+    def _errors(self) -> dict[str, Any]:
+        """Return the figures against the mesh's own motion, as far as it has any in the plant's frames."""
+        mesh, view = self._mesh, self._view
+        if mesh.frame_count == 1 or stands_still(mesh):
+            return {}
+        is_whole = mesh.frame_count == view.decoder.frame_count and len(view.clip_ranges) == 1
+        first = view.first_frame if is_whole else 0
+        if not is_whole and (mesh.frame_count != view.frame_count or not _same_times(mesh.time, view.time)):
+            frames = f"{mesh.frame_count:,} against {view.frame_count:,}"
+            return {"not_compared": f"the mesh's own motion has other frames ({frames}) and was not compared"}
+        meter = ErrorMeter()
+        for start, block in self.clip.blocks():
+            meter.add(mesh.block(first + start, first + start + len(block)), block)
+        return {"frame_count": meter.frame_count, "max_error": meter.max_error, "rms_error": meter.rms_error}
+
+    def _moved_clip(self) -> MotionClip:
+        view, mesh = self._view, self._mesh
+        of_plant = {name: view.metadata[name] for name in OF_PLANT if name in view.metadata}
+        of_mesh = {name: value for name, value in mesh.metadata.items() if name not in (*OF_PLANT, *OF_MESH)}
+        branches = {} if mesh.has_branches else self._branches()
+        return mesh.replace(
+            **branches,
+            positions=Frames(self._block, view.frame_count, mesh.vertex_count, self.dtype),
+            time=view.time,
+            clip_ranges=view.clip_ranges,
+            metadata=of_mesh | of_plant,
+            rest_given=True,
+            unchanged=_Unchanged(mesh, view.inputs),
+        )
+
+    def _branches(self) -> dict[str, np.ndarray]:
+        """Return the plant's branches as those of the mesh, as far as they move any of it."""
+        branch, along = self._moving.branch_of_points()
+        parent = self._view.decoder.file.hierarchy.branch_parent
+        is_used = np.bincount(branch, minlength=len(parent)) > 0
+        # The nearest branch below that is used; parents come before their children.
+        below = np.full(len(parent), -1)
+        for each in np.flatnonzero(parent >= 0).tolist():
+            below[each] = parent[each] if is_used[parent[each]] else below[parent[each]]
+        number = np.append(np.cumsum(is_used) - 1, -1)
+        vertex_branch = number[branch[self._points.of_vertex]]
+        order = np.lexsort((along[self._points.of_vertex], vertex_branch))
+        stem_index = np.empty(len(order), np.int64)
+        stem_index[order] = np.arange(len(order)) - np.searchsorted(vertex_branch[order], vertex_branch[order])
+        return {"vertex_branch": vertex_branch, "branch_parent": number[below[is_used]], "stem_index": stem_index}
+
+
+def _same_times(times: np.ndarray, others: np.ndarray) -> bool:
+    """Whether frames are at the same times, within half a frame."""
+    return len(times) == 1 or bool((np.abs(times - others) < 0.5 * np.abs(np.diff(others)).min()).all())
+
+
+class _Unchanged:
+    """Whether the mesh's file is as it was, and the files that the moved mesh is read from."""
+
+    def __init__(self, mesh: MotionClip, inputs: frozenset[FileId]):
+        self._mesh, self.files = mesh, mesh.inputs | inputs
+
+    def __call__(self) -> bool:
+        return self._mesh.unchanged is None or self._mesh.unchanged()
+
+
+def onto(
+    motion: Decoder | ClipView, mesh: Source, *, unit: str | None = None, up_axis: str | None = None, **options: Any
+) -> OntoMesh:
+    """Let a mesh in the rest pose of a plant move as the plant does.
+
+    Every vertex of the mesh hangs on the nearest place along a stem, or on two or three where stems join. It keeps its
+    offset from there in a frame that turns with the stem. Connected pieces that grow beside a stem, such as leaves,
+    move as a whole. A stem that grows by more than a tenth takes its girth and its leaves with it.
+
+    Parameters
+    ----------
+    motion : Decoder or ClipView
+        The plant: an opened .ath file, at the level that it shows.
+    mesh : str, path-like, MotionClip or array
+        The mesh: a file of any format that `read` knows, of which the rest pose, or else the first frame, is the
+        plant's rest pose; files that are numbered like it are not read. An array (vertices, 3) or (frames, vertices, 3)
+        can have `faces` beside it.
+    unit : {"m", "cm", "mm", "km", "in", "ft"}, optional
+        The unit of the mesh, in place of what it states. The mesh is brought to that of the plant, or to metres where
+        the plant states none.
+    up_axis : {"x", "y", "z"}, optional
+        The up axis of the mesh, in place of what it states; likewise.
+    **options
+        What an array does not say, as for `encode`: faces; for a path, options of `read`.
+
+    Returns
+    -------
+    OntoMesh
+        Positions (frames, V, 3) in the plant's unit and axes, with a `report`, and as a `clip` for `write`. Close it,
+        or use it in a ``with`` statement; the motion stays open.
+
+    Raises
+    ------
+    ClipError
+        If most vertices are further from the plant than a tenth of its diagonal, or the mesh is no usable clip.
+    NeedsHostMesh
+        If the file has no rest pose, and no `host_mesh` was passed to `open`.
+    MissingExtra
+        If scipy is missing, or what reads the mesh.
+    OSError
+        If the mesh cannot be read.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("grass"), clip="gale") as grass:
+    ...     blades = athcodec.onto(grass, grass.file.rest[::2])
+    ...     blades.shape, blades.report.far_count
+    ((150, 700, 3), 0)
+    """
+    view = ClipView(motion) if isinstance(motion, Decoder) else motion
+    _warn_of_rest(view)
+    stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
+    opened = ExitStack()
+    try:
+        clip = _opened_mesh(mesh, opened, options)
+        return OntoMesh(view, *_in_scene_of(view, clip, stated), opened)
+    except BaseException:
+        opened.close()
+        raise
+
+
+def _opened_mesh(mesh: Source, opened: ExitStack, options: dict[str, Any]) -> MotionClip:
+    """Return a mesh as a clip; a file is closed with `opened`."""
+    if isinstance(mesh, (str, os.PathLike)):
+        from athcodec.sources import read  # The sources take long to import.
+
+        # Levels of detail are numbered as frames are.
+        return opened.enter_context(read(mesh, alone=True, **options))
+    if not isinstance(mesh, (MotionClip, Decoder, ClipView)) and "axes" not in options:
+        # A mesh may be a single pose; elsewhere an array without frames is taken for a mistake.
+        mesh = np.asarray(mesh)[None] if len(getattr(mesh, "shape", None) or np.shape(mesh)) == 2 else mesh
+    return opened.enter_context(clip_of(mesh, **options))[0]
+
+
+def _warn_of_rest(view: ClipView) -> None:
+    """Warn of a plant whose rest pose, which the mesh is to lie on, is known less exactly than its motion."""
+    file = view.decoder.file
+    if file.rest_error <= COARSE_REST * file.max_error_bound:
+        return
+    unit = f" {view.metadata['unit']}" if view.metadata.get("unit") else ""
+    warnings.warn(
+        f"{file.name}: the rest pose is off by up to {file.rest_error:.3g}{unit}, and the mesh lies on it no better; "
+        "encode the plant with --exact-rest (exact_rest=True)",
+        CoarseWarning,
+        stacklevel=3,
+    )
+
+
+def _in_scene_of(
+    view: ClipView, mesh: MotionClip, stated: dict[str, str | None]
+) -> tuple[MotionClip, dict[str, str], dict[str, str]]:
+    """Return a mesh in the unit and axes of a plant, and the unit and the axis of the plant and those that the mesh
+    was taken to have.
+
+    What the caller states goes before what the mesh states. A plant that states none is in metres and y up, where the
+    caller states those of the mesh; else the mesh is taken to be as the plant is.
+    """
+    plant, taken = dict(DEFAULT_SCENE), dict(DEFAULT_SCENE)
+    metadata = dict(mesh.metadata)
+    for name, option in stated.items():
+        known: dict[str, str] = {}
+        with suppress(ClipError):  # A plant may have a unit that nothing can be brought to.
+            known = stated_scene({name: view.metadata.get(name)})
+        plant |= known
+        taken[name] = plant[name]
+        if option:
+            metadata = {key: value for key, value in metadata.items() if key != METRES_PER_UNIT or name != "unit"}
+            metadata[name] = option
+        if known or option:
+            mesh = mesh.replace(metadata=metadata)
+            taken |= stated_scene({name: metadata.get(name)})
+            mesh = in_scene(mesh, **{"unit": None, "up_axis": None} | {name: plant[name]})
+            metadata = dict(mesh.metadata)
+    return mesh, plant, taken
+
+
+def _refuse_far_mesh(
+    marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], taken: dict[str, str]
+) -> None:
+    """Raise ClipError if most vertices are far from the plant; the message names the unit or axis that fits."""
+    fit = Fit(marks, rest, limit)
+    if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
+        return
+    scene = fit.better_scene(plant, taken)
+    text = f"onto: {fit.mesh_far:.0%} of the mesh is further from the plant than {limit:.3g}, a tenth of its diagonal"
+    if fit.mesh_far <= MOST_FAR:
+        # A mesh of a part of the plant covers little of it as well, but no other unit makes it cover more.
+        if not scene:
+            return
+        text = (
+            f"onto: {fit.plant_far:.0%} of the plant is further from the mesh than {limit:.3g}, a tenth of its diagonal"
+        )
+    if not scene:
+        text += ", and no other unit or up axis brings it there"
+        raise ClipError(f"{text}; expected a mesh of this plant in its rest pose")
+    raise ClipError(
+        text,
+        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in scene.items())}",
+        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in scene.items()),
+    )

@@ -1,0 +1,317 @@
+"""The place on a plant's chains that each point of a mesh hangs on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec.binding.chains import Chains
+from athcodec.binding.surface import MeshPoints
+from athcodec.motion.branches.point_runs import scipy_module
+
+NEAREST = 8  # Marks looked at around each point; they tell the branches that it may be on.
+FINENESS = 300  # Marks on an element over its length, where that is the plant's diagonal.
+MOST_MARKS = 64  # Marks on an element.
+LOOKED_AT = 64  # Points of a piece that its branch is chosen by.
+BRANCHES_TRIED = 12  # Branches that a piece may be on, without their parents.
+AROUND = 0.5  # Length of the mean offset from a stem over the mean length of offsets, below which a piece encloses it.
+ONE_STEM = 2.0  # Mean distance of a piece from its branch over that from the nearest branches, for a piece on one stem.
+ONE_SURFACE = 0.6  # Share of a piece's points that are nearest to one branch that is a surface.
+LARGEST_CARD = 0.5  # Extent of a piece over the plant's diagonal, above which it is no leaf.
+SMALL_CARD = 0.1  # The same extent, below which a piece between several stems is a leaf and no wood.
+FLAT = 0.05  # Variance of a flat piece across its plane over the smaller one within it.
+BLADE = 0.15  # Mean distance of a flat piece from its stem over its extent, above which it is a leaf across the stem.
+ROUNDS = 6  # Rounds in which weights spread over the mesh where the branches of neighbours differ.
+SHARES = 3  # Branches that move a point, at most.
+LEAST_WEIGHT = 0.02
+BLOCK = 1 << 21  # Pairs of points and elements whose distances are in memory at once.
+
+
+@dataclass(frozen=True)
+class Binding:
+    """What moves the P points of a mesh: up to SHARES places each, by rows of a table with R rows.
+
+    Attributes
+    ----------
+    point, element : (R,) int64
+        The point, and the element of the chains.
+    share : (R,) float64
+        The place along the element, 0 to 1.
+    weight : (R,) float64
+        Weights of a point's rows add up to 1.
+    distance : (P,) float64
+        Distance of each point from the plant in the rest pose.
+    card_count : int
+        Pieces that move as a whole.
+    """
+
+    point: np.ndarray
+    element: np.ndarray
+    share: np.ndarray
+    weight: np.ndarray
+    distance: np.ndarray
+    card_count: int
+
+    @property
+    def is_shared(self) -> np.ndarray:
+        """Which points more than one branch moves, (P,) bool."""
+        return np.bincount(self.point, minlength=len(self.distance)) > 1
+
+
+class Marks:
+    """Points all over the plant, with the branch of each: samples of lines and vertices of surfaces."""
+
+    def __init__(self, chains: Chains):
+        branch, place = [], []
+        lines = np.flatnonzero(chains.is_line[chains.element_branch])
+        if len(lines):
+            step = chains.diagonal / FINENESS or 1.0
+            count = np.clip(np.ceil(chains.length[lines] / step), 1, MOST_MARKS).astype(np.int64)
+            element = np.repeat(lines, count)
+            number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+            share = (number + 0.5) / np.repeat(count, count)
+            place.append(chains.at_rest(element, share))
+            branch.append(chains.element_branch[element])
+        on_surface = ~chains.is_line[chains.branch_of]
+        if on_surface.any():
+            place.append(chains.vertex_rest[on_surface])
+            branch.append(chains.branch_of[on_surface])
+        self.branch = np.concatenate(branch)
+        self.tree = scipy_module("spatial").cKDTree(np.concatenate(place))
+
+    def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return distances and branches (P, k) of the marks nearest to points."""
+        distance, mark = self.tree.query(points, k=min(NEAREST, len(self.branch)))
+        return distance.reshape(len(points), -1), self.branch[mark].reshape(len(points), -1)
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Return the distance (P,) of points from the nearest mark."""
+        return self.tree.query(points)[0]
+
+
+class _Pairs:
+    """Points with a branch each, put onto it: the place on the branch, and the distance from it."""
+
+    def __init__(self, chains: Chains, points: np.ndarray, branch: np.ndarray):
+        self.element, self.share = np.zeros(len(points), np.int64), np.zeros(len(points))
+        order = np.argsort(branch, kind="stable")
+        branches, first = np.unique(branch[order], return_index=True)
+        for each, rows in zip(branches.tolist(), np.split(order, first[1:])):
+            low, high = chains.first_element[each], chains.first_element[each + 1]
+            step = max(1, BLOCK // max(1, high - low))
+            for begin in range(0, len(rows), step):
+                some = rows[begin : begin + step]
+                self.element[some], self.share[some] = _onto(chains, points[some], low, high)
+        self.offset = points - chains.at_rest(self.element, self.share)
+        self.distance = np.linalg.norm(self.offset, axis=1)
+        self.depth = self.distance
+        if chains.radius is not None:
+            start, end = chains.radius[chains.start[self.element]], chains.radius[chains.end[self.element]]
+            self.depth = self.distance - ((1 - self.share) * start + self.share * end)
+
+
+def _onto(chains: Chains, points: np.ndarray, low: int, high: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nearest of the elements low to high - 1, and the place along it, for each point."""
+    start = chains.rest[chains.start[low:high]]
+    chord = chains.rest[chains.end[low:high]] - start
+    square = (chord**2).sum(axis=1)
+    along = (points @ chord.T - (start * chord).sum(axis=1)) / np.where(square > 0, square, 1.0)
+    along = np.clip(along, 0.0, 1.0)
+    # |p - s - t c|^2 without an array of vectors.
+    off = points[:, None] - start if len(points) * (high - low) < BLOCK // 4 else None
+    if off is None:
+        distance = np.stack(
+            [((points - start[e] - along[:, e : e + 1] * chord[e]) ** 2).sum(axis=1) for e in range(high - low)], axis=1
+        )
+    else:
+        distance = ((off - along[..., None] * chord) ** 2).sum(axis=2)
+    best = distance.argmin(axis=1)
+    return low + best, along[np.arange(len(points)), best]
+
+
+def bind(chains: Chains, mesh: MeshPoints, marks: Marks) -> Binding:
+    """Return what moves the points of a mesh in the plant's rest pose."""
+    return _Search(chains, mesh, marks).result()
+
+
+class _Search:
+    def __init__(self, chains: Chains, mesh: MeshPoints, marks: Marks):
+        self.chains, self.mesh = chains, mesh
+        self.near, self.near_branch = marks.nearest(mesh.place)
+        parent = chains.hierarchy.branch_parent
+        self.parent = np.where(chains.is_line[np.maximum(parent, 0)] & (parent >= 0), parent, -1)
+        self.branch = np.full(len(mesh.place), -1)  # The branch of points whose piece is on one.
+        self.foot = np.full(len(mesh.place), -1)  # The point that its card hangs by, of each point of one.
+        self.card_count = 0
+
+    def result(self) -> Binding:
+        if self.mesh.piece_count:
+            self._look_at_pieces()
+        one_by_one = np.flatnonzero((self.branch < 0) & (self.foot < 0))
+        rows = [self._of_pieces(), self._of_cards(), self._of_points(one_by_one)]
+        point, element, share, weight = (np.concatenate(column) for column in zip(*rows))
+        return Binding(point, element, share, weight, self.near[:, 0], self.card_count)
+
+    # ---- pieces ----
+
+    def _look_at_pieces(self) -> None:
+        mesh, chains = self.mesh, self.chains
+        inside = np.flatnonzero(mesh.piece >= 0)
+        # Vertices are in any order within their piece: every n-th one of a tube may lie on one side of it.
+        order = inside[np.lexsort((np.random.default_rng(0).random(len(inside)), mesh.piece[inside]))]
+        piece = mesh.piece[order]
+        first = np.searchsorted(piece, np.arange(mesh.piece_count + 1))
+        low, high = (each.reduceat(mesh.place[order], first[:-1]) for each in (np.minimum, np.maximum))
+        extent = np.linalg.norm(high - low, axis=1)
+        sample = order[np.arange(len(order)) - first[piece] < LOOKED_AT]
+        nearest = _Pairs(chains, mesh.place[sample], self.near_branch[sample, 0])
+        near, around = _mean_offsets(mesh.piece[sample], nearest.offset, mesh.piece_count)
+        best, mean, best_around = self._best_stems(sample)
+        mode, mode_share = _modes(mesh.piece[sample], self.near_branch[sample, 0], mesh.piece_count)
+        on_line = chains.is_line[mode]
+        whole = np.where(on_line, (mean <= ONE_STEM * near) & (best_around < AROUND), mode_share >= ONE_SURFACE)
+        # A card hangs by a point that it shares with its twig, or else by its point nearest to the plant. It lies
+        # to one side of that place.
+        foot = order[np.lexsort((self.near[order, 0], piece))][first[:-1]]
+        foot[mesh.shared[:, 0]] = mesh.shared[:, 1]
+        hangs = _Pairs(chains, mesh.place[foot], self.near_branch[foot, 0])
+        from_foot = mesh.place[sample] - (mesh.place[foot] - hangs.offset)[mesh.piece[sample]]
+        aside = _mean_offsets(mesh.piece[sample], from_foot, mesh.piece_count)[1]
+        # A flat piece that is wide for its distance from the stem is a leaf across it, and no blade along it.
+        flat = _flatness(mesh.piece[sample], mesh.place[sample], mesh.piece_count) < FLAT
+        across = on_line & flat & (mean > BLADE * extent)
+        whole &= ~across
+        is_card = (across | (around >= AROUND)) & (extent <= LARGEST_CARD * chains.diagonal)
+        is_card |= (aside >= AROUND) & (extent <= SMALL_CARD * chains.diagonal)
+        is_card &= ~whole
+        self.branch[order] = np.where(whole, np.where(on_line, best, mode), -1)[piece]
+        self.foot[order] = np.where(is_card, foot, -1)[piece]
+        self.card_count = int(is_card.sum())
+
+    def _best_stems(self, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return for each piece the line that it is nearest to as a whole, its mean distance, and the length of the
+        mean offset over that."""
+        mesh, count, branches = self.mesh, self.mesh.piece_count, self.chains.hierarchy.branch_count
+        piece = np.repeat(mesh.piece[sample], self.near_branch.shape[1])
+        key, votes = np.unique(piece * branches + self.near_branch[sample].reshape(-1), return_counts=True)
+        order = np.lexsort((-votes, key // branches))
+        key = key[order]
+        rank = np.arange(len(key)) - np.searchsorted(key // branches, key // branches)
+        key = key[rank < BRANCHES_TRIED]
+        parent = self.parent[key % branches]
+        key = np.unique(np.append(key, (key // branches * branches + parent)[parent >= 0]))
+        key = key[self.chains.is_line[key % branches]]
+        best, mean, around = np.zeros(count, np.int64), np.full(count, np.inf), np.ones(count)
+        if not len(key):
+            return best, mean, around
+        sizes = np.bincount(mesh.piece[sample], minlength=count)
+        by_piece = sample[np.argsort(mesh.piece[sample], kind="stable")]
+        starts = np.cumsum(sizes) - sizes
+        times = sizes[key // branches]
+        row = np.repeat(np.arange(len(key)), times)
+        number = np.arange(times.sum()) - np.repeat(np.cumsum(times) - times, times)
+        points = by_piece[starts[key[row] // branches] + number]
+        pairs = _Pairs(self.chains, mesh.place[points], key[row] % branches)
+        far, off = _mean_offsets(row, pairs.offset, len(key))
+        order = np.lexsort((far, key // branches))
+        pieces, first = np.unique(key[order] // branches, return_index=True)
+        chosen = order[first]
+        best[pieces], mean[pieces], around[pieces] = key[chosen] % branches, far[chosen], off[chosen]
+        return best, mean, around
+
+    # ---- rows ----
+
+    def _of_pieces(self) -> tuple[np.ndarray, ...]:
+        points = np.flatnonzero(self.branch >= 0)
+        pairs = _Pairs(self.chains, self.mesh.place[points], self.branch[points])
+        return points, pairs.element, pairs.share, np.ones(len(points))
+
+    def _of_cards(self) -> tuple[np.ndarray, ...]:
+        points = np.flatnonzero((self.branch < 0) & (self.foot >= 0))
+        feet, of = np.unique(self.foot[points], return_inverse=True)
+        branch = np.where(self.branch[feet] >= 0, self.branch[feet], self.near_branch[feet, 0])
+        pairs = _Pairs(self.chains, self.mesh.place[feet], branch)
+        return points, pairs.element[of], pairs.share[of], np.ones(len(points))
+
+    def _of_points(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return rows of points that are on the nearest branch each, with weights that change gradually between
+        neighbours."""
+        if not len(points):
+            return points, points, np.zeros(0), np.zeros(0)
+        branches = self.chains.hierarchy.branch_count
+        candidates = self.near_branch[points]
+        candidates = np.concatenate([candidates, self.parent[candidates]], axis=1)
+        key = np.arange(len(points))[:, None] * branches + candidates
+        key = np.unique(key[candidates >= 0])
+        point, branch = key // branches, key % branches
+        pairs = _Pairs(self.chains, self.mesh.place[points[point]], branch)
+        depth = pairs.depth.copy()
+        surface = np.flatnonzero(~self.chains.is_line[branch])
+        if len(surface):  # A surface is as far away as its nearest vertex.
+            is_it = self.near_branch[points[point[surface]]] == branch[surface, None]
+            depth[surface] = np.where(is_it, self.near[points[point[surface]]], np.inf).min(axis=1)
+        order = np.lexsort((depth, point))
+        nearest = branch[order[np.unique(point[order], return_index=True)[1]]]
+        weights = self._spread(points, nearest)
+        pairs = _Pairs(self.chains, self.mesh.place[points[weights.row]], weights.col.astype(np.int64))
+        return points[weights.row], pairs.element, pairs.share, weights.data
+
+    def _spread(self, points: np.ndarray, branch: np.ndarray):
+        """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most."""
+        sparse = scipy_module("sparse")
+        number = np.full(len(self.mesh.place), -1)
+        number[points] = np.arange(len(points))
+        links = number[self.mesh.links]
+        links = links[(links >= 0).all(axis=1)]
+        count = len(points)
+        both = np.concatenate([links, links[:, ::-1], np.arange(count)[:, None] * [1, 1]])
+        step = sparse.coo_matrix((np.ones(len(both)), both.T), (count, count)).tocsr()
+        step = sparse.diags(1.0 / np.asarray(step.sum(axis=1)).reshape(-1)) @ step
+        shape = count, self.chains.hierarchy.branch_count
+        weights = sparse.coo_matrix((np.ones(count), (np.arange(count), branch)), shape).tocsr()
+        for _ in range(ROUNDS):
+            weights = _largest(step @ weights)
+        return weights.tocoo()
+
+
+def _largest(weights):
+    """Return the SHARES largest of each row of a sparse matrix, and no small ones, adding up to 1."""
+    coo = weights.tocoo()
+    order = np.lexsort((-coo.data, coo.row))
+    row, col, data = coo.row[order], coo.col[order], coo.data[order]
+    rank = np.arange(len(row)) - np.searchsorted(row, row)
+    kept = (rank < SHARES) & ((data >= LEAST_WEIGHT) | (rank == 0))
+    row, col, data = row[kept], col[kept], data[kept]
+    data = data / np.bincount(row, data, minlength=weights.shape[0])[row]
+    return type(coo)((data, (row, col)), weights.shape).tocsr()
+
+
+def _mean_offsets(group: np.ndarray, offset: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each group of offsets (n, 3) their mean length, and the length of their mean over that."""
+    size = np.maximum(np.bincount(group, minlength=count), 1)
+    length = np.bincount(group, np.linalg.norm(offset, axis=1), count) / size
+    mean = np.stack([np.bincount(group, offset[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
+    return length, np.linalg.norm(mean, axis=1) / np.where(length > 0, length, np.inf)
+
+
+def _flatness(group: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
+    """Return for each group of points (n, 3) the smallest of its variances along axes over the middle one, else 1."""
+    size = np.maximum(np.bincount(group, minlength=count), 1)
+    mean = np.stack([np.bincount(group, points[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
+    off = points - mean[group]
+    moments = [[np.bincount(group, off[:, i] * off[:, j], count) for i in range(3)] for j in range(3)]
+    variance = np.linalg.eigvalsh(np.array(moments).transpose(2, 0, 1))
+    return np.where(variance[:, 1] > 0, variance[:, 0] / np.where(variance[:, 1] > 0, variance[:, 1], 1.0), 1.0)
+
+
+def _modes(group: np.ndarray, label: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the most frequent label of each group, and its share."""
+    width = int(label.max()) + 1
+    key, votes = np.unique(group * width + label, return_counts=True)
+    order = np.lexsort((-votes, key // width))
+    groups, first = np.unique(key[order] // width, return_index=True)
+    mode, share = np.zeros(count, np.int64), np.zeros(count)
+    mode[groups] = key[order[first]] % width
+    share[groups] = votes[order[first]] / np.bincount(group, minlength=count)[groups]
+    return mode, share
