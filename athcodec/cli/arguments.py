@@ -324,8 +324,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--segment-frames",
         metavar="FRAMES",
         type=_argument(_segment_frames),
-        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {DEFAULT_SEGMENT}, or all of a small "
-        "clip, short ones of what jumps); what is decoded at once, so shorter ones seek faster and make larger files",
+        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {MAX_SEGMENT}, of large "
+        f"plants {DEFAULT_SEGMENT}, or shorter if the file is smaller); what is decoded at once, so shorter ones seek faster and make larger files",
     )
     verb.add_argument(
         "--tam",

@@ -32,7 +32,7 @@ from athcodec.options import MIN_SEGMENT
 LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
 SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
-NEAREST, NEAR_RATIO = 4, 1.12  # Steps are walked for so many other choices, of at most so many times the least bytes.
+NEAREST, NEAR_RATIO = 3, 1.1  # Steps are walked for so many other choices, of at most so many times the least bytes.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
@@ -70,6 +70,13 @@ def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list
     costs = trials.costs(others)
     most = NEAR_RATIO * min([trials.cost(settings), *costs])
     return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
+
+
+def _learned_cost(trials: Trials) -> float:
+    """Return the bytes of a file at first settings, or with learned time bases or modes if it is smaller with them."""
+    start = trials.start
+    with_bases = trials.cheapest([start, *learned_bases.candidates(start, trials)])
+    return min(trials.costs([with_bases, *learned_pieces.candidates(with_bases, trials)]))
 
 
 # What progress and summaries call a choice, and the largest share of the work that is left that it may take. Steps and
@@ -134,7 +141,7 @@ class Search:
     def shorter_segments(self) -> list[tuple[int, float]]:
         """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
         settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
-        smaller. Learned time bases may do as well in longer ones: the last length is the smallest with them, too."""
+        smaller. What is learned may do as well in longer ones: the last length is the smallest with it, too."""
         trials = (self.of_sample or self).trials
         lengths = [max(stop - start for start, stop in trials.source.segments)]
         tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
@@ -149,8 +156,15 @@ class Search:
             tried.append(other)
         if len(tried) == 1:
             return []
-        costs = [min(one.costs([one.start, *learned_bases.candidates(one.start, one)])) for one in tried]
+        costs = [_learned_cost(one) for one in tried]
         return list(zip(lengths, costs))[1 : int(np.argmin(costs)) + 1]
+
+    def share_of_longest(self, others: int) -> float:
+        """Return the share of the work that is left for the search in the longest segments if it is made again in so
+        many others: an equal one, but what a search takes that is not short of work."""
+        trials, work = (self.of_sample or self).trials, self.trials.work
+        needed = TIGHT * expected_trials(self.effort, trials.is_layered, False) * trials.work_of_trial
+        return min(1.0, max(1 / (1 + others), needed / max(work.allowed - work.done, 1.0)))
 
     def levels_need_own_bases(self) -> bool:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
