@@ -149,6 +149,9 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "picture": "CLIP --out OUT",
     "wrappings": "--help",
     "onto": "--picture OUT",
+    "structure": "trellis --short",
+    "split": "--help",
+    "branches": "CLIP --results OUT",
 }
 
 
