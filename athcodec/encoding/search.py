@@ -167,7 +167,7 @@ class Search:
         """Return the share of the work that is left for the search in the longest segments if it is made again in so
         many others: an equal one, but what a search takes that is not short of work."""
         trials, work = (self.of_sample or self).trials, self.trials.work
-        needed = TIGHT * expected_trials(self.effort, trials.is_layered, False) * trials.work_of_trial
+        needed = TIGHT * expected_trials(self.effort, trials.is_layered, self._is_small) * trials.work_of_trial
         return min(1.0, max(1 / (1 + others), needed / max(work.allowed - work.done, 1.0)))
 
     def levels_need_own_bases(self) -> bool:
