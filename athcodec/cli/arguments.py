@@ -325,7 +325,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="FRAMES",
         type=_argument(_segment_frames),
         help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {MAX_SEGMENT}, of large "
-        f"plants {DEFAULT_SEGMENT}, or shorter if the file is smaller); what is decoded at once, so shorter ones seek faster and make larger files",
+        f"plants {DEFAULT_SEGMENT}, or shorter if the file is smaller); what is decoded at once, so shorter ones seek "
+        "faster and mostly make larger files",
     )
     verb.add_argument(
         "--tam",

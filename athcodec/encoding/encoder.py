@@ -38,6 +38,7 @@ from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, st
 from athcodec.options import DEFAULT_REL_ERROR
 
 JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
+USUAL = "usual effort"  # The stage of progress in which effort "best" decides as "default" does.
 FEWER_PLACES = 0.9  # Largest share of the places that are left then, if joining is to be tried.
 
 
@@ -199,17 +200,26 @@ def _decided(
 ) -> tuple[EncodingJob, float, Decided]:
     """Return the job, its bound in scene units, and what is decided about the file. Trials estimate, so effort "best"
     decides as "default" does, too, and keeps what makes the smaller file."""
-    job, bound = _begin(clip, option, options, report)
+    usual = None
+    if _is_compared(option, options):
+        as_usual = dataclasses.replace(options, effort="default")
+        weights = _stage_weights(clip, option, as_usual, motion=False)
+        part = WeightedProgress(lambda stage, fraction: report(f"{USUAL}: {stage}", fraction), weights)
+        usual = _decided(clip, option, as_usual, part)
+    with warnings.catch_warnings():
+        if usual is not None:
+            warnings.simplefilter("ignore", SourceWarning)  # The usual job has warned.
+        job, bound = _begin(clip, option, options, report)
     with job.refusing(bound):
         decided = job.decide(bound)
-    if options.effort != "best" or option.target_size is not None:
-        return job, bound, decided
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SourceWarning)  # The first job has warned.
-        usual, _ = _begin(clip, option, dataclasses.replace(options, effort="default"), report)
-    with usual.refusing(bound):
-        made = usual.decide(bound)
-    return (usual, bound, made) if usual.size(made) <= job.size(decided) else (job, bound, decided)
+    if usual is not None and usual[0].size(usual[2]) <= job.size(decided):
+        return dataclasses.replace(usual[0], report=report), bound, usual[2]
+    return job, bound, decided
+
+
+def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
+    """Return whether two efforts are compared. A target size is met by both."""
+    return options.effort == "best" and option.target_size is None
 
 
 def _begin(
@@ -281,17 +291,22 @@ def _table_bytes(placed: PlacedClip) -> int:
 def _weighted_progress(
     clip: MotionClip, progress: Progress | None, option: BoundOption, options: EncodingOptions, draft: bool = False
 ) -> WeightedProgress:
+    weights = _stage_weights(clip, option, options, not draft)
+    if _is_compared(option, options):
+        as_usual = dataclasses.replace(options, effort="default")
+        weights = {USUAL: sum(_stage_weights(clip, option, as_usual, motion=False).values())} | weights
+    return WeightedProgress(progress, weights)
+
+
+def _stage_weights(clip: MotionClip, option: BoundOption, options: EncodingOptions, motion: bool) -> dict[str, float]:
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
-    return WeightedProgress(
-        progress,
-        stage_weights(
-            clip.vertex_count,
-            segments,
-            options.effort,
-            samples=min(SAMPLES, len(clip.clip_range_frames)),
-            branches=not clip.has_branches,
-            sizes=option.target_size is not None,
-            motion=not draft,
-            layers=len(layer_ratios(options.ladder, option.rel_error or DEFAULT_REL_ERROR, 1.0)),
-        ),
+    return stage_weights(
+        clip.vertex_count,
+        segments,
+        options.effort,
+        samples=min(SAMPLES, len(clip.clip_range_frames)),
+        branches=not clip.has_branches,
+        sizes=option.target_size is not None,
+        motion=motion,
+        layers=len(layer_ratios(options.ladder, option.rel_error or DEFAULT_REL_ERROR, 1.0)),
     )

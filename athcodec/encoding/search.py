@@ -141,7 +141,8 @@ class Search:
     def shorter_segments(self) -> list[tuple[int, float]]:
         """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
         settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
-        smaller. What is learned may do as well in longer ones: the last length is the smallest with it, too."""
+        smaller. What is learned may do as well in longer ones: the last half is the smallest with it, too, and stands
+        before the power of two that is next to it."""
         trials = (self.of_sample or self).trials
         lengths = [max(stop - start for start, stop in trials.source.segments)]
         tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
@@ -157,13 +158,16 @@ class Search:
         if len(tried) == 1:
             return []
         costs = [_learned_cost(one) for one in tried]
-        return list(zip(lengths, costs))[1 : int(np.argmin(costs)) + 1]
+        best = int(np.argmin(costs))
+        shorter = list(zip(lengths, costs))[1 : best + 1]
+        usual = 1 << round(math.log2(lengths[best]))
+        return [*shorter, (usual, costs[best])] if shorter and usual != lengths[best] else shorter
 
     def share_of_longest(self, others: int) -> float:
         """Return the share of the work that is left for the search in the longest segments if it is made again in so
         many others: an equal one, but what a search takes that is not short of work."""
         trials, work = (self.of_sample or self).trials, self.trials.work
-        needed = TIGHT * expected_trials(self.effort, trials.is_layered, False) * trials.work_of_trial
+        needed = TIGHT * expected_trials(self.effort, trials.is_layered, self._is_small) * trials.work_of_trial
         return min(1.0, max(1 / (1 + others), needed / max(work.allowed - work.done, 1.0)))
 
     def levels_need_own_bases(self) -> bool:
