@@ -7,6 +7,7 @@ import struct
 import time
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -124,7 +125,7 @@ def test_deeper_levels_cost_more_bytes_and_show_more_parts_with_less_error(name,
     assert levels[0].rms_error > 10 * levels[-1].rms_error
 
 
-@pytest.mark.parametrize("name", ["sample", "chain", "tube"])
+@pytest.mark.parametrize("name", ["sample", "half accepted"])
 def test_level_0_of_a_plant_on_one_root_is_one_affine_map_per_frame(name, plants):
     path, source = plants[name]
     with athcodec.open(path) as decoder:
@@ -357,7 +358,8 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     decoder.positions(0, last)
     decoder.positions(first, 0)
     decoder.positions(stop - 1, last)
-    assert prepared == [(1, last), (0, last), (1, 0), (1, last)] and decoder.file.bytes_read > before
+    asked = [(1, last), (0, last), (1, 0), (1, last)]
+    assert prepared == [part for part, _ in groupby(asked)] and decoder.file.bytes_read > before
 
 
 def test_several_threads_at_once_see_what_one_alone_does(played):

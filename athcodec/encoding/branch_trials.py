@@ -26,6 +26,7 @@ from athcodec.options import DEFAULT_SEGMENT
 TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
 TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
+ALIKE = 1.05  # Bytes, over the fewest, up to which branches with fewer roots are better: they have more levels.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
@@ -51,11 +52,13 @@ def _best_candidate(
     clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
 ) -> tuple[Found, float]:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
-    about its bytes, infinite where nothing had to be tried. Predicted motion hardly depends on branches: if two
+    about its bytes, infinite where nothing had to be tried; of those that are about as small the one with the fewest
+    roots. Predicted motion hardly depends on branches: if two
     candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
+    tried: list[tuple[float, Found]] = []
     finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
     work.add(finding)
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
@@ -64,12 +67,14 @@ def _best_candidate(
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         size, is_predicted = trial.size(branches)
         predicted += is_predicted
-        if size < least:
-            best, least = branches, size
+        tried.append((size, branches))
         if number > 1:
             work.add(finding)
             if predicted == number or not work.fits(finding + trial.least_work):
                 break
+    fewest = min(size for size, _ in tried)
+    alike = [one for one in tried if one[0] <= ALIKE * fewest] or tried
+    least, best = min(alike, key=lambda one: (np.count_nonzero(one[1].branch_parent < 0), one[0]))
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
         return best, least
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.

@@ -213,6 +213,7 @@ def _decided(
     with job.refusing(bound):
         decided = job.decide(bound)
     if usual is not None and usual[0].size(usual[2]) <= job.size(decided):
+        usual[2].choice = dataclasses.replace(usual[2].choice, untried=decided.choice.untried)
         return dataclasses.replace(usual[0], report=report), bound, usual[2]
     return job, bound, decided
 

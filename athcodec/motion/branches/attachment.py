@@ -75,8 +75,9 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
     prices, count = Prices(frames, label), int(label.max()) + 1
     vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
     child, parent = label[vertices].T
-    strained = np.tile(contacts.cost, 2) / np.maximum(_sizes(frames[0], label)[child], np.finfo(float).tiny)
-    hanging = prices.on_others(vertices) + np.minimum(strained, MOST_STRAIN)
+    size = np.maximum(_sizes(frames[0], label)[child], np.tile(contacts.cost, 2) / MOST_STRAIN)
+    strained = np.tile(contacts.cost, 2) / np.maximum(size, np.finfo(float).tiny)
+    hanging = prices.on_others(vertices) + strained
     alone = prices.as_roots()
     if root is not None:
         alone += hanging.sum() + alone.sum()
