@@ -20,13 +20,13 @@ from athcodec.motion.branches.finding import candidates, named_labels
 from athcodec.motion.branches.result import Found, with_branches
 from athcodec.motion.branches.still import clip_among, joined, still_parts
 from athcodec.motion.clip import MotionClip, stands_still
-from athcodec.motion.hierarchy import hierarchy_of
+from athcodec.motion.hierarchy import branch_orders, hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
 TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
 TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
-ALIKE = 1.05  # Bytes, over the fewest, up to which branches with fewer roots are better: they have more levels.
+ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
@@ -52,8 +52,8 @@ def _best_candidate(
     clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
 ) -> tuple[Found, float]:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
-    about its bytes, infinite where nothing had to be tried; of those that are about as small the one with the fewest
-    roots. Predicted motion hardly depends on branches: if two
+    about its bytes, infinite where nothing had to be tried; of those that are about as small the one of the lowest
+    order, but roots alone last, which have no levels. Predicted motion hardly depends on branches: if two
     candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
@@ -74,12 +74,18 @@ def _best_candidate(
                 break
     fewest = min(size for size, _ in tried)
     alike = [one for one in tried if one[0] <= ALIKE * fewest] or tried
-    least, best = min(alike, key=lambda one: (np.count_nonzero(one[1].branch_parent < 0), one[0]))
+    least, best = min(alike, key=_order_and_size)
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
         return best, least
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
     size = trial.size(unordered)[0]
     return (unordered, size) if size < least else (best, least)
+
+
+def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
+    size, branches = tried
+    order = int(branch_orders(branches.branch_parent).max())
+    return order == 0, order, size
 
 
 class Trial:

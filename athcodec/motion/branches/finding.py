@@ -102,9 +102,9 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
     has_many_roots = MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent)
     if first.method == "components" and has_many_roots:
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
+    yield dataclasses.replace(first, stem_index=None)
     if first.method == "components" and roots > 1:
         yield _by_contact(seen, first)
-    yield dataclasses.replace(first, stem_index=None)
     if first.method == "components":
         if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
             yield arranged(seen, seen.parts, None, "components")
