@@ -262,7 +262,8 @@ class _Search:
         sparse = scipy_module("sparse")
         number = np.full(len(self.mesh.place), -1)
         number[points] = np.arange(len(points))
-        links = number[self.mesh.links]
+        # Only a skin spreads: the points of a centre line are each on one stem.
+        links = number[self.mesh.links[(self.mesh.piece[self.mesh.links] >= 0).all(axis=1)]]
         links = links[(links >= 0).all(axis=1)]
         count = len(points)
         both = np.concatenate([links, links[:, ::-1], np.arange(count)[:, None] * [1, 1]])
