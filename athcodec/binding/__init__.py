@@ -213,7 +213,7 @@ class OntoMesh(ArrayLike):
         frames to compare them."""
         of_vertex = self._points.of_vertex
         distance = self._binding.distance[of_vertex]
-        known = {
+        known: dict[str, Any] = {
             "vertex_count": self._mesh.vertex_count,
             "far_count": int((distance > self._limit).sum()),
             "far_limit": self._limit,

@@ -106,9 +106,9 @@ class Chains:
         if len(surfaces):
             rest = self.vertex_rest[hierarchy.vertex_source]
             along, edge = _along_surfaces(hierarchy, rest, links, surfaces)
-            for branch in surfaces.tolist():
-                rows = slice(first[branch], first[branch] + count[branch])
-                slice_of[rows] = _slices(rest[rows], along[rows], edge[branch])
+            for each in surfaces.tolist():
+                rows = slice(first[each], first[each] + count[each])
+                slice_of[rows] = _slices(rest[rows], along[rows], edge[each])
         order = np.lexsort((slice_of, np.repeat(np.arange(len(first)), count)))
         branch, sliced = self.branch_of_place[order], slice_of[order]
         begins = np.append(True, (np.diff(branch) != 0) | (np.diff(sliced) != 0))
