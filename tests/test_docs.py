@@ -60,7 +60,7 @@ def files(tmp_path_factory):
             )
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
-        for number, sides in enumerate((8, 5, 3)):
+        for number, sides in enumerate((5, 4, 3)):
             tubes = Tubes(Skeleton.of(clip, 1), sides)
             lod = athcodec.MotionClip(tubes.at(clip.rest)[None], [0.0], faces=tubes.faces, metadata={"unit": "m"})
             athcodec.write(lod, folder / f"lod{number}.glb")

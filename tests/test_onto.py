@@ -172,6 +172,36 @@ def test_girth_and_leaves_grow_with_a_stem_that_grows():
     assert radius[0] < 0.15 and 0.4 < radius[1] < 0.6 and radius[2] == pytest.approx(1.0, abs=1e-5)
 
 
+def test_a_mesh_in_the_pose_of_a_frame_takes_the_motion_from_there(stem):
+    points, quads = tube(0.0, LENGTH, 0.05, 21)
+    with opened(stem) as plant, athcodec.onto(plant, bent(points, ANGLES[-1]), faces=quads, frame=-1) as moving:
+        for frame, angle in enumerate(ANGLES):
+            off = np.linalg.norm(moving[frame] - bent(points, angle), axis=1)
+            assert off.max() < 0.05 * (ANGLES[-1] - angle) / (NODES - 1) / 2 + 5e-4
+        with pytest.raises(IndexError):
+            athcodec.onto(plant, points, frame=FRAMES)
+
+
+def test_a_plant_that_grows_from_a_point_takes_a_mesh_of_its_last_frame():
+    points = line(NODES)
+    growth = np.array([0.0, 0.5, 1.0])
+    clip = MotionClip(growth[:, None, None] * points, np.arange(3) / 10, rest=0.0 * points, edges=rows(NODES))
+    ring, quads = tube(0.0, LENGTH, 0.05, 21)
+    seedling = clip.replace(positions=(growth + 0.05)[:, None, None] * points, rest=0.05 * points)
+    with (
+        opened(athcodec.encode(seedling, rel_error=1e-5)) as plant,
+        pytest.raises(ClipError, match="fits with frame=-1"),
+    ):
+        athcodec.onto(plant, ring, faces=quads)
+    with opened(athcodec.encode(clip, rel_error=1e-5)) as plant:
+        with pytest.raises(ClipError, match="frame=-1"):
+            athcodec.onto(plant, ring, faces=quads)
+        moving = np.asarray(athcodec.onto(plant, ring, faces=quads, frame=-1), np.float64)
+    np.testing.assert_allclose(moving[2], ring, atol=1e-4)
+    assert np.ptp(moving[0], axis=0).max() < 0.01
+    np.testing.assert_allclose(moving[1, :, 1], ring[:, 1] / 2, atol=1e-3)
+
+
 def test_a_coarse_tube_follows_a_fine_one(stem):
     fine, quads = tube(0.0, LENGTH, 0.05, 81)
     coarse, coarse_quads = tube(0.0, LENGTH, 0.05, 11)
@@ -284,8 +314,11 @@ def test_decode_says_how_the_mesh_lies_and_refuses_what_makes_no_sense(files, ca
     ath, lod, out = (str(files / name) for name in ("stem.ath", "lod.h5", "out.h5"))
     assert main(["decode", ath, out, "--onto", lod]) == 0
     assert "126 vertices on the plant" in capsys.readouterr().out
-    assert main(["decode", ath, out, "--onto-unit", "cm"]) == 1
-    assert "--onto" in capsys.readouterr().err
+    for option in (("--onto-unit", "cm"), ("--onto-up-axis", "z"), ("--onto-frame", "0")):
+        assert main(["decode", ath, out, *option]) == 1
+        assert f"{option[0]}: got no mesh" in capsys.readouterr().err
+    assert main(["decode", ath, out, "--onto", lod, "--onto-frame", "0"]) == 0
+    capsys.readouterr()
     assert main(["decode", ath, lod, "--onto", lod]) == 1
     assert "is the input" in capsys.readouterr().err
     assert main(["decode", ath, out, "--onto", lod, "--onto-unit", "mm"]) == 1

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from athcodec.arrays import Source, clip_of
 from athcodec.binding.chains import Chains
 from athcodec.binding.moving import MovingPoints
-from athcodec.binding.scene import COVERS, Fit
+from athcodec.binding.scene import COVERS, FITS, Fit
 from athcodec.binding.search import Marks, bind
 from athcodec.binding.surface import MeshPoints
 from athcodec.decoding.array_like import ArrayLike
@@ -32,6 +32,7 @@ from athcodec.errors import ClipError, CoarseWarning
 from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter
+from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.frames import Frames
 from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH
@@ -40,6 +41,7 @@ from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, s
 
 FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
 COARSE_REST = 2.0  # Error of the plant's rest pose over that of its motion, above which a mesh lies on it badly.
+POINT = 10.0  # Diagonal of a plant over its error, up to which it is a point.
 MOST_FAR = 0.5  # Share of far vertices above which a mesh is refused.
 DEFAULT_SCENE = {"unit": "m", "up_axis": "y"}
 OF_PLANT = ("unit", "up_axis", METRES_PER_UNIT, "fps", "start_frame", STRENGTH, HEADING, BLEND, OWN)
@@ -129,13 +131,25 @@ class OntoMesh(ArrayLike):
     """
 
     def __init__(
-        self, view: ClipView, mesh: MotionClip, plant: dict[str, str], taken: dict[str, str], opened: ExitStack
+        self,
+        view: ClipView,
+        pose: np.ndarray,
+        mesh: MotionClip,
+        plant: dict[str, str],
+        taken: dict[str, str],
+        opened: ExitStack,
     ):
         self._view, self._mesh, self._opened = view, mesh, opened
-        chains = Chains(view)
+        chains = Chains(view, pose)
+        if not chains.diagonal > POINT * view.decoder.file.max_error_bound:
+            raise ClipError(
+                "onto: the plant is a point in its rest pose, expected the pose of the mesh",
+                python="frame=-1 takes a mesh in the pose of the last frame",
+                shell="--onto-frame -1 takes a mesh in the pose of the last frame",
+            )
         marks, self._limit = Marks(chains), FAR * chains.diagonal
         rest = np.asarray(mesh.rest, np.float64)
-        _refuse_far_mesh(marks, rest, self._limit, plant, taken)
+        _refuse_far_mesh(view, marks, rest, self._limit, plant, taken)
         points = MeshPoints(rest, mesh.polygons, mesh.edges)
         self._points, self._binding = points, bind(chains, points, marks)
         offset = rest - points.place[points.of_vertex]
@@ -199,7 +213,7 @@ class OntoMesh(ArrayLike):
         frames to compare them."""
         of_vertex = self._points.of_vertex
         distance = self._binding.distance[of_vertex]
-        known = {
+        known: dict[str, Any] = {
             "vertex_count": self._mesh.vertex_count,
             "far_count": int((distance > self._limit).sum()),
             "far_limit": self._limit,
@@ -273,9 +287,15 @@ class _Unchanged:
 
 
 def onto(
-    motion: Decoder | ClipView, mesh: Source, *, unit: str | None = None, up_axis: str | None = None, **options: Any
+    motion: Decoder | ClipView,
+    mesh: Source,
+    *,
+    frame: int | None = None,
+    unit: str | None = None,
+    up_axis: str | None = None,
+    **options: Any,
 ) -> OntoMesh:
-    """Let a mesh in the rest pose of a plant move as the plant does.
+    """Let a mesh in the rest pose of a plant, or in the pose of a frame, move as the plant does.
 
     Every vertex of the mesh hangs on the nearest place along a stem, or on two or three where stems join. It keeps its
     offset from there in a frame that turns with the stem. Connected pieces that grow beside a stem, such as leaves,
@@ -289,6 +309,9 @@ def onto(
         The mesh: a file of any format that `read` knows, of which the rest pose, or else the first frame, is the
         plant's rest pose; files that are numbered like it are not read. An array (vertices, 3) or (frames, vertices, 3)
         can have `faces` beside it.
+    frame : int, optional
+        The frame of the clip whose pose the mesh is in, negative from the end; by default it is in the rest pose. For a
+        plant that grows the last one shows all its parts. A mesh with as many frames as the clip is taken in this one.
     unit : {"m", "cm", "mm", "km", "in", "ft"}, optional
         The unit of the mesh, in place of what it states. The mesh is brought to that of the plant, or to metres where
         the plant states none.
@@ -313,6 +336,8 @@ def onto(
         If scipy is missing, or what reads the mesh.
     OSError
         If the mesh cannot be read.
+    IndexError
+        If the clip has no such frame.
 
     Examples
     --------
@@ -322,12 +347,19 @@ def onto(
     ((150, 700, 3), 0)
     """
     view = ClipView(motion) if isinstance(motion, Decoder) else motion
-    _warn_of_rest(view)
+    if frame is None:
+        _warn_of_rest(view)
     stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}
     opened = ExitStack()
     try:
         clip = _opened_mesh(mesh, opened, options)
-        return OntoMesh(view, *_in_scene_of(view, clip, stated), opened)
+        pose = view.rest
+        if frame is not None:
+            pose = view.decoder.at_level(None).positions(frame, dtype=np.float64)
+            if clip.frame_count == view.decoder.frame_count > 1:
+                number = frame % clip.frame_count
+                clip = clip.replace(rest=clip.block(number, number + 1)[0])
+        return OntoMesh(view, pose, *_in_scene_of(view, clip, stated), opened)
     except BaseException:
         opened.close()
         raise
@@ -389,26 +421,35 @@ def _in_scene_of(
 
 
 def _refuse_far_mesh(
-    marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], taken: dict[str, str]
+    view: ClipView, marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], taken: dict[str, str]
 ) -> None:
-    """Raise ClipError if most vertices are far from the plant; the message names the unit or axis that fits."""
+    """Raise ClipError if most vertices are far from the plant; the message names the pose, unit or axis that fits."""
     fit = Fit(marks, rest, limit)
     if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
         return
-    scene = fit.better_scene(plant, taken)
+    fitting: dict[str, Any] = fit.better_scene(plant, taken)
     text = f"onto: {fit.mesh_far:.0%} of the mesh is further from the plant than {limit:.3g}, a tenth of its diagonal"
-    if fit.mesh_far <= MOST_FAR:
+    if fit.mesh_far > MOST_FAR and _is_in_last_frame(view, rest):
+        fitting = {"frame": -1}
+    elif fit.mesh_far <= MOST_FAR:
         # A mesh of a part of the plant covers little of it as well, but no other unit makes it cover more.
-        if not scene:
+        if not fitting:
             return
         text = (
             f"onto: {fit.plant_far:.0%} of the plant is further from the mesh than {limit:.3g}, a tenth of its diagonal"
         )
-    if not scene:
+    if not fitting:
         text += ", and no other unit or up axis brings it there"
         raise ClipError(f"{text}; expected a mesh of this plant in its rest pose")
     raise ClipError(
         text,
-        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in scene.items())}",
-        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in scene.items()),
+        python=f"it fits with {', '.join(f'{name}={value!r}' for name, value in fitting.items())}",
+        shell="it fits with " + " ".join(f"--onto-{name.replace('_', '-')} {value}" for name, value in fitting.items()),
     )
+
+
+def _is_in_last_frame(view: ClipView, rest: np.ndarray) -> bool:
+    """Whether a mesh lies on the plant as it is in the clip's last frame."""
+    last = view.decoder.at_level(None).positions(-1, dtype=np.float64)
+    distance = scipy_module("spatial").cKDTree(last).query(rest)[0]
+    return bool((distance > FAR * np.linalg.norm(np.ptp(last, axis=0))).mean() < FITS)

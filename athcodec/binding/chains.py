@@ -38,6 +38,13 @@ class Pose:
 class Chains:
     """The nodes and elements of a plant.
 
+    Parameters
+    ----------
+    view : ClipView
+        The plant.
+    rest : (N, 3) array
+        The pose of the plant that the mesh is in, in the source's order.
+
     Attributes
     ----------
     rest : (M, 3) float64
@@ -57,10 +64,10 @@ class Chains:
         Radius of the stem at each node, where the file has the attribute.
     """
 
-    def __init__(self, view: ClipView):
+    def __init__(self, view: ClipView, rest: np.ndarray):
         file = view.decoder.file
         self.hierarchy: Hierarchy = file.hierarchy
-        self.vertex_rest = np.asarray(view.rest, np.float64)
+        self.vertex_rest = np.asarray(rest, np.float64)
         self.diagonal = float(np.linalg.norm(np.ptp(self.vertex_rest, axis=0)))
         self._least = max(NO_LENGTH * self.diagonal, LEAST_LENGTH)
         self.error = float(view.max_error)
@@ -99,9 +106,9 @@ class Chains:
         if len(surfaces):
             rest = self.vertex_rest[hierarchy.vertex_source]
             along, edge = _along_surfaces(hierarchy, rest, links, surfaces)
-            for branch in surfaces.tolist():
-                rows = slice(first[branch], first[branch] + count[branch])
-                slice_of[rows] = _slices(rest[rows], along[rows], edge[branch])
+            for each in surfaces.tolist():
+                rows = slice(first[each], first[each] + count[each])
+                slice_of[rows] = _slices(rest[rows], along[rows], edge[each])
         order = np.lexsort((slice_of, np.repeat(np.arange(len(first)), count)))
         branch, sliced = self.branch_of_place[order], slice_of[order]
         begins = np.append(True, (np.diff(branch) != 0) | (np.diff(sliced) != 0))

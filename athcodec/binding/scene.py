@@ -38,7 +38,8 @@ class Fit:
     def _far_shares(self, points: np.ndarray) -> tuple[float, float]:
         """Return the share of the mesh that is far from the plant, and that of the plant that is far from the mesh."""
         back = scipy_module("spatial").cKDTree(points).query(self._plant)[0]
-        return tuple(float((each > self._limit).mean()) for each in (self._marks.distance(points), back))
+        there = self._marks.distance(points)
+        return float((there > self._limit).mean()), float((back > self._limit).mean())
 
     def better_scene(self, plant: dict[str, str], taken: dict[str, str]) -> dict[str, str]:
         """Return the "unit" and the "up_axis" of the mesh with which it would lie on the plant, as far as they are not

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -257,12 +258,13 @@ class _Search:
         pairs = _Pairs(self.chains, self.mesh.place[points[weights.row]], weights.col.astype(np.int64))
         return points[weights.row], pairs.element, pairs.share, weights.data
 
-    def _spread(self, points: np.ndarray, branch: np.ndarray):
+    def _spread(self, points: np.ndarray, branch: np.ndarray) -> Any:
         """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most."""
         sparse = scipy_module("sparse")
         number = np.full(len(self.mesh.place), -1)
         number[points] = np.arange(len(points))
-        links = number[self.mesh.links]
+        # Only a skin spreads: the points of a centre line are each on one stem.
+        links = number[self.mesh.links[(self.mesh.piece[self.mesh.links] >= 0).all(axis=1)]]
         links = links[(links >= 0).all(axis=1)]
         count = len(points)
         both = np.concatenate([links, links[:, ::-1], np.arange(count)[:, None] * [1, 1]])
@@ -275,16 +277,16 @@ class _Search:
         return weights.tocoo()
 
 
-def _largest(weights):
+def _largest(weights: Any) -> Any:
     """Return the SHARES largest of each row of a sparse matrix, and no small ones, adding up to 1."""
-    coo = weights.tocoo()
-    order = np.lexsort((-coo.data, coo.row))
-    row, col, data = coo.row[order], coo.col[order], coo.data[order]
+    entries = weights.tocoo()
+    order = np.lexsort((-entries.data, entries.row))
+    row, col, data = entries.row[order], entries.col[order], entries.data[order]
     rank = np.arange(len(row)) - np.searchsorted(row, row)
     kept = (rank < SHARES) & ((data >= LEAST_WEIGHT) | (rank == 0))
     row, col, data = row[kept], col[kept], data[kept]
     data = data / np.bincount(row, data, minlength=weights.shape[0])[row]
-    return type(coo)((data, (row, col)), weights.shape).tocsr()
+    return type(entries)((data, (row, col)), weights.shape).tocsr()
 
 
 def _mean_offsets(group: np.ndarray, offset: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -474,6 +474,13 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         help="write this mesh, a file of any format that is read, moved as the plant moves: its rest pose, or else its "
         "first frame, is the plant's rest pose; it keeps its faces and attributes",
     )
+    verb.add_argument(
+        "--onto-frame",
+        metavar="N",
+        type=int,
+        help="the mesh is in the pose of this frame of the clip, counted from 0 or, from the end, -1, in place of the "
+        "rest pose: -1 for a mesh of a plant that has grown",
+    )
     for name, kind, checked, choices in (
         ("unit", "UNIT", checked_unit, METRES),
         ("up-axis", "AXIS", checked_axis, AXES),

@@ -127,7 +127,8 @@ def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
     with naming(args.onto), warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below
         warnings.simplefilter("always", GuessWarning)
-        moving = athcodec.onto(view, args.onto, unit=args.onto_unit, up_axis=args.onto_up_axis)
+        how = {"frame": args.onto_frame, "unit": args.onto_unit, "up_axis": args.onto_up_axis}
+        moving = athcodec.onto(view, args.onto, **how)
     _say_not_read(moving.clip, args.onto)
     return moving
 

@@ -244,8 +244,10 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
     from athcodec.sources import listed
 
     check_output(args.output, args.input, args.host_mesh, args.onto, suffix="" if args.format else None)
-    if args.onto is None and (args.onto_unit or args.onto_up_axis):
-        raise ClipError("--onto-unit, --onto-up-axis: got no mesh, expected one with --onto")
+    if args.onto is None:
+        for name in ("onto_unit", "onto_up_axis", "onto_frame"):
+            if getattr(args, name) is not None:
+                raise ClipError(f"--{name.replace('_', '-')}: got no mesh, expected one with --onto")
     format_to_write(args.output, args.format)  # An unknown one is refused before there is work.
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
