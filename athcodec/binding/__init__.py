@@ -33,7 +33,7 @@ from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter
 from athcodec.motion.branches.point_runs import scipy_module
-from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.clip import MotionClip, stands_still, stem_index_of
 from athcodec.motion.frames import Frames
 from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH
 from athcodec.motion.scene import in_scene
@@ -265,9 +265,7 @@ class OntoMesh(ArrayLike):
             below[each] = parent[each] if is_used[parent[each]] else below[parent[each]]
         number = np.append(np.cumsum(is_used) - 1, -1)
         vertex_branch = number[branch[self._points.of_vertex]]
-        order = np.lexsort((along[self._points.of_vertex], vertex_branch))
-        stem_index = np.empty(len(order), np.int64)
-        stem_index[order] = np.arange(len(order)) - np.searchsorted(vertex_branch[order], vertex_branch[order])
+        stem_index = stem_index_of(vertex_branch, along[self._points.of_vertex])
         return {"vertex_branch": vertex_branch, "branch_parent": number[below[is_used]], "stem_index": stem_index}
 
 

@@ -15,8 +15,10 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
+from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.polygons import sides
 from athcodec.motion.quaternions import quaternions, rotation_matrices
 
 WINDING = 4.0  # Length of the path through a branch's vertices over its extent, above which they are no line.
@@ -98,7 +100,6 @@ class Chains:
     def _make_nodes(self, links: np.ndarray) -> None:
         """Put the vertices of each branch into nodes, from base to tip."""
         hierarchy = self.hierarchy
-        slice_of = np.zeros(hierarchy.vertex_count, np.int64)
         first, count = hierarchy.first_vertex.astype(np.int64), hierarchy.stem_count.astype(np.int64)
         place = np.arange(hierarchy.vertex_count) - np.repeat(first, count)
         slice_of = np.where(np.repeat(self.is_line, count), place, 0)
@@ -109,8 +110,9 @@ class Chains:
             for each in surfaces.tolist():
                 rows = slice(first[each], first[each] + count[each])
                 slice_of[rows] = _slices(rest[rows], along[rows], edge[each])
-        order = np.lexsort((slice_of, np.repeat(np.arange(len(first)), count)))
-        branch, sliced = self.branch_of_place[order], slice_of[order]
+        of_branch = hierarchy.vertex_branch().astype(np.int64)
+        order = np.lexsort((slice_of, of_branch))
+        branch, sliced = of_branch[order], slice_of[order]
         begins = np.append(True, (np.diff(branch) != 0) | (np.diff(sliced) != 0))
         self._vertices = hierarchy.vertex_source[order]
         self._starts = np.flatnonzero(begins)
@@ -120,11 +122,6 @@ class Chains:
         node_of = np.empty(len(order), np.int64)
         node_of[order] = np.cumsum(begins) - 1
         self._node_of_vertex = node_of  # By the vertex' number in file order.
-
-    @property
-    def branch_of_place(self) -> np.ndarray:
-        """The branch of each vertex in file order, (N,) int64."""
-        return np.repeat(np.arange(self.hierarchy.branch_count), self.hierarchy.stem_count)
 
     def _make_elements(self) -> None:
         hierarchy, count = self.hierarchy, len(self.rest)
@@ -311,15 +308,13 @@ def _joined_moment(
 def _best_turn(moment: np.ndarray, prior: np.ndarray) -> np.ndarray:
     """Return the rotations (..., 3, 3) that fit moments best, near `prior` where they leave one free."""
     size = np.linalg.norm(moment, axis=(-2, -1), keepdims=True)
-    left, _, right = np.linalg.svd(moment / np.where(size > 0, size, 1.0) + PRIOR * prior)
-    left[..., 2] *= np.sign(np.linalg.det(left) * np.linalg.det(right))[..., None]
-    return left @ right
+    return nearest_rotations(moment / np.where(size > 0, size, 1.0) + PRIOR * prior)
 
 
 def _branch_in_file_order(hierarchy: Hierarchy) -> np.ndarray:
     """Return the branch, in file order, of each vertex in the source's order, (N,) int64."""
     branch = np.empty(hierarchy.vertex_count, np.int64)
-    branch[hierarchy.vertex_source] = np.repeat(np.arange(hierarchy.branch_count), hierarchy.stem_count)
+    branch[hierarchy.vertex_source] = hierarchy.vertex_branch()
     return branch
 
 
@@ -330,19 +325,10 @@ def _links(view: ClipView) -> tuple[np.ndarray, np.ndarray]:
     if view.polygons is not None:
         counts, corners = (np.asarray(each, np.int64) for each in view.polygons)
         has_faces[corners] = True
-        links.append(polygon_sides(counts, corners))
+        links.append(sides(counts, corners))
     if view.edges is not None:
         links.append(np.asarray(view.edges, np.int64))
     return np.concatenate(links), has_faces
-
-
-def polygon_sides(counts: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the sides of polygons as pairs of vertices, (C, 2), a row for each corner."""
-    stop = np.cumsum(counts)
-    following = np.arange(1, len(corners) + 1)
-    used = counts > 0
-    following[stop[used] - 1] = (stop - counts)[used]
-    return np.stack([corners, corners[following]], axis=1)
 
 
 def _along_surfaces(
@@ -351,7 +337,7 @@ def _along_surfaces(
     """Return how far each vertex is from the foot of its branch along the surface, (N,), and the length of a branch's
     longer edges, (B,); all in file order."""
     count, first = hierarchy.vertex_count, hierarchy.first_vertex
-    branch = np.repeat(np.arange(hierarchy.branch_count), hierarchy.stem_count)
+    branch = hierarchy.vertex_branch()
     place = np.empty(count, np.int64)
     place[hierarchy.vertex_source] = np.arange(count)
     links = place[links]

@@ -10,6 +10,7 @@ import numpy as np
 from athcodec.binding.chains import Chains
 from athcodec.binding.surface import MeshPoints
 from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.seen import moments_of_each, sums_of_each
 
 NEAREST = 8  # Marks looked at around each point; they tell the branches that it may be on.
 FINENESS = 300  # Marks on an element over its length, where that is the plant's diagonal.
@@ -293,17 +294,15 @@ def _mean_offsets(group: np.ndarray, offset: np.ndarray, count: int) -> tuple[np
     """Return for each group of offsets (n, 3) their mean length, and the length of their mean over that."""
     size = np.maximum(np.bincount(group, minlength=count), 1)
     length = np.bincount(group, np.linalg.norm(offset, axis=1), count) / size
-    mean = np.stack([np.bincount(group, offset[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
+    mean = sums_of_each(offset, group, count) / size[:, None]
     return length, np.linalg.norm(mean, axis=1) / np.where(length > 0, length, np.inf)
 
 
 def _flatness(group: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
     """Return for each group of points (n, 3) the smallest of its variances along axes over the middle one, else 1."""
     size = np.maximum(np.bincount(group, minlength=count), 1)
-    mean = np.stack([np.bincount(group, points[:, axis], count) for axis in range(3)], axis=1) / size[:, None]
-    off = points - mean[group]
-    moments = [[np.bincount(group, off[:, i] * off[:, j], count) for i in range(3)] for j in range(3)]
-    variance = np.linalg.eigvalsh(np.array(moments).transpose(2, 0, 1))
+    off = points - (sums_of_each(points, group, count) / size[:, None])[group]
+    variance = np.linalg.eigvalsh(moments_of_each(off, off, group, count))
     return np.where(variance[:, 1] > 0, variance[:, 0] / np.where(variance[:, 1] > 0, variance[:, 1], 1.0), 1.0)
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.binding.chains import polygon_sides
-from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.seen import faces_by_sides
 from athcodec.motion.places import Places
+from athcodec.motion.polygons import sides
 
 SAME_PLACE = 1e-6  # Grid of the points' places, as a share of the mesh's diagonal.
 
@@ -43,20 +43,15 @@ class MeshPoints:
             links.append(self.of_vertex[edges].astype(np.int64))
         if polygons is not None and len(polygons[1]):
             counts, corners = np.asarray(polygons[0], np.int64), self.of_vertex[polygons[1]].astype(np.int64)
-            sides = np.sort(polygon_sides(counts, corners), axis=1)
-            links.append(sides)
-            self._find_pieces(counts, corners, sides)
+            side = sides(counts, corners)
+            links.append(side)
+            self._find_pieces(counts, corners, faces_by_sides(counts, side))
         joined = np.unique(np.sort(np.concatenate(links), axis=1), axis=0)
         self.links = joined[joined[:, 0] != joined[:, 1]]
 
-    def _find_pieces(self, counts: np.ndarray, corners: np.ndarray, sides: np.ndarray) -> None:
-        face = np.repeat(np.arange(len(counts)), counts)
-        order = np.lexsort((sides[:, 1], sides[:, 0]))
-        same = (sides[order[1:]] == sides[order[:-1]]).all(axis=1)
-        pairs = np.stack([face[order[:-1][same]], face[order[1:][same]]])
-        sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
-        graph = sparse.coo_matrix((np.ones(pairs.shape[1], np.int8), pairs), (len(counts),) * 2)
-        number, piece = graphs.connected_components(graph, directed=False)
+    def _find_pieces(self, counts: np.ndarray, corners: np.ndarray, piece: np.ndarray) -> None:
+        """Give points to pieces; piece: (F,) of each face."""
+        face, number = np.repeat(np.arange(len(counts)), counts), int(piece.max()) + 1
         # A point of several pieces belongs to the largest of them, which is written last.
         faces = np.bincount(piece, minlength=number)
         first = np.argsort(faces[piece[face]], kind="stable")

@@ -14,7 +14,7 @@ from athcodec._native import address, lib
 from athcodec.motion.branches.finding import named_labels
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.seen import copies_of, parts_by_sides, parts_of
-from athcodec.motion.clip import MotionClip, Skin
+from athcodec.motion.clip import MotionClip, Skin, stem_index_of
 from athcodec.motion.frames import Frames
 from athcodec.motion.hierarchy import is_forest
 from athcodec.motion.places import Places
@@ -74,7 +74,7 @@ class PlacedClip:
         """Return branches of these places for those of another clip of the same vertices."""
         of_place = self.places.of_vertex[other.places.first]
         branch = branches.vertex_branch[of_place]
-        stem_index = None if branches.stem_index is None else _ranks(branches.stem_index[of_place], branch)
+        stem_index = None if branches.stem_index is None else stem_index_of(branch, branches.stem_index[of_place])
         return replace(branches, vertex_branch=branch, stem_index=stem_index)
 
 
@@ -137,7 +137,7 @@ def clip_of_places(clip: MotionClip, places: Places) -> MotionClip:
     positions.chunks = getattr(clip.positions, "chunks", None)
     stem_index = None
     if clip.stem_index is not None:
-        stem_index = _ranks(clip.stem_index[first], clip.vertex_branch[first])
+        stem_index = stem_index_of(clip.vertex_branch[first], clip.stem_index[first])
     skin = clip.skin and Skin(clip.skin.joint_parent, clip.skin.vertex_joint[first], clip.skin.names)
     edges = None if clip.edges is None else of_vertex[clip.edges]
     coded = MotionClip(
@@ -368,11 +368,3 @@ def _alike_in_runs(places: Places, counts: np.ndarray) -> Places:
 def _joined_in_all(places: np.ndarray) -> np.ndarray:
     """Return labels (k, n) for the places (k, n) of vertices of like parts, which join what is joined in all parts."""
     return np.broadcast_to(Places.of_labels(places.T).of_vertex, places.shape)
-
-
-def _ranks(places: np.ndarray, branch: np.ndarray) -> np.ndarray:
-    """Return the rank of each vertex among those of its branch."""
-    order = np.lexsort((places, branch))
-    ranks = np.empty(len(order), np.int32)
-    ranks[order] = np.arange(len(order)) - np.searchsorted(branch[order], branch[order])
-    return ranks

@@ -15,6 +15,7 @@ from athcodec.encoding.quantise import half_octaves
 from athcodec.errors import BoundError
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.polygons import sides
 from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
 
 OF_BOUND = "bound"
@@ -91,11 +92,9 @@ def shape_steps(clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.n
         return steps
     counts, corners = polygons
     faces = np.repeat(np.arange(len(counts)), counts)
-    first = np.cumsum(counts) - counts
-    following = np.arange(1, len(corners) + 1)
-    following[(first + counts - 1)[counts > 0]] = first[counts > 0]
     points = np.asarray(clip.rest, np.float64)
-    edges = points[corners[following]] - points[corners]
+    start, stop = sides(counts, corners).T
+    edges = points[stop] - points[start]
     lengths = np.linalg.norm(edges, axis=1)
     sizes = np.minimum(EDGE_STEP * lengths, HEIGHT_STEP * _heights(edges, lengths, faces, len(counts), corners, points))
     counted = np.where(lengths > LEAST_SIZE * diagonal, np.maximum(sizes, EDGE_STEP * LEAST_SIZE * diagonal), np.inf)

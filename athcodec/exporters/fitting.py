@@ -20,6 +20,7 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import Progress
+from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.hierarchy import build_hierarchy, hierarchy_of
 from athcodec.motion.quaternions import quaternions
 
@@ -244,10 +245,3 @@ def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
     places = np.concatenate([batch[2] for batch in done], axis=1)[:, by_place]
     values = [np.concatenate([batch[3][i] for batch in done], axis=1)[:, by_place] for i in range(len(done[0][3]))]
     return Moving(Parts.over(order, first[by_place], count[by_place], rest), places, values)
-
-
-def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
-    """The rotations nearest to matrices (..., 3, 3)."""
-    u, _, v = np.linalg.svd(matrices)
-    u[..., 2] *= np.sign(np.linalg.det(u @ v))[..., None]
-    return u @ v

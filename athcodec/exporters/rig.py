@@ -21,9 +21,10 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import Progress
-from athcodec.exporters.fitting import allowed_error, nearest_rotations, portions
+from athcodec.exporters.fitting import allowed_error, portions
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import distinct
+from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.branches.finding import find_branches
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of

@@ -6,6 +6,7 @@ import numpy as np
 
 from athcodec.metrics.blocks import Meter, Spread
 from athcodec.motion.clip import MotionClip, source_stem_index
+from athcodec.motion.polygons import sides
 
 DEGENERATE_SHARE = 1e-3
 """Of a face's area in the source: a decoded face that has less is degenerate."""
@@ -141,12 +142,8 @@ def stem_links(vertex_branch: np.ndarray, stem_index: np.ndarray | None = None) 
 
 def _sides(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     """(E, 2) pairs of neighbouring corners, each once, without those of a vertex with itself."""
-    indices = np.asarray(indices, np.int64)
-    following = np.roll(indices, -1)
-    ends = np.cumsum(counts)[np.asarray(counts) > 0]
-    following[ends - 1] = indices[np.append(0, ends[:-1])]
-    sides = np.sort(np.stack([indices, following], axis=1), axis=1)
-    return np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0)
+    pairs = np.sort(sides(counts, indices), axis=1)
+    return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
 
 
 def _by_size(counts: np.ndarray, indices: np.ndarray) -> list[np.ndarray]:

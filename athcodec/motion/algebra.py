@@ -65,6 +65,20 @@ def determinant(matrices: np.ndarray) -> np.ndarray:
     return (matrices[..., 0, :] * across).sum(axis=-1)
 
 
+def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
+    """Return the rotations nearest to matrices (..., 3, 3)."""
+    left, _, right = np.linalg.svd(matrices)
+    return rotations_of(left, right)
+
+
+def rotations_of(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return the rotations nearest to matrices of which these are the singular vectors, (..., 3, 3) each, as
+    numpy.linalg.svd returns them."""
+    left = left.copy()
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
+    return left @ right
+
+
 def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K,
     n, n), which are destroyed."""

@@ -638,7 +638,12 @@ def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray |
 
 def source_stem_index(vertex_branch: np.ndarray) -> np.ndarray:
     """Return the place of each vertex on its stem, (N,) int32, if vertices run from base to tip by their numbers."""
-    order = np.argsort(vertex_branch, kind="stable")
+    return stem_index_of(vertex_branch, np.arange(len(vertex_branch)))
+
+
+def stem_index_of(vertex_branch: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return the place of each vertex on its stem, (N,) int32, by how far along it is, (N,), and then by its number."""
+    order = np.lexsort((along, vertex_branch))
     labels = vertex_branch[order]
     places = np.empty(len(order), np.int32)
     places[order] = np.arange(len(order)) - np.searchsorted(labels, labels)

@@ -25,6 +25,16 @@ def type_of(code: int) -> np.dtype:
     return np.dtype(f"<{'i' if code & _SIGNED else 'u'}{1 << (code & 3)}")
 
 
+def sides(counts: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the sides of polygons as pairs of vertices, (C, 2) int64: from each corner to the next one of its face.
+    counts: (F,) corners of each face. corners: (C,) vertices, face after face."""
+    counts, corners = np.asarray(counts, np.int64), np.asarray(corners, np.int64)
+    following, stop = np.arange(1, len(corners) + 1), np.cumsum(counts)
+    has_corners = counts > 0
+    following[stop[has_corners] - 1] = (stop - counts)[has_corners]
+    return np.stack([corners, corners[following]], axis=1)
+
+
 @dataclass(frozen=True)
 class Polygons:
     """Corners (C,) int32 in source order, counts (F,) uint32, or None if all faces have `columns` corners, and the

@@ -19,7 +19,7 @@ from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import Seen, cheapest_of_each, components
-from athcodec.motion.clip import source_stem_index
+from athcodec.motion.clip import source_stem_index, stem_index_of
 
 NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are sought.
 LONE_PARTS = 64  # Most parts of the plant whose nearest others are sought at any distance.
@@ -75,9 +75,9 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
     prices, count = Prices(frames, label), int(label.max()) + 1
     vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
     child, parent = label[vertices].T
-    size = np.maximum(_sizes(frames[0], label)[child], np.tile(contacts.cost, 2) / MOST_STRAIN)
-    strained = np.tile(contacts.cost, 2) / np.maximum(size, np.finfo(float).tiny)
-    hanging = prices.on_others(vertices) + strained
+    cost = np.tile(contacts.cost, 2)
+    size = np.maximum(_sizes(frames[0], label)[child], cost / MOST_STRAIN)
+    hanging = prices.on_others(vertices) + cost / np.maximum(size, np.finfo(float).tiny)
     alone = prices.as_roots()
     if root is not None:
         alone += hanging.sum() + alone.sum()
@@ -138,8 +138,7 @@ def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: 
 def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
     """Return the vertex of each branch that moves least, (B,), where a root begins."""
     way = ((frames - frames[0]) ** 2).sum(axis=(0, 2))
-    order = np.lexsort((way, label))
-    return order[np.searchsorted(label[order], np.arange(label.max() + 1))]
+    return cheapest_of_each(label, way)
 
 
 def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
@@ -215,12 +214,7 @@ def _others_nearby(tree: Any, rest: np.ndarray, label: np.ndarray, near: int) ->
 def _along(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarray) -> np.ndarray:
     """Return the places of the vertices on their branches, (N,), from the base out: the source's order, or its reverse,
     if it is one, else by the distance from the base over the links within the branch."""
-    count = len(rest)
-    way = _ways(rest, label, joints, links)
-    place = np.empty(count, np.int64)
-    order = np.lexsort((np.arange(count), way, label))
-    first = np.searchsorted(label[order], np.arange(label.max() + 1))
-    place[order] = np.arange(count) - first[label[order]]
+    place = stem_index_of(label, _ways(rest, label, joints, links))
     source = source_stem_index(label)
     agreement = _rank_correlation(label, place, source)
     size = np.bincount(label)

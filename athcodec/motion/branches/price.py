@@ -9,6 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from athcodec.motion.algebra import rotations_of
+from athcodec.motion.branches.seen import cheapest_of_each, moments_of_each, sums_of_each
+
 STEP = 1e-4  # Of the diagonal: about the steps of quantisation, below which motion costs nothing.
 SHOWN = 3  # Vertices of a branch, far from each other, whose motion stands for its own.
 HANGING = 30.0  # Bits of hanging on anything: a flag, a vertex, and the errors of what it hangs on.
@@ -54,11 +57,10 @@ class Prices:
 
 def _far_vertices(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     """Return vertices of each branch that are far from its centre and from each other, (B, SHOWN)."""
-    away = ((rest - _means(rest, label)[label]) ** 2).sum(axis=1)
+    away = np.square(_centred(rest, label)).sum(axis=1)
     shown: list[np.ndarray] = []
     for _ in range(SHOWN):
-        order = np.lexsort((-away, label))
-        shown.append(order[np.searchsorted(label[order], np.arange(label.max() + 1))])
+        shown.append(cheapest_of_each(label, -away))
         apart = ((rest - rest[shown[-1]][label]) ** 2).sum(axis=1)
         away = apart if len(shown) == 1 else np.minimum(away, apart)
     return np.stack(shown, axis=1)
@@ -67,17 +69,15 @@ def _far_vertices(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
 def _turns(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
     """Return the rotations that carry the branches best from the rest pose to each frame, less the identity,
     (B, 3, 3, F) (Kabsch 1976); zero for branches whose vertices lie on a line."""
-    rest = frames[0] - _means(frames[0], label)[label]
-    turns = np.empty((int(label.max()) + 1, 3, 3, len(frames) - 1))
-    for number, pose in enumerate(frames[1:]):
-        products = [np.bincount(label, pose[:, i] * rest[:, j]) for i in range(3) for j in range(3)]
-        left, sizes, right = np.linalg.svd(np.stack(products, axis=1).reshape(-1, 3, 3))
-        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-        flat = sizes[:, 1] <= FLAT * sizes[:, 0]
-        turns[..., number] = np.where(flat[:, None, None], 0.0, left @ right - np.eye(3))
-    return turns
+    rest = _centred(frames[0], label)
+    moments = np.stack([moments_of_each(pose, rest, label) for pose in frames[1:]])
+    left, sizes, right = np.linalg.svd(moments)
+    flat = sizes[..., 1] <= FLAT * sizes[..., 0]
+    turns = np.where(flat[..., None, None], 0.0, rotations_of(left, right) - np.eye(3))
+    return turns.transpose(1, 2, 3, 0)
 
 
-def _means(values: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return the mean of the vertices of each label, (B, 3)."""
-    return np.stack([np.bincount(label, column) for column in values.T], axis=1) / np.bincount(label)[:, None]
+def _centred(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return positions less the mean of those of the same branch, (N, 3)."""
+    centred: np.ndarray = rest - (sums_of_each(rest, label) / np.bincount(label)[:, None])[label]
+    return centred

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
+from athcodec.motion.polygons import sides
 
 SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
 AFFINE_ERROR = 1e-4  # Part of the diagonal that parts may be off one affine map.
@@ -24,6 +26,12 @@ class Seen:
 
     def __init__(self, clip: MotionClip, by_price: bool = False):
         self.clip, self.by_price = clip, by_price
+
+    def by_contact(self) -> Seen:
+        """Return the same observations, with what is known of them, for branches that hang where they grow."""
+        seen = copy.copy(self)
+        seen.by_price = False
+        return seen
 
     @cached_property
     def frames(self) -> np.ndarray:
@@ -63,11 +71,7 @@ def links_of(clip: MotionClip) -> np.ndarray:
     if clip.edges is not None:
         pairs.append(clip.edges.astype(np.int64))
     if clip.polygons is not None:
-        counts, indices = (array.astype(np.int64) for array in clip.polygons)
-        following = np.arange(1, len(indices) + 1)
-        ends = np.cumsum(counts)
-        following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
-        pairs.append(np.stack([indices, indices[following]], axis=1))
+        pairs.append(sides(*clip.polygons))
     copy = copies_of(clip)
     inside = np.flatnonzero((copy[1:] == copy[:-1]) & (copy[1:] > 0))
     pairs.append(np.stack([inside, inside + 1], axis=1))
@@ -102,24 +106,30 @@ def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
     """Return the share of the vertices whose parts, (N,) labels, move by one affine map in each of the frames,
     (k, N, 3), from that in which the part is largest."""
     size = np.bincount(label)
-    centred = np.stack([pose - _sums(pose, label)[label] / size[label, None] for pose in frames])
-    spreads = np.array([_sums((pose**2).sum(axis=1)[:, None], label)[:, 0] for pose in centred])
+    centred = np.stack([pose - sums_of_each(pose, label)[label] / size[label, None] for pose in frames])
+    spreads = np.array([sums_of_each((pose**2).sum(axis=1)[:, None], label)[:, 0] for pose in centred])
     full = centred[spreads.argmax(axis=0)[label], np.arange(len(label))]
-    moments = _sums((full[:, :, None] * full[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3)
+    moments = moments_of_each(full, full, label)
     flat = (FLAT * spreads.max(axis=0) + np.finfo(float).tiny)[:, None, None] * np.eye(3)
     inverse = np.linalg.inv(moments + flat)
     tolerance = AFFINE_ERROR * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
     moves = np.ones(len(size), bool)
     for pose in centred:
-        maps = _sums((pose[:, :, None] * full[:, None]).reshape(-1, 9), label).reshape(-1, 3, 3) @ inverse
+        maps = moments_of_each(pose, full, label) @ inverse
         off = np.linalg.norm(pose - np.einsum("nij,nj->ni", maps[label], full), axis=1)
         moves[label[off > tolerance]] = False
     return float(size[moves].sum() / size.sum())
 
 
-def _sums(values: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return the sums of the rows, (N, k), of each label."""
-    return np.stack([np.bincount(label, column) for column in values.T], axis=1)
+def sums_of_each(values: np.ndarray, label: np.ndarray, count: int = 0) -> np.ndarray:
+    """Return the sums of the rows, (N, k), of each label; count: of the labels, if some have no rows."""
+    return np.stack([np.bincount(label, column, count) for column in values.T], axis=1)
+
+
+def moments_of_each(values: np.ndarray, others: np.ndarray, label: np.ndarray, count: int = 0) -> np.ndarray:
+    """Return the sums over each label of the outer products of rows, (N, 3) each, (L, 3, 3)."""
+    products = (values[:, :, None] * others[:, None]).reshape(-1, 9)
+    return sums_of_each(products, label, count).reshape(-1, 3, 3)
 
 
 def copies_of(clip: MotionClip) -> np.ndarray:
@@ -140,14 +150,8 @@ def parts_by_sides(clip: MotionClip, places: Places) -> np.ndarray | None:
     counts, corners = (array.astype(np.int64) for array in clip.polygons)
     if not len(corners):
         return None
-    face, following = np.repeat(np.arange(len(counts)), counts), np.arange(1, len(corners) + 1)
-    ends = np.cumsum(counts)
-    following[ends[counts > 0] - 1] = (ends - counts)[counts > 0]
-    at = places.of_vertex[corners]
-    sides = np.sort(np.stack([at, at[following]], axis=1), axis=1)
-    order = np.lexsort(sides.T)
-    same = np.flatnonzero((sides[order[1:]] == sides[order[:-1]]).all(axis=1))
-    of_face = components(np.stack([face[order[same]], face[order[same + 1]]], axis=1), len(counts))
+    face = np.repeat(np.arange(len(counts)), counts)
+    of_face = faces_by_sides(counts, sides(counts, places.of_vertex[corners]))
     size = np.bincount(of_face[face], minlength=of_face.max() + 1)
     label = np.full(clip.vertex_count, -1)
     largest_last = np.argsort(size[of_face[face]], kind="stable")
@@ -155,6 +159,14 @@ def parts_by_sides(clip: MotionClip, places: Places) -> np.ndarray | None:
     bare = label < 0
     label[bare] = len(size) + places.of_vertex[bare]
     return numbered(label)
+
+
+def faces_by_sides(counts: np.ndarray, side: np.ndarray) -> np.ndarray:
+    """Return labels of what common sides join, of faces with so many corners, (F,). side: pairs of vertices, (C, 2)."""
+    face, side = np.repeat(np.arange(len(counts)), counts), np.sort(side, axis=1)
+    order = np.lexsort(side.T)
+    same = np.flatnonzero((side[order[1:]] == side[order[:-1]]).all(axis=1))
+    return components(np.stack([face[order[same]], face[order[same + 1]]], axis=1), len(counts))
 
 
 def _pairs_at_one_place(clip: MotionClip) -> np.ndarray:
