@@ -73,7 +73,7 @@ def _best_candidate(
             if predicted == number or not work.fits(finding + trial.least_work):
                 break
     fewest = min(size for size, _ in tried)
-    alike = [one for one in tried if one[0] <= ALIKE * fewest] or tried
+    alike = [one for one in tried if one[0] <= ALIKE * fewest]
     least, best = min(alike, key=_order_and_size)
     if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
         return best, least

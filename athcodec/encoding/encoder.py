@@ -196,20 +196,21 @@ def write(
 
 
 def _decided(
-    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress
+    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress, known: PlacedClip | None = None
 ) -> tuple[EncodingJob, float, Decided]:
     """Return the job, its bound in scene units, and what is decided about the file. Trials estimate, so effort "best"
-    decides as "default" does, too, and keeps what makes the smaller file."""
-    usual = None
+    decides as "default" does, too, and keeps what makes the smaller file. known: the clip's places, which do not depend
+    on the effort; None: they are found here."""
+    placed, usual = _placed(clip, option, options) if known is None else known, None
     if _is_compared(option, options):
         as_usual = dataclasses.replace(options, effort="default")
         weights = _stage_weights(clip, option, as_usual, motion=False)
         part = WeightedProgress(lambda stage, fraction: report(f"{USUAL}: {stage}", fraction), weights)
-        usual = _decided(clip, option, as_usual, part)
+        usual = _decided(clip, option, as_usual, part, placed)
     with warnings.catch_warnings():
         if usual is not None:
             warnings.simplefilter("ignore", SourceWarning)  # The usual job has warned.
-        job, bound = _begin(clip, option, options, report)
+        job, bound = _begin(placed, option, options, report)
     with job.refusing(bound):
         decided = job.decide(bound)
     if usual is not None and usual[0].size(usual[2]) <= job.size(decided):
@@ -223,12 +224,16 @@ def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
     return options.effort == "best" and option.target_size is None
 
 
+def _placed(clip: MotionClip, option: BoundOption, options: EncodingOptions) -> PlacedClip:
+    clip.check()
+    return placed_clip(clip, options, option.least(clip))
+
+
 def _begin(
-    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress
+    placed: PlacedClip, option: BoundOption, options: EncodingOptions, report: Progress
 ) -> tuple[EncodingJob, float]:
     """The job, whose clip has branches by then, and its bound in scene units."""
-    clip.check()
-    placed, branches = placed_clip(clip, options, option.least(clip)), None
+    clip, branches = placed.source, None
     if not clip.has_branches:
         vertices, frames = placed.clip.vertex_count, clip.frame_count
         work = Work(BRANCH_SHARE * allowed_work(vertices, frames, options.effort), report, "branches")

@@ -17,11 +17,11 @@ from athcodec.encoding.settings import OF_BRANCHES, Choice, Settings
 from athcodec.encoding.shape import detail_of, finer_than
 from athcodec.encoding.start import still_choice
 from athcodec.encoding.survey import Ath, Survey
+from athcodec.motion.branches.still import LEAST_STILL
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.thresholds import Thresholds
 
 STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
-LEAST_STILL = 64  # Vertices below which what stands still is searched like everything else.
 
 
 def still_branches(source: Source, bound: float) -> np.ndarray | None:

@@ -9,8 +9,9 @@ a few frames are read.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from athcodec.motion.branches.patches import rigid_patches
 from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, near_neighbours, numbered, parts_of
-from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
 from athcodec.motion.hierarchy import branches_from_edges
 from athcodec.options import METHODS, whole
 
@@ -77,14 +78,13 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
             yield other
         return
     if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
-        yield first
-        yield from _others(seen, first)
+        yield from _distinct(itertools.chain([first], _others(seen, first)))
         return
     yield from _in_order(seen)
     yield single
     if first is not None:
         yield first
-    grown = Seen(clip)  # Patches of one mesh hang on each other.
+    grown = seen.by_contact()  # Patches of one mesh hang on each other.
     yield _by_motion(grown, None)
     is_large = clip.vertex_count >= LARGE_MESH
     yield _by_motion(grown, None, LARGE_PATCH if is_large else SMALL_PATCH)
@@ -92,30 +92,44 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
         yield _free_patches(seen, size)
 
 
+def _distinct(proposals: Iterable[Found]) -> Iterator[Found]:
+    """Yield branches that differ from all before them: a mesh may leave nothing to arrange in another way."""
+    before: list[tuple[np.ndarray, ...]] = []
+    for found in proposals:
+        index = source_stem_index(found.vertex_branch) if found.stem_index is None else found.stem_index
+        arrays = found.vertex_branch, found.branch_parent, index
+        if not any(all(map(np.array_equal, arrays, others)) for others in before):
+            before.append(arrays)
+            yield found
+
+
 def _others(seen: Seen, first: Found) -> Iterator[Found]:
     """Yield alternatives to branches that are not found by motion alone."""
-    roots = np.count_nonzero(first.branch_parent < 0)
     if first.method == "runs":
         yield from _in_order(seen)
-    if first.method not in ("skeleton", "components"):
-        return
-    has_many_roots = MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent)
-    if first.method == "components" and has_many_roots:
+    elif first.method == "skeleton":
+        yield dataclasses.replace(first, stem_index=None)
+    elif first.method == "components":
+        yield from _other_components(seen, first)
+
+
+def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
+    roots = np.count_nonzero(first.branch_parent < 0)
+    if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
     yield dataclasses.replace(first, stem_index=None)
-    if first.method == "components" and roots > 1:
+    if roots > 1:
         yield _by_contact(seen, first)
-    if first.method == "components":
-        if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
-            yield arranged(seen, seen.parts, None, "components")
-        unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
-        if len(unwelded.branch_parent) != len(first.branch_parent):
-            yield unwelded
+    if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
+        yield arranged(seen, seen.parts, None, "components")
+    unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
+    if len(unwelded.branch_parent) != len(first.branch_parent):
+        yield unwelded
 
 
 def _by_contact(seen: Seen, first: Found) -> Found:
     """Return the same branches where they grow, as far as contacts show it."""
-    found = _FINDERS[first.method](Seen(seen.clip), None)
+    found = _FINDERS[first.method](seen.by_contact(), None)
     return first if found is None else found
 
 

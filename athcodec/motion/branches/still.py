@@ -10,11 +10,11 @@ from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import components, links_of, near_neighbours
 from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
 from athcodec.motion.frames import Frames
-from athcodec.motion.polygons import POLYGON_ARRAYS
+from athcodec.motion.polygons import Polygons
 
 NEIGHBOURS = 8  # Nearest points of each vertex without links, among which it stands.
 LEAST_STILL = 64  # Vertices below which what stands still stays with what moves.
-STILL_SHARE = 0.2  # Smallest share of a connected part that stands still apart from the rest of it.
+INSIDE_SHARE = 0.2  # Smallest share of a connected part that stands still apart from the rest of it.
 
 
 def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
@@ -41,13 +41,13 @@ def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
     label = components(links, clip.vertex_count)
     size, standing = np.bincount(label), np.bincount(label, still)
     inside = _inside(still, links)
-    apart = (standing == size) | (np.bincount(label, inside) >= STILL_SHARE * size)
+    apart = (standing == size) | (np.bincount(label, inside) >= INSIDE_SHARE * size)
     chosen: np.ndarray = np.where((standing == size)[label], True, inside) & apart[label]
     return chosen if LEAST_STILL <= np.count_nonzero(chosen) < clip.vertex_count else None
 
 
 def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
-    """Return which vertices stay within a distance of the rest pose, (N,) bool; frames are read until none does."""
+    """Return which vertices stay within a distance of the rest pose, (N,) bool; frames are read until too few do."""
     rest = clip.source_rest
     still = np.ones(clip.vertex_count, bool)
     for _, block in clip.blocks():
@@ -58,7 +58,7 @@ def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
             apart = block[:, some[moved]].astype(np.float64) - rest[some[moved]]
             moved[moved] = np.square(apart).sum(axis=2).max(axis=0) > most**2
         still[some[moved]] = False
-        if not still.any():
+        if np.count_nonzero(still) < LEAST_STILL:
             break
     return still
 
@@ -88,8 +88,6 @@ def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
 
 def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -> MotionClip:
     """Return some vertices of a clip, ascending, with what branches are found by; is_still: the rest pose alone."""
-    number = np.full(clip.vertex_count, -1)
-    number[vertices] = np.arange(len(vertices))
     rest = clip.source_rest[vertices]
     if is_still:
         positions, time = rest[None].astype(clip.dtype), clip.time[:1]
@@ -101,9 +99,9 @@ def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -
         positions,
         time,
         rest=rest,
-        edges=_among(clip.edges, number),
-        faces=_among(clip.faces, number),
-        attributes=_attributes(clip, vertices, number),
+        edges=_among(clip.edges, vertices),
+        faces=_among(clip.faces, vertices),
+        attributes=_attributes(clip, vertices),
         metadata=clip.metadata,
         clip_ranges=() if is_still else clip.clip_ranges,
     )
@@ -111,23 +109,16 @@ def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -
     return some
 
 
-def _among(corners: np.ndarray | None, number: np.ndarray) -> np.ndarray | None:
-    """Return the rows all of whose vertices have numbers, by these."""
-    if corners is None:
-        return None
-    rows = number[corners]
-    kept = rows[(rows >= 0).all(axis=1)]
-    return kept if len(kept) else None
+def _among(rows: np.ndarray | None, vertices: np.ndarray) -> np.ndarray | None:
+    """Return the edges or faces all of whose vertices are among these, ascending, by their numbers there."""
+    kept = None if rows is None else Polygons.of_rows(rows).among(vertices)
+    return kept.rows if kept is not None and kept.face_count else None
 
 
-def _attributes(clip: MotionClip, vertices: np.ndarray, number: np.ndarray) -> dict[str, np.ndarray]:
-    arrays = {}
-    if POLYGON_ARRAYS[0] in clip.attributes and clip.polygons is not None:
-        counts, corners = clip.polygons
-        face = np.repeat(np.arange(len(counts)), counts)
-        kept = np.bincount(face, number[corners] < 0, len(counts)) == 0
-        if kept.any():
-            arrays = dict(zip(POLYGON_ARRAYS, (counts[kept], number[corners[kept[face]]].astype(corners.dtype))))
+def _attributes(clip: MotionClip, vertices: np.ndarray) -> dict[str, np.ndarray]:
+    polygons = Polygons.of_attributes(clip.attributes)
+    kept = None if polygons is None else polygons.among(vertices)
+    arrays = kept.attributes if kept is not None and kept.face_count else {}
     parts = clip.attributes.get("part_vertex_counts")
     if parts is not None and parts.ndim == 1 and parts.dtype.kind in "iu" and parts.sum() == clip.vertex_count:
         of_vertex = np.repeat(np.arange(len(parts)), parts)[vertices]
