@@ -14,6 +14,7 @@ from ctypes import addressof, c_size_t
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -423,13 +424,8 @@ class SegmentMotion:
         """
         at, into, place = self._source(source), (bent, None, False, None), None
         if positions is not None:
-            level, out = self.plan.level_count - 1, (positions.dtype == np.float64, positions.ctypes.data)
-            into = bent, address(origin, np.float64, 3), *out
-
-            def place(motion: Motion, first: int, stop: int) -> None:
-                at_origin = address(origin, np.float64, 3)
-                lib.ath_pose(self.plan.core, motion, self.integers, first, stop, level, at_origin, *out)
-
+            out = _output(origin, positions)
+            into, place = (bent, *out), self._placing(self.plan.level_count - 1, *out)
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into
@@ -472,6 +468,14 @@ class SegmentMotion:
         if of_still is not None:
             self.plan.pool.map(self._with_scratch(of_still), standing)
 
+    def _placing(self, *into: Any) -> Callable[[Motion, int, int], None]:
+        """Return what places a range of pieces at a level; into: the level, and an `_output`."""
+
+        def place(motion: Motion, first: int, stop: int) -> None:
+            lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
+
+        return place
+
     def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
         plan = self.plan
         of_level = [(n, n + 1) for n in np.flatnonzero(plan.nodes["level"] == level).tolist()]
@@ -500,11 +504,8 @@ class SegmentMotion:
             positions = zeros(shape, dtype)
         else:
             positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
-        into = level, address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
-
-        def place(motion: Motion, first: int, stop: int) -> None:
-            lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
-
+        into = level, *_output(origin, positions)
+        place = self._placing(*into)
         self._piecewise(place, place)
         self._nodewise(
             lambda motion, first, stop: lib.ath_pose_nodes(self.plan.core, motion, self.integers, first, stop, *into)
@@ -533,6 +534,11 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
 
     pool.map(fill, ranges(vertices, 3 * frames))
     return out
+
+
+def _output(origin: np.ndarray, positions: np.ndarray) -> tuple[Any, bool, int]:
+    """Return where the core writes positions, to which it adds the origin."""
+    return address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
 
 
 def squared_bends(positions: np.ndarray) -> np.ndarray:

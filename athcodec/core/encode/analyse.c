@@ -415,17 +415,16 @@ static void shift_of_all(const ath_plan *plan, int32_t T, const ath_piece *piece
         }
 }
 
-/* Returns whether a piece is a root whose first vertex, its foot, stands still while the others move. */
-static int stands_on_foot(const ath_plan *plan, int32_t T, const ath_piece *piece, const double *source)
+/* Returns whether the first of some vertices, the foot of a root, stands still while the others move. */
+static int stands_on_foot(const ath_plan *plan, int32_t T, int32_t first, int32_t count, const double *source)
 {
     double moved = 0.0, of_foot = 0.0;
-    if (piece->parent >= 0) return 0;
-    for (int32_t v = piece->first; v < piece->first + piece->count; v++) {
+    for (int32_t v = first; v < first + count; v++) {
         const double *x = source + (size_t)v * 3 * (size_t)T, *x0 = ath_rest_of(plan, v);
         for (int32_t i = 0; i < 3 * T; i++) moved += (x[i] - x0[i / T]) * (x[i] - x0[i / T]);
-        if (v == piece->first) of_foot = moved;
+        if (v == first) of_foot = moved;
     }
-    return of_foot * (double)piece->count <= STANDING * STANDING * moved;
+    return of_foot * (double)count <= STANDING * STANDING * moved;
 }
 
 /* Codes the piece's own translation and rotation. local: room for its vertices. A rigid piece is turned first, so that
@@ -436,7 +435,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
 {
     const ath_stream *base = ath_base_stream(motion, piece);
     int32_t T = motion->frames;
-    int floats = (piece->flags & ATH_RIGID) != 0 && !stands_on_foot(plan, T, piece, source);
+    int floats = (piece->flags & ATH_RIGID) != 0
+                 && (piece->parent >= 0 || !stands_on_foot(plan, T, piece->first, piece->count, source));
     ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece) && !floats) {
         shift_of_first(plan, T, piece, scratch, source);
@@ -545,13 +545,12 @@ void ath_mode_weights(const ath_piece *piece, double weights[ATH_SHAPE_MODES])
 }
 
 /* Averages the residual in the attach frame, e = R'(x - c) - d, over the subtree. Tracks r < rank become the mean of e
- * * w_r, track 3 the mean of e, `centre` the mean of w, scratch->track e of the first vertex. Returns whether that
- * vertex, the foot of a root, stands still while the others move. */
-static int node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
-                        const double *source, double *tracks, double centre[3])
+ * * w_r, track 3 the mean of e, `centre` the mean of w, scratch->track e of the first vertex. */
+static void node_moments(const ath_plan *plan, const ath_node *node, int32_t T, const ath_scratch *scratch,
+                         const double *source, double *tracks, double centre[3])
 {
     const double *a = ath_rest_attach(plan, plan->pieces + node->piece);
-    double *local = scratch->placed, weight = 1.0 / (double)node->count, moved = 0.0, of_foot = 0.0;
+    double *local = scratch->placed, weight = 1.0 / (double)node->count;
     memset(tracks, 0, 12 * (size_t)T * sizeof *tracks);
     centre[0] = centre[1] = centre[2] = 0.0;
     for (int32_t v = node->first; v < node->first + node->count; v++) {
@@ -562,12 +561,8 @@ static int node_moments(const ath_plan *plan, const ath_node *node, int32_t T, c
             for (int32_t t = axis * T; t < (axis + 1) * T; t++) {
                 local[t] -= d[axis];
                 tracks[9 * T + t] += local[t] * weight;
-                moved += local[t] * local[t] * weight;
             }
-        if (v == node->first) {
-            memcpy(scratch->track, local, 3 * (size_t)T * sizeof *local);
-            of_foot = moved / weight;
-        }
+        if (v == node->first) memcpy(scratch->track, local, 3 * (size_t)T * sizeof *local);
         for (int32_t r = 0; r < node->rank; r++) {
             const double *w = node->whitening + 3 * r;
             double value = (w[0] * d[0] + w[1] * d[1] + w[2] * d[2]) * weight, *track = tracks + r * 3 * T;
@@ -575,7 +570,6 @@ static int node_moments(const ath_plan *plan, const ath_node *node, int32_t T, c
             for (int32_t i = 0; i < 3 * T; i++) track[i] += value * local[i];
         }
     }
-    return of_foot <= STANDING * STANDING * moved;
 }
 
 /* Turns the moments into the least-squares map: e = Y w, which they are already, for attached nodes, e = s + Y w for
@@ -613,7 +607,8 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     double *tracks = scratch->rows, centre[3];
     int free_base = ath_has_shift(piece);
     ath_attach(plan, motion, piece, scratch->at);
-    int stands = node_moments(plan, node, T, scratch, source, tracks, centre) && piece->parent < 0;
+    node_moments(plan, node, T, scratch, source, tracks, centre);
+    int stands = piece->parent < 0 && stands_on_foot(plan, T, node->first, node->count, source);
     fit_node(node, free_base, stands ? scratch->track : 0, T, tracks, centre);
     *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
     double step = ath_node_step(*rows->step);
