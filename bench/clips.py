@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from athcodec.sources import FRAME_SUFFIXES
 from athcodec.sources.numbering import numbered_files
 
 REL_ERROR = 1e-4
+POSITIONS: dict[str, Any] = {"attributes": "none", "ladder": "none"}  # Options of a file of positions in one layer.
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,13 @@ def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:
 
 def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> None:
     parser.add_argument("--effort", choices=EFFORTS, default=default, help="the encoder's effort (default %(default)s)")
+
+
+def file_and_seconds(clip: athcodec.MotionClip, **options: Any) -> tuple[bytes, float]:
+    """The file of a clip, and seconds of the processor."""
+    start = time.process_time()
+    data = athcodec.encode(clip, **options)
+    return data, time.process_time() - start
 
 
 @contextmanager

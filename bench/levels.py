@@ -26,7 +26,9 @@ from bench.tables import table
 GAP_FRAMES = 9
 ROUNDING = 1e-6  # the error table holds float32
 STANDING = 1e-3  # largest motion of a foot that stands still, over the extent of its plant
-LEVELLED_BYTES, FEWEST_LEVELS, LARGEST_PREFIX = 20_000, 3, 0.25  # what larger files should have
+LEVELLED_BYTES = 20_000  # Bytes above which a file should have levels.
+FEWEST_LEVELS = 3  # Levels that it should have at least.
+LARGEST_PREFIX = 0.25  # Share of its bytes that its first level should take at most.
 
 LEVELS_NOTE = """
 Bytes: the file cut after this level, with rest pose and hierarchy, without attributes. Errors over the

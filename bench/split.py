@@ -29,8 +29,13 @@ from bench.memory import peak_bytes
 from bench.tables import table
 
 ROOT = Path(__file__).resolve().parent.parent
-RUNS, SEED, FRAMES = 9, 1, 30
-WELDED, TABLE, ENTROPY, DECODING = 1.05, 0.25, 1.2, 1.1
+RUNS = 9  # Rounds of decoding.
+SEED = 1
+FRAMES = 30  # Frames of the clip whose places are found.
+WELDED = 1.05  # Limit of the size over the welded clip's.
+TABLE = 0.25  # Bytes of the table of places for each vertex, at most, in the mesh's order.
+ENTROPY = 1.2  # Limit of the table's size over its entropy in a shuffled order.
+DECODING = 1.1  # Limit of the time over that of the welded clip and a gather.
 
 NOTE = f"""
 Limits of a clip in its own order: {WELDED:g} x welded + {TABLE:g} byte a vertex; of a shuffled one {WELDED:g} x welded

@@ -7,14 +7,12 @@ none`); the columns of default options say what a user of `athcodec encode` gets
 from __future__ import annotations
 
 import argparse
-import time
 from typing import Any
 
 import numpy as np
 
 import athcodec
-from athcodec import MotionClip
-from bench.clips import add_effort, add_rel_error
+from bench.clips import POSITIONS, add_effort, add_rel_error, file_and_seconds
 from bench.scenes import SCENES, Scene
 from bench.scenes.assembly import bare
 from bench.tables import table
@@ -23,7 +21,6 @@ PARTS = 8  # Plants of a scene that are encoded alone, where it has more; their 
 SEGMENTS = (16, 32, 64, 128, 256)
 SEGMENT_SCENES = ("cloth_leaf", "storm")
 SEGMENT_BOUNDS = (1e-3, 1e-4)
-POSITIONS = {"attributes": "none", "ladder": "none"}
 
 FOUND_NOTE = f"""
 Roots and branches: of the maker, and those found for positions and faces alone. True: bytes on the maker's
@@ -73,13 +70,6 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": [part for part in tables if part["rows"]], "broken": []}
 
 
-def _encoded(clip: MotionClip, **options: Any) -> tuple[bytes, float]:
-    """The file, and seconds of the processor."""
-    start = time.process_time()
-    data = athcodec.encode(clip, **options)
-    return data, time.process_time() - start
-
-
 def _bound(scene: Scene, rel_error: float) -> float:
     """In scene units: parts are held to that of the scene."""
     low = np.min(scene.clip.positions, axis=(0, 1)).astype(np.float64)
@@ -95,8 +85,8 @@ def _branches(data: bytes) -> list[int]:
 
 def _found_row(scene: Scene, rel_error: float, effort: str, has_parts: bool) -> dict[str, Any]:
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
-    found, seconds = _encoded(scene.bare(), **options)
-    true, true_seconds = _encoded(scene.clip, **options)
+    found, seconds = file_and_seconds(scene.bare(), **options)
+    true, true_seconds = file_and_seconds(scene.clip, **options)
     parent = scene.clip.branch_parent
     row = {
         "vertices": scene.clip.vertex_count,
@@ -119,7 +109,7 @@ def _parts(scene: Scene, options: dict[str, Any]) -> float:
     plants = np.unique(scene.plant)
     chosen = plants[np.unique(np.linspace(0, len(plants) - 1, PARTS).round().astype(int))]
     still = _still_plants(scene)  # They are few, and unlike plants.
-    sizes = {plant: len(_encoded(scene.part(plant), **options)[0]) for plant in {*chosen.tolist(), *still}}
+    sizes = {plant: len(file_and_seconds(scene.part(plant), **options)[0]) for plant in {*chosen.tolist(), *still}}
     moving = [size for plant, size in sizes.items() if plant not in still]
     rest = sum(sizes[plant] for plant in still)
     return rest + (len(plants) - len(still)) * float(np.mean(moving)) if moving else rest
@@ -132,7 +122,7 @@ def _still_plants(scene: Scene) -> set[int]:
 
 
 def _default_row(scene: Scene, rel_error: float, effort: str) -> dict[str, Any]:
-    data, seconds = _encoded(scene.bare(), rel_error=rel_error, effort=effort)
+    data, seconds = file_and_seconds(scene.bare(), rel_error=rel_error, effort=effort)
     clip = scene.clip
     with athcodec.open(data) as decoder:
         levels = decoder.levels
@@ -153,7 +143,7 @@ def _default_row(scene: Scene, rel_error: float, effort: str) -> dict[str, Any]:
 
 def _turning_row(scene: Scene, turning: int, rel_error: float, effort: str) -> dict[str, Any]:
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
-    standing = len(_encoded(bare(scene.standing), **options)[0])
+    standing = len(file_and_seconds(bare(scene.standing), **options)[0])
     return {
         "standing": standing,
         "turning": turning,
@@ -165,6 +155,8 @@ def _turning_row(scene: Scene, turning: int, rel_error: float, effort: str) -> d
 def _segment_row(scene: Scene, bound: float, effort: str) -> dict[str, Any]:
     options = POSITIONS | {"rel_error": bound, "effort": effort}
     lengths = [length for length in SEGMENTS if length < 2 * scene.clip.frame_count]
-    sizes = {str(length): len(_encoded(scene.bare(), segment_frames=length, **options)[0]) for length in lengths}
-    default = len(_encoded(scene.bare(), **options)[0])
+    sizes = {
+        str(length): len(file_and_seconds(scene.bare(), segment_frames=length, **options)[0]) for length in lengths
+    }
+    default = len(file_and_seconds(scene.bare(), **options)[0])
     return {"bound": bound, **sizes, "default": default, "default / best": default / min(sizes.values())}

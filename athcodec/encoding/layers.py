@@ -63,14 +63,16 @@ from athcodec.errors import BoundError
 # holds. Where there are leaves, corrections take more bytes than finer steps.
 STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.25), (0.8, 0.8)
 FEW_ROOTS = 4  # Up to so many roots a scene counts as one plant.
-MOTION_STEP, SURFACE_MOTION_STEP = 2.0, 1.0  # Largest step of the first layer of more, over the RMS motion.
+MOTION_STEP = 2.0  # Largest step of the first layer of more roots, over the RMS motion of all vertices.
+SURFACE_MOTION_STEP = 1.0  # The same where they have faces or leaves.
 LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
-LARGEST, RMS = MEASURES.index("max"), MEASURES.index("rms")
+LARGEST = MEASURES.index("max")
+RMS = MEASURES.index("rms")
 LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
 FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
 MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.

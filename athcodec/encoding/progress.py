@@ -35,7 +35,8 @@ EIGENVECTOR = 0.0013  # For three frames, each any of a segment, of which a leve
 FINDING = 60  # For a vertex whose branch is sought by motion.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNT, LEARNING = 4, 0.15  # For a vertex, and a vertex in a frame, from which modes are learned.
-LEAST_WORK, WORK = 3e6, 8.0  # An encoding may take so much, and so much more for each vertex in a frame.
+LEAST_WORK = 3e6  # Microseconds that an encoding may take.
+WORK = 8.0  # Microseconds that it may take besides for each vertex in a frame.
 EFFORTS = {"fast": math.inf, "default": 1.0, "best": 8.0}  # Factors on it.
 
 TRIALS = {"fast": 7, "default": 31, "best": 50}  # Trials that a search is expected to take as long as, by effort.

@@ -32,7 +32,8 @@ from athcodec.options import MIN_SEGMENT
 LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
 SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
-NEAREST, NEAR_RATIO = 3, 1.1  # Steps are walked for so many other choices, of at most so many times the least bytes.
+NEAREST = 3  # Steps are walked for so many other choices.
+NEAR_RATIO = 1.1  # Bytes of these, over the least.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.

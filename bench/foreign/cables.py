@@ -16,9 +16,11 @@ from bench.scenes import stems as covers
 from bench.trees.ride import smallest_turns
 from bench.trees.wind import Wind
 
-FRAMES, SIDE_BY_SIDE = 200, 80  # Frames of single plants, and of many beside each other.
+FRAMES = 200  # Frames of a single plant.
+SIDE_BY_SIDE = 80  # Frames of many plants beside each other.
 GROUP = 8  # Rods of one model.
-FPS, STEPS = 30.0, 8  # Steps: of the engine in a frame.
+FPS = 30.0
+STEPS = 8  # Steps of the engine in a frame.
 RADIUS, WIDTH, DENSITY = 0.002, 0.012, 600.0  # Metres, kg/m3. Width: what the wind sees, with leaves.
 
 

@@ -11,8 +11,12 @@ from bench.foreign.tubes import tubes
 from bench.trees.plant import Plant, grow
 from bench.trees.wind import Wind
 
-FRAMES, FPS, STEPS = 80, 30.0, 8  # Steps: of the engine in a frame.
-DENSITY, YOUNG, DAMPING = 700.0, 2e8, 0.03  # kg/m3, N/m2, seconds.
+FRAMES = 80
+FPS = 30.0
+STEPS = 8  # Steps of the engine in a frame.
+DENSITY = 700.0  # kg/m3
+YOUNG = 2e8  # N/m2
+DAMPING = 0.03  # Seconds.
 SIDES, LEAVES, WIDTH = 5, 2, 0.05  # Leaves: on each node that carries foliage. Width: what the wind sees, in metres.
 
 
