@@ -357,7 +357,7 @@ def test_a_bound_mesh_bends_as_the_moved_mesh_does(stem, tmp_path):
     mesh, faces = np.concatenate([tube_points, CARD]), [*quads, len(tube_points) + np.arange(4)]
     with opened(stem) as plant, athcodec.onto(plant, mesh, faces=faces) as moving:
         facts = moving.write_bound(tmp_path / "bound.glb")
-    # Between two bones whose turns differ by a, a skin is thinner by a^2 / 8 of what stands off the stem; most the card.
+    # Between bones whose turns differ by a, a skin is thinner by a^2 / 8 of what stands off the stem; most the card.
     most = CARD[:, 0].max() * (ANGLES[-1] / (NODES - 1)) ** 2 / 8
     assert facts["bones"] == NODES and facts["max_error"] < 2 * most
     document, _ = apart((tmp_path / "bound.glb").read_bytes())
