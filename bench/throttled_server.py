@@ -12,7 +12,7 @@ from urllib.parse import unquote
 import athcodec
 
 WEB = Path(athcodec.__file__).parent / "viewer" / "web"
-TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}
+TYPES = {".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css"}
 
 
 class ThrottledServer(ThreadingHTTPServer):

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from glb import apart
 
 import athcodec
 from athcodec import MotionClip
@@ -349,6 +350,44 @@ def test_a_mesh_without_branches_gets_those_that_move_it(fork):
         clip = moving.clip
         assert clip.branch_parent.tolist() == [-1, 0]
         assert set(clip.vertex_branch[: len(trunk)]) == {0} and set(clip.vertex_branch[len(trunk) :]) == {1}
+
+
+def test_a_bound_mesh_bends_as_the_moved_mesh_does(stem, tmp_path):
+    tube_points, quads = tube(0.0, LENGTH, 0.05, 21)
+    mesh, faces = np.concatenate([tube_points, CARD]), [*quads, len(tube_points) + np.arange(4)]
+    with opened(stem) as plant, athcodec.onto(plant, mesh, faces=faces) as moving:
+        facts = moving.write_bound(tmp_path / "bound.glb")
+    # Between bones whose turns differ by a, a skin is thinner by a^2 / 8 of what stands off the stem; most the card.
+    most = CARD[:, 0].max() * (ANGLES[-1] / (NODES - 1)) ** 2 / 8
+    assert facts["bones"] == NODES and facts["max_error"] < 2 * most
+    document, _ = apart((tmp_path / "bound.glb").read_bytes())
+    names = document["nodes"][document["skins"][0]["skeleton"]]["extras"]["ATH_bones"]
+    assert sorted(names["vertex"]) == list(range(NODES)) and "animations" not in document
+    with athcodec.read(tmp_path / "bound.glb") as still:
+        np.testing.assert_allclose(still.block(0, 1)[0], mesh, atol=1e-6)
+
+
+def test_decode_binds_a_mesh_and_refuses_what_has_no_bones(files, capsys):
+    ath, lod = str(files / "stem.ath"), str(files / "lod.h5")
+    words = ["decode", ath, str(files / "bound.glb"), "--onto", lod, "--bind"]
+    assert main(words) == 0
+    assert f"a mesh on {NODES} bones" in capsys.readouterr().out
+    for options, message in (
+        (["decode", ath, str(files / "out.glb"), "--bind"], "--bind: got no mesh"),
+        (["decode", ath, str(files / "out.h5"), "--onto", lod, "--bind"], "expected a .glb file"),
+        ([*words, "--rig"], "another way to move"),
+    ):
+        assert main(options) == 1
+        assert message in capsys.readouterr().err
+
+
+def test_a_mesh_on_surfaces_is_not_bound(tmp_path):
+    points, quads = tube(0.0, LENGTH, 0.05, 41)
+    data = athcodec.encode(bent_clip(points, faces=quads), rel_error=1e-4, exact_rest=True)
+    with opened(data) as plant, athcodec.onto(plant, points, faces=quads) as moving:
+        with pytest.raises(ClipError, match="surfaces, expected stems"):
+            moving.write_bound(tmp_path / "bound.glb")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.tools

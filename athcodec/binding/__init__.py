@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from athcodec.arrays import Source, clip_of
+from athcodec.binding.bones import bones_of
 from athcodec.binding.chains import Chains
 from athcodec.binding.moving import MovingPoints
 from athcodec.binding.scene import COVERS, FITS, Fit
@@ -30,6 +31,7 @@ from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.indexing import split_index
 from athcodec.errors import ClipError, CoarseWarning
 from athcodec.files.atomic import FileId
+from athcodec.files.plain import FilePath
 from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter
 from athcodec.motion.branches.point_runs import scipy_module
@@ -153,6 +155,7 @@ class OntoMesh(ArrayLike):
         points = MeshPoints(rest, mesh.polygons, mesh.edges)
         self._points, self._binding = points, bind(chains, points, marks)
         offset = rest - points.place[points.of_vertex]
+        self._chains = chains
         self._moving = MovingPoints(chains, self._binding, points.place, points.of_vertex, offset)
         self.clip = self._moved_clip()
 
@@ -204,6 +207,41 @@ class OntoMesh(ArrayLike):
 
     def _block(self, start: int, stop: int) -> np.ndarray:
         return self._moving.move(self._view.block(start, stop)).astype(self.dtype, copy=False)
+
+    def write_bound(self, path: FilePath) -> dict[str, Any]:
+        """Write the mesh as a GLB with a skin whose bones stand in the rest pose, for ATHBones of three.js.
+
+        Bones are the vertices of the plant's stems; ATHBones moves them by positions that are decoded from the .ath
+        file, so that one small file moves any number of meshes.
+
+        Parameters
+        ----------
+        path : str or path-like
+            The GLB to write.
+
+        Returns
+        -------
+        dict
+            "bones", their number; "vertices"; "max_error", the largest distance of a skinned vertex in any frame from
+            where this array has it, in the plant's unit; and "not_written", what GLB has no place for, if anything.
+
+        Raises
+        ------
+        ClipError
+            If branches that move the mesh are surfaces and no rows of points, or there are more than 65,536 bones.
+        OSError
+            If the file cannot be written.
+        """
+        from athcodec.exporters.gltf import write_bound  # Formats take long to import.
+
+        bones = bones_of(self._chains, self._binding, self._points.of_vertex)
+        rest, largest = np.asarray(self.clip.rest, np.float64), 0.0
+        for start, block in self.clip.blocks():
+            pose = self._chains.pose(self._view.block(start, start + len(block)))
+            off = bones.skinned(pose, rest) - block
+            largest = max(largest, float(np.sqrt((off**2).sum(axis=2).max())))
+        facts = {"bones": len(bones.vertex), "vertices": len(rest), "max_error": largest}
+        return facts | write_bound(self.clip, path, bones, facts | {"max_error_of_plant": self._chains.error})
 
     # ---- what is known of it ----
 

@@ -60,6 +60,8 @@ class Chains:
         The branch of each element, in file order.
     first_element : (B + 1,) int64
         The first element of each branch.
+    vertex_of_nodes : (M,) int64
+        The first vertex of each node, in the source's order; a node of a line has one.
     is_line : (B,) bool
         Whether the branch is a row of points; the others are surfaces.
     radius : (M,) float64 or None
@@ -119,6 +121,7 @@ class Chains:
         self._counts = np.diff(np.append(self._starts, len(order)))
         self.node_branch = branch[begins]
         self.rest = self._means(self.vertex_rest[None])[0]
+        self.vertex_of_nodes = self._vertices[self._starts]
         node_of = np.empty(len(order), np.int64)
         node_of[order] = np.cumsum(begins) - 1
         self._node_of_vertex = node_of  # By the vertex' number in file order.

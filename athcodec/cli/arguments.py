@@ -491,6 +491,12 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
             type=_argument(checked),
             help=f"{name.replace('-', ' ')} of that mesh, in place of what it states: {', '.join(choices)}",
         )
+    verb.add_argument(
+        "--bind",
+        action="store_true",
+        help="with --onto, to GLB: write the mesh with bones at rest in place of its motion; in three.js, ATHBones "
+        "moves any number of such meshes by IN.ath",
+    )
     _host_mesh_argument(verb)
     _gltf_motion_argument(
         verb, "of a GLB with several motions (ATH_motion), the one of this name; to a GLB, by default, all"

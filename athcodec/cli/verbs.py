@@ -66,6 +66,7 @@ from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
+    from athcodec.binding import OntoMesh
     from athcodec.encoding.summary import Summary
     from athcodec.exporters import Written
 
@@ -245,10 +246,14 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
 
     check_output(args.output, args.input, args.host_mesh, args.onto, suffix="" if args.format else None)
     if args.onto is None:
-        for name in ("onto_unit", "onto_up_axis", "onto_frame"):
-            if getattr(args, name) is not None:
+        for name in ("onto_unit", "onto_up_axis", "onto_frame", "bind"):
+            if (given := getattr(args, name)) is not None and given is not False:
                 raise ClipError(f"--{name.replace('_', '-')}: got no mesh, expected one with --onto")
-    format_to_write(args.output, args.format)  # An unknown one is refused before there is work.
+    format_name = format_to_write(args.output, args.format).name  # An unknown one is refused before there is work.
+    if args.bind and format_name != "gltf":
+        raise ClipError(f"--bind: got {args.output}, expected a .glb file, which has bones")
+    if args.bind and (args.rig is not None or args.instances or args.animation != "auto"):
+        raise ClipError("--bind: got another way to move the mesh too, expected its bones alone")
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
         names = motions_of(args.input, args) if _goes_back(args) else [args.gltf_motion]
@@ -256,7 +261,7 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         motions = [view_to_decode(decoder, args) for decoder in decoders]
         moving = None if args.onto is None else opened.enter_context(mesh_onto(motions[0], args))
         shown = motions if moving is None else [moving.clip]
-        written = _write_decoded(shown, args)
+        written = _write_decoded(shown, args) if moving is None or not args.bind else _bound(moving, args.output)
         for decoder, motion in zip(decoders, motions):
             if decoder.file.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
@@ -283,6 +288,13 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         if lost := written.facts.get("not_written"):
             say("not written", f"{args.output}: {listed(lost)}")
     return 0
+
+
+def _bound(moving: OntoMesh, path: str) -> Written:
+    from athcodec.exporters import Written
+
+    facts = moving.write_bound(path)
+    return Written((Path(path),), facts | {"animation": f"a mesh on {facts['bones']:,} bones"})
 
 
 def _goes_back(args: argparse.Namespace) -> bool:

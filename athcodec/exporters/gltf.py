@@ -20,7 +20,7 @@ numbers. Keys of animations are held in memory, morph targets are written frame 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import fspath
 from pathlib import Path
 from typing import Any
@@ -153,6 +153,34 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
         glb.write(out)
 
 
+def write_bound(motion: Any, path: FilePath, bones: Any, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Write the rest pose with a skin, whose bones (binding.bones.Bones) stand in it and have no keys; returns what is
+    not written, as `write_clip` does.
+
+    What ATHBones needs to turn them is in the extras of the node above them, as "ATH_bones": for each bone its vertex
+    in the .ath file, and the bones before and after it along its stem; and the bones that are the first of their stems.
+    """
+    meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), Path(fspath(path)).stem)
+    lost = {"left_out": meshes.left_out} if meshes.left_out else {}
+    glb = Glb({"athcodec": {**facts, "animation": "none", **lost}})
+    add_materials(glb, meshes)
+    lists = {name: getattr(bones, name).tolist() for name in ("vertex", "before", "after")}
+    lists["first"] = np.flatnonzero(bones.side).tolist()
+    extras = {"ATH_bones": {**lists, "error": facts["max_error_of_plant"]}}
+    root = glb.node(name="plant", extras=extras, **root_transform(motion))
+    count = len(bones.rest)
+    bind = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
+    bind[:, :3, 3] = -bones.rest
+    still = (bones.rest.astype(np.float32), np.tile(np.float32([0, 0, 0, 1]), (count, 1)), np.ones((count, 3)))
+    names = tuple(f"bone_{number}" for number in range(count))
+    joined = _Joined(motion, Joints(bones.joint, bind, still, still, weights=bones.weight, names=names))
+    joined.add_still(glb, root, meshes.meshes)
+    with new_file(path) as out:
+        glb.write(out)
+    not_written = lost_arrays(motion, set(motion.attributes) - set(meshes.left_out)).get(NOT_WRITTEN, {})
+    return {NOT_WRITTEN: not_written} if not_written else {}
+
+
 def _offset_count(shape: GltfMesh) -> int:
     """Return how many vectors a morph target of a mesh has: one for each position and each normal."""
     return len(shape.source) * (2 if NORMAL in shape.attributes else 1)
@@ -232,6 +260,12 @@ class _Joined:
         moving = takes(self._motion)
         _animate(glb, moving, Movers.all_of(movers), [([], []) for _ in moving])
         return iter(())
+
+    def add_still(self, glb: Glb, root: int, found: Iterable[GltfMesh]) -> None:
+        """Add joints without keys, and meshes that hang on them."""
+        self._add_skin(glb, root, self._joints)
+        for shape in found:
+            self._add_mesh(glb, shape, self._joints)
 
     def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
         nodes: list[int] = []

@@ -1,0 +1,126 @@
+"""A mesh on a plant's chains as bones and weights, which engines skin: what `OntoMesh.write_bound` writes.
+
+A bone is a node of a stem. A point at a place along an element hangs on the bones at both ends by a smooth step: under
+linear blending its place then follows, to first order at both ends, the cubic curve that `Chains.places` follows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from athcodec.binding.chains import Chains, Pose, rotated
+from athcodec.binding.search import Binding
+from athcodec.errors import ClipError
+
+INFLUENCES = 4  # Bones of a vertex, as glTF and engines have them in one set.
+MOST_BONES = 65536
+
+
+@dataclass(frozen=True)
+class Bones:
+    """J bones, parents before their children, and V vertices on them.
+
+    Attributes
+    ----------
+    node : (J,) int64
+        The node of the chains that each bone is.
+    vertex : (J,) int64
+        The vertex of the plant, in the source's order, whose place the bone has.
+    before, after : (J,) int64
+        The bones that come before and after it along its stem, the foot's on the parent's stem; -1 for none.
+    side : (J,) bool
+        Whether the bone is the first of its stem, whose element belongs to it and not to the parent's stem.
+    rest : (J, 3) float64
+        Places in the rest pose.
+    joint : (V, 4) int64
+        The bones of each vertex.
+    weight : (V, 4) float32
+        Their weights, which add up to 1.
+    """
+
+    node: np.ndarray
+    vertex: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    side: np.ndarray
+    rest: np.ndarray
+    joint: np.ndarray
+    weight: np.ndarray
+
+    def skinned(self, pose: Pose, points: np.ndarray) -> np.ndarray:
+        """Return vertices (k, V, 3) that are at `points` (V, 3) in the rest pose, as an engine skins them."""
+        moved = np.zeros((len(pose.centre), *points.shape))
+        for joint, weight in zip(self.joint.T, self.weight.T):
+            node = self.node[joint]
+            off = pose.size[:, node, None] * rotated(pose.turn[:, node], points - self.rest[joint])
+            moved += weight[:, None] * (pose.centre[:, node] + off)
+        return moved
+
+
+def bones_of(chains: Chains, binding: Binding, of_vertex: np.ndarray) -> Bones:
+    """Return the bones that move the vertices of a mesh.
+
+    Parameters
+    ----------
+    chains : Chains
+        The plant, whose branches that move any of the mesh are rows of points.
+    binding : Binding
+        What moves each point of the mesh.
+    of_vertex : (V,) array of integers
+        The point of each vertex.
+
+    Raises
+    ------
+    ClipError
+        If a branch that moves the mesh is a surface, or there are more than MOST_BONES bones.
+    """
+    parent = chains.hierarchy.branch_parent
+    is_used = np.bincount(chains.element_branch[binding.element], minlength=len(parent)) > 0
+    for branch in np.flatnonzero(parent >= 0)[::-1].tolist():  # Parents come before their children.
+        is_used[parent[branch]] |= is_used[branch]
+    surfaces = int((is_used & ~chains.is_line).sum())
+    if surfaces:
+        raise ClipError(
+            f"bones: got {surfaces:,} of {int(is_used.sum()):,} branches that are surfaces, expected stems that are "
+            "rows of points, such as beams or bones; write the moved mesh without --bind"
+        )
+    node = np.flatnonzero(is_used[chains.node_branch])
+    if len(node) > MOST_BONES:
+        raise ClipError(f"bones: got {len(node):,}, expected at most {MOST_BONES:,} vertices of the plant's stems")
+    number = np.full(len(chains.rest) + 1, -1)
+    number[node] = np.arange(len(node))
+    joint, weight = _influences(chains, binding, len(chains.rest))
+    return Bones(
+        node,
+        chains.vertex_of_nodes[node],
+        number[chains.before[node]],
+        number[chains.after[node]],
+        np.append(True, np.diff(chains.node_branch[node]) != 0),
+        chains.rest[node],
+        number[joint][of_vertex],
+        weight[of_vertex],
+    )
+
+
+def _influences(chains: Chains, binding: Binding, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes (P, 4) of each point, the heaviest first, and their weights (P, 4) float32."""
+    rise = binding.share**2 * (3 - 2 * binding.share)
+    point = np.tile(binding.point, 2)
+    node = np.concatenate([chains.start[binding.element], chains.end[binding.element]])
+    weight = np.concatenate([binding.weight * (1 - rise), binding.weight * rise])
+    pairs, of_pair = np.unique(point * count + node, return_inverse=True)
+    total = np.bincount(of_pair.reshape(-1), weight)
+    point, node = np.divmod(pairs, count)
+    order = np.lexsort((-total, point))
+    point, node, total = point[order], node[order], total[order]
+    rank = np.arange(len(point)) - np.searchsorted(point, point)
+    kept = rank < INFLUENCES
+    # What has no weight names the first bone of its vertex, as glTF wants no joint named twice with weight.
+    first = node[rank == 0]
+    joints = np.repeat(first[:, None], INFLUENCES, axis=1)
+    weights = np.zeros(joints.shape)
+    joints[point[kept], rank[kept]], weights[point[kept], rank[kept]] = node[kept], total[kept]
+    joints = np.where(weights > 0, joints, first[:, None])
+    return joints, (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
