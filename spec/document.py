@@ -53,6 +53,11 @@ def table(title: str, first_column: str) -> list[dict[str, str]]:
     return [dict(zip(rows[0], row)) for row in rows[2:]]
 
 
+def limits_of(profile: str) -> dict[str, int]:
+    """The limits of a profile, "full" or "small"."""
+    return {row["Limit"]: int(row[profile.capitalize()]) for row in table("Limits", "Limit")}
+
+
 def reader(code: str):
     form = struct.Struct("<" + code)
     return lambda data, at: form.unpack_from(data, at)[0]
@@ -120,7 +125,7 @@ TAKEN_FOR_GRANTED = {
     "single": single,
     "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
     "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
-    "limit": {row["Limit"]: int(row["Value"]) for row in table("Limits", "Limit")}.__getitem__,
+    "limit": limits_of("full").__getitem__,
     "is_json_object": is_json_object,
     "zstd_frame": zstd_frame,
 }

@@ -63,7 +63,7 @@ _FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits on what a reader accepts; FORMAT.md, "Limits".
+    """Limits on what a reader accepts; FORMAT.md, "Limits". The defaults are those of the full profile.
 
     Attributes
     ----------
@@ -95,6 +95,24 @@ class Limits:
 
     def __post_init__(self) -> None:
         set_numbers(self, wholes=self.__dataclass_fields__)
+
+    @classmethod
+    def small(cls) -> Limits:
+        """Return the limits of the small profile, which telephones and web pages decode."""
+        return cls(
+            chunks=1 << 16,
+            table_bytes=1 << 20,
+            metadata_bytes=1 << 18,
+            vertices=1 << 20,
+            branches=1 << 16,
+            frames=1 << 16,
+            hierarchy_depth=1024,
+            attributes=64,
+            chunk_bytes=32 << 20,
+            decoded_chunk_bytes=32 << 20,
+            memory_bytes=256 << 20,
+            corners=1 << 23,
+        )
 
 
 def _array() -> Any:
