@@ -28,6 +28,8 @@ NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
+FIRST_PRIVATE = 0xC000  # The first kind of chunk that other programs may define.
+PRIVATE_KINDS = "private_kinds"  # Key of metadata: names of the kinds of chunks that other programs define.
 
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, 5, OPTIONAL | 6
