@@ -41,7 +41,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -243,12 +243,9 @@ def profile(name: str) -> Iterator[None]:
 
 def of_profile(vector: Vector, name: str) -> Vector:
     """The vector with the results that a decoder of a profile gives: more files are beyond the limits of a small one."""
-    with profile(name):
-        opened.cache_clear()
-        answers = one_by_one(document)((vector, item) for item in vector.results if not needs_rest(item))
-        items = [item for item in vector.results if not needs_rest(item)]
-        beyond = {item for item, answer in zip(items, answers) if str(answer) == "LIMIT_EXCEEDED"}
-    opened.cache_clear()
+    jobs = [(vector, item) for item in ("open", "static") if item in vector.results]
+    answers = one_by_one({"full": document, "small": small_document}[name])(jobs)
+    beyond = {item for (_, item), answer in zip(jobs, answers) if str(answer) == "LIMIT_EXCEEDED"}
     changed = set(vector.results) if "open" in beyond else beyond
     return replace(vector, results=vector.results | dict.fromkeys(changed, "LIMIT_EXCEEDED"))
 
@@ -330,13 +327,25 @@ def document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
         raise Refused(str(error)) from None
 
 
-def package(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+def small_document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+    """The code of FORMAT.md with the limits of the small profile."""
+    with profile("small"):
+        opened.cache_clear()
+        try:
+            return document(data, item, mesh)
+        finally:
+            opened.cache_clear()
+
+
+def package(data: bytes, item: str, mesh: bytes | None = None, is_small: bool = False) -> bytes:
     """The C core through Python, and the package's reader of static data."""
     import athcodec
+    from athcodec.decoding.container import Limits
     from athcodec.errors import FormatError, LevelUnavailable
 
+    limits = Limits.small() if is_small else None
     try:
-        with athcodec.open(BytesIO(data), strict=item == "strict") as decoder:
+        with athcodec.open(BytesIO(data), strict=item == "strict", limits=limits) as decoder:
             if mesh is not None and needs_rest(item):
                 decoder.file.set_host_mesh(np.frombuffer(mesh, "<f4").reshape(-1, 3))
             return ask_package(decoder, item)
@@ -406,7 +415,7 @@ const positions = (file, level) => {
   return all;
 };
 const answer = ({ path, item, mesh }) => {
-  const file = AthFile.open(new Uint8Array(readFileSync(path)));
+  const file = AthFile.open(new Uint8Array(readFileSync(path)), { profile: jobs.profile });
   if (mesh) file.setHostMesh(new Float32Array(new Uint8Array(readFileSync(mesh)).buffer));
   const array = items[item] ? items[item](file) : positions(file, Number(item));
   const bytes = Buffer.from(array.buffer, array.byteOffset, array.byteLength).toString("base64");
@@ -424,7 +433,7 @@ console.log(JSON.stringify(answers));
 """
 
 
-def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
+def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[bytes | Exception]:
     """The decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
     node = shutil.which("node")
     if node is None:
@@ -434,7 +443,7 @@ def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
         | ({"mesh": str(vector.mesh_path)} if vector.mesh_path and needs_rest(item) else {})
         for vector, item in jobs
     ]
-    request = {"module": DECODER_MODULE.as_uri(), "jobs": asked}
+    request = {"module": DECODER_MODULE.as_uri(), "jobs": asked, "profile": profile}
     done = subprocess.run(
         [node, "--input-type=module", "-e", NODE_SCRIPT],
         input=json.dumps(request),
@@ -461,13 +470,14 @@ def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
 @dataclass(frozen=True)
 class Own:
     decoder: Decoder
+    small: Decoder  # With the limits of the small profile.
     without: tuple[str, ...] = ()
 
 
 OWN = {
-    "c": Own(one_by_one(package)),
-    "wasm": Own(web_assembly, ("strict", "static")),
-    "document": Own(one_by_one(document)),
+    "c": Own(one_by_one(package), one_by_one(partial(package, is_small=True))),
+    "wasm": Own(web_assembly, partial(web_assembly, profile="small"), ("strict", "static")),
+    "document": Own(one_by_one(document), one_by_one(small_document)),
 }
 
 
@@ -498,7 +508,8 @@ def main(words: list[str] | None = None) -> int:
         parser.error("expected a DECODER-COMMAND or --own")
     decoder, without = command(options.command), tuple(options.without)
     if options.own:
-        decoder, without = OWN[options.own].decoder, without + OWN[options.own].without
+        own = OWN[options.own]
+        decoder, without = own.small if options.profile == "small" else own.decoder, without + own.without
     chosen = [vector for vector in vectors() if fnmatch(vector.name, options.only)]
     if options.profile != "full":
         chosen = [of_profile(vector, options.profile) for vector in chosen]
