@@ -1,8 +1,6 @@
 """Header, counts, error table, and files that end early."""
 
-import re
-
-from spec.document import rules, section
+from spec.document import rules
 from spec.make.base import *
 from spec.make.corrections import corrected_lone
 from spec.make.predicted import SINGLE, predicted
@@ -10,10 +8,17 @@ from spec.make.source_rest import bent
 from spec.make.static import attributes, element
 
 
-def documented() -> bytes:
-    """The hex dump in FORMAT.md."""
-    dump = section("Smallest file")
-    return bytes.fromhex("".join(re.findall(r"^ {4}[0-9a-f]{8}  ((?:[0-9a-f]{2} ?)+)", dump, re.M)))
+def traced() -> Plant:
+    """The file of "A file in bytes" and "A level traced" in FORMAT.md."""
+    stem = [Stem(-1, 3)]
+    return Plant(
+        stem,
+        frames=4,
+        rest=exact_rest(stem, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0], False),
+        time=whole_rates(25),
+        scripts={(STEMS, 0): Script(*row(), *row((3, 0, 0), (-1, 0, 0)))},
+        default_head=stems_head(0.25),
+    )
 
 
 def first_bytes(count: int, change: bytes = b"") -> bytes:
@@ -104,7 +109,7 @@ def shown(*levels: int) -> Draft:
     return draft
 
 
-valid("documented: the smallest file, as FORMAT.md has it", documented)
+valid("traced: a stem of three vertices that bends, whose bytes and numbers FORMAT.md has", traced)
 valid("uneven-segments: 7 frames in 3 segments, of 2, 2 and 3", moving, FORK, 25, frames=7, segments=3, heads=HEADS)
 valid("segment-per-frame: as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
 valid("level-0-alone: shortened: level 0 of 3", lambda: fork().upto(0))
