@@ -65,7 +65,7 @@ def front(header, table: list) -> str:
     chunks = ", ".join(f"{name(*chunk)}: {chunk[3]} bytes" for chunk in table)
     errors = "; ".join(", ".join(f"{x:g}" for x in entry) for row in header.errors for entry in row)
     return (
-        f"Front_Stream: {', '.join(facts)}. Stages of the levels: {', '.join(map(str, header.shown))}. Chunks: {chunks}. "
+        f"Front_Stream: {', '.join(facts)}. Stages of the levels: {', '.join(map(str, header.stages))}. Chunks: {chunks}. "
         f"Errors of each level: {errors}. No joins, no repeats."
     )
 
@@ -96,11 +96,11 @@ def said(file, chunk: tuple, content: bytes) -> Iterator[Part]:
 
 def rows(file, level: int, segment: int) -> str:
     """The rows that STEMS of a level adds for the first piece."""
-    plan = rules.shown_plans(file, level)[0]
+    plan = rules.plans_of(file, level)[0]
     motion = rules.decode_motion(file, plan, segment, level)
     piece = plan.pieces[0]
-    modes = range(piece.low_modes) if level == piece.low_level else range(piece.low_modes, len(piece.basis))
-    facts = ["translation: no frequency"] if level == piece.low_level else []
+    modes = range(piece.low_modes) if level == piece.low_stage else range(piece.low_modes, len(piece.basis))
+    facts = ["translation: no frequency"] if level == piece.low_stage else []
     for m in modes:
         row = motion.coefficients[piece.first + m]
         count = rules.row_extent(row)

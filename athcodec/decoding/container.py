@@ -140,7 +140,7 @@ class Header:
     is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
-    stages: tuple[int, ...] = ()  # Of each of the full_level_count levels; (): no stage is left out.
+    stages: tuple[int, ...] = ()  # Stage of each of the full_level_count levels; (): every stage is a level.
     joins: np.ndarray | None = _array()  # (levels, segments) uint8; None: all are 0
     repeats: np.ndarray | None = _array()  # (frames,) bool: like the one before; None: none
 
@@ -167,7 +167,7 @@ class Chunk:
     checksum: int
     offset: int = 0
     index: int = -1
-    stage: int | None = None  # Level in the table, which counts what is not shown too; None: `level`.
+    stage: int | None = None  # Stage in the table, which counts those that are no levels too; None: `level`.
 
     @property
     def is_motion(self) -> bool:

@@ -103,7 +103,7 @@ def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().d
 
 def shown(*levels: int) -> Draft:
     """The fork, of which these levels are shown."""
-    draft = fork().with_header(shown=levels, level_count=len(levels), full_level_count=len(levels))
+    draft = fork().with_header(stages=levels, level_count=len(levels), full_level_count=len(levels))
     for segment in range(2 if 0 not in levels else 0):
         draft = draft.without(AFFINES, 0, segment)
     return draft
@@ -132,7 +132,7 @@ invalid(
 )
 invalid(
     "last-not-shown BAD_HEADER: the last level is not shown",
-    lambda: fork().upto(1).with_header(shown=(0, 1), full_level_count=2),
+    lambda: fork().upto(1).with_header(stages=(0, 1), full_level_count=2),
 )
 invalid("level-32-shown BAD_HEADER: level 32 is shown", lambda: shown(0, 1, 32))
 invalid("empty NOT_AN_ATH_FILE: a file of no bytes", b"")

@@ -382,7 +382,7 @@ typedef struct ath_chunk {
     uint32_t segment;
     uint16_t kind;
     uint8_t level; /* the first level that needs the chunk; ATH_NO_LEVEL: it belongs to no level */
-    uint8_t stage; /* Level in the chunk table; deeper than `level` where some are not shown */
+    uint8_t stage; /* Stage in the chunk table; more than `level` if there are stages that are no levels */
 } ath_chunk;
 
 ATH_API const ath_chunk *ath_chunks(const ath_file *file);
@@ -485,7 +485,7 @@ ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t lev
  * is added if velocities are joined, too. */
 enum { ATH_JOIN_SLOPED = 128 };
 ATH_API const uint8_t *ath_joins(const ath_file *file);
-/* Returns the stage of each of the full_level_count levels: what FORMAT.md numbers as a level, whether shown or not. */
+/* Returns the stage of each of the full_level_count levels: a stage of FORMAT.md. */
 ATH_API const uint8_t *ath_stages(const ath_file *file);
 
 /* Returns frame_count flags: 1 if the frame shows the positions of the frame before. Such frames take no bytes. */
