@@ -24,7 +24,7 @@ to its standard output and exit with 0; or, where the file is to be refused, the
                 derived edges as if they were stored
 
 An item whose level or chunk has not arrived is TRUNCATED. A decoder without static data or strict mode, or with other
-limits than FORMAT.md, is tested with --without. Classes and profiles are those of FORMAT.md, "Conformance" and "Limits".
+limits than FORMAT.md, is tested with --without. FORMAT.md, "Conformance" and "Limits", has the classes and profiles.
 Of an approximate decoder the largest distance is printed, in tolerances; its positions are asked for at the vectors
 real-size-* alone. The exit status is 0 if all results are as expected.
 """
@@ -242,7 +242,7 @@ def profile(name: str) -> Iterator[None]:
 
 
 def of_profile(vector: Vector, name: str) -> Vector:
-    """The vector with the results that a decoder of a profile gives: more files are beyond the limits of a small one."""
+    """The vector with the results that a decoder of a profile gives."""
     jobs = [(vector, item) for item in ("open", "static") if item in vector.results]
     answers = one_by_one({"full": document, "small": small_document}[name])(jobs)
     beyond = {item for (_, item), answer in zip(jobs, answers) if str(answer) == "LIMIT_EXCEEDED"}

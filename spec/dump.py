@@ -65,8 +65,8 @@ def front(header, table: list) -> str:
     chunks = ", ".join(f"{name(*chunk)}: {chunk[3]} bytes" for chunk in table)
     errors = "; ".join(", ".join(f"{x:g}" for x in entry) for row in header.errors for entry in row)
     return (
-        f"Front_Stream: {', '.join(facts)}. Stages of the levels: {', '.join(map(str, header.stages))}. Chunks: {chunks}. "
-        f"Errors of each level: {errors}. No joins, no repeats."
+        f"Front_Stream: {', '.join(facts)}. Stages of the levels: {', '.join(map(str, header.stages))}. "
+        f"Chunks: {chunks}. Errors of each level: {errors}. No joins, no repeats."
     )
 
 

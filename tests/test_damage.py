@@ -258,7 +258,9 @@ def unknown_chunks(path) -> list[tuple[int, int, int, bytes, int]]:
         return [(chunk.kind, chunk.level, chunk.segment, file.stored(chunk), chunk.checksum) for chunk in unknown]
 
 
-@pytest.mark.parametrize("name, going", [("unknown-optional", 1), ("unknown-optional-damaged", 0), ("private-kinds", 0)])
+@pytest.mark.parametrize(
+    "name, going", [("unknown-optional", 1), ("unknown-optional-damaged", 0), ("private-kinds", 0)]
+)
 def test_truncation_keeps_unknown_optional_chunks_but_those_of_levels_that_go(name, going, tmp_path):
     """Bytes and checksums stay as they are, so that what was damaged stays so."""
     source, target = conformance.FOLDER / f"valid/{name}.ath", tmp_path / "cut.ath"

@@ -146,7 +146,7 @@ BEYOND_SMALL = ["valid/depth-4096.ath", "valid/metadata-longest.ath", "invalid/t
 
 
 def test_decoders_of_the_small_profile_refuse_what_is_beyond_it():
-    """And open all that is not: one vector stands for it here, `python -m spec.conformance --profile small` asks all."""
+    """And open what is within it: one vector stands here for all that `--profile small` asks."""
     chosen = [vector for vector in VECTORS if vector.name in BEYOND_SMALL]
     small = [conformance.of_profile(vector, "small") for vector in chosen]
     assert all("LIMIT_EXCEEDED" in vector.results.values() for vector in small)

@@ -164,8 +164,7 @@ header("feature-first UNSUPPORTED_FEATURE: the lowest bit of Features is set", f
 header("feature-last UNSUPPORTED_FEATURE: the highest bit of Features is set", features=1 << 15)
 header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=254, features=1)
 invalid(
-    "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature",
-    lambda: first_bytes(12, b"\0\1"),
+    "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature", lambda: first_bytes(12, b"\0\1")
 )
 header("vertices-limit LIMIT_EXCEEDED: Vertex_Count 2^26 + 1", place_count=(1 << 26) + 1)
 header("branches-limit LIMIT_EXCEEDED: Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1)

@@ -58,10 +58,7 @@ valid(
         Entry(0xE0A1, FUTURE),
     ),
 )
-table(
-    "private-required UNKNOWN_CHUNK: a private kind without Is_Optional",
-    lambda: fork().add(Entry(0x4000, FUTURE)),
-)
+table("private-required UNKNOWN_CHUNK: a private kind without Is_Optional", lambda: fork().add(Entry(0x4000, FUTURE)))
 valid(
     "unknown-optional-damaged: what is skipped is not read: its Checksum does not fit",
     lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)),

@@ -40,7 +40,7 @@ void ath_default_limits(ath_limits *limits)
 
 void ath_small_limits(ath_limits *limits)
 {
-    static const ath_limits small = {1u << 16, 1u << 20,  1u << 20, 1u << 16,          1u << 16,
+    static const ath_limits small = {1u << 16, 1u << 20,  1u << 20, 1u << 16,           1u << 16,
                                      1024,     32u << 20, 0,        (uint64_t)256 << 20};
     *limits = small;
 }
