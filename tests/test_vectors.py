@@ -179,6 +179,14 @@ def test_an_approximate_decoder_passes_within_the_tolerance_and_not_beyond_it(of
     assert test.largest == pytest.approx(off, rel=0.05)
 
 
+@pytest.mark.web
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_form_for_a_gpu_is_an_approximate_decoder():
+    own, test = conformance.OWN_APPROXIMATE["gpu"], conformance.Approximately()
+    chosen = [vector for vector in VECTORS if fnmatch(vector.name, conformance.APPROXIMATE)]
+    assert list(test.failures(own.decoder, chosen, own.without)) == [] and 0.0 < test.largest < 1.0
+
+
 def test_the_document_decodes_the_smallest_vectors():
     own, smallest = conformance.OWN["document"], sorted(VECTORS, key=lambda vector: vector.path.stat().st_size)[:200]
     assert list(conformance.failures(own.decoder, smallest, own.without)) == []
