@@ -137,6 +137,7 @@ _PLAYING = {  # Functions of core/include/ath.h.
     "ath_fault_text": (c_size_t, [c_void_p, c_char_p, c_size_t]),
     "ath_level_name": (c_size_t, [c_void_p, c_int32, c_char_p, c_size_t]),
     "ath_default_limits": (None, [c_void_p]),
+    "ath_small_limits": (None, [c_void_p]),
     "ath_front": (c_int, [c_void_p, c_size_t, c_void_p, c_void_p, c_void_p, c_void_p]),
     "ath_open": (c_int, [c_void_p, c_size_t, c_void_p, c_size_t, c_void_p, c_void_p]),
     "ath_set_host_mesh": (c_int, [c_void_p, c_void_p, c_size_t, c_int32, c_void_p]),

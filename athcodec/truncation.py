@@ -26,8 +26,8 @@ def truncate(
 ) -> int:
     """Write the first levels of an .ath file as a complete file, whose error bound is that of the last of them.
 
-    Static data is kept, and so is the rest pose of the source, unless the source is cut off before it. Nothing is
-    decoded. One of `level`, `max_error` and `target_size` is given.
+    Static data is kept, and so are the rest pose of the source, unless the source is cut off before it, and what other
+    programs added in optional chunks. Nothing is decoded. One of `level`, `max_error` and `target_size` is given.
 
     Parameters
     ----------
@@ -97,17 +97,20 @@ def truncate(
 
             if not isinstance(file.source, GltfMotion):
                 raise ClipError(f"{target}: got an .ath file to cut, expected a GLB with a motion to write another one")
-            return put_motion(source, b"".join([front, *map(file.payload, chunks)]), target, file.source.number)
+            return put_motion(source, b"".join([front, *map(file.stored, chunks)]), target, file.source.number)
         with new_file(target) as out:
             out.write(front)
             for chunk in chunks:
-                out.write(file.payload(chunk))
+                out.write(file.stored(chunk))
             return out.tell()
 
 
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
-    """Return the front of the file that ends with a level, and the chunks behind it."""
-    chunks = [chunk for chunk in file.chunks if not chunk.is_motion or chunk.level <= level]
+    """Return the front of the file that ends with a level, and the chunks behind it.
+
+    Chunks of unknown kinds are kept as FORMAT.md, "Rewriting", says of a file that is cut off behind a level.
+    """
+    chunks = [chunk for chunk in file.all_chunks if not chunk.is_motion or chunk.level <= level]
     if file.rest_is_missing:
         chunks = [chunk for chunk in chunks if chunk.kind != ct.SOURCE_REST]
     whole = level + 1 == file.full_level_count

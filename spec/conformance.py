@@ -2,6 +2,9 @@
 
     python -m spec.conformance DECODER-COMMAND...          any program
     python -m spec.conformance --own c|wasm|document       those of this repository
+    python -m spec.conformance --own gpu                   likewise, of the approximate class
+    python -m spec.conformance --approximate ...           decoders of the approximate class
+    python -m spec.conformance --profile small ...         decoders of the small profile
 
 A program is called as `DECODER-COMMAND... FILE ITEM` for every item of every vector, and with one argument more,
 `MESH`, where a file of the vector's name ends in .mesh: the positions of the host's mesh, binary32, little-endian, in
@@ -22,7 +25,9 @@ to its standard output and exit with 0; or, where the file is to be refused, the
                 derived edges as if they were stored
 
 An item whose level or chunk has not arrived is TRUNCATED. A decoder without static data or strict mode, or with other
-limits than FORMAT.md, is tested with --without. The exit status is 0 if all results are as expected.
+limits than FORMAT.md, is tested with --without. FORMAT.md, "Conformance" and "Limits", has the classes and profiles.
+Of an approximate decoder the largest distance is printed, in tolerances; its positions are asked for at the vectors
+real-size-* alone. The exit status is 0 if all results are as expected.
 """
 
 from __future__ import annotations
@@ -34,16 +39,17 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
-from functools import lru_cache
+from functools import lru_cache, partial
 from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from spec.document import File, clip_entry, crc32c, rules
+from spec.document import File, clip_entry, crc32c, limits_of, rules
 
 FOLDER = Path(__file__).resolve().parent / "vectors"
 DECODER_MODULE = Path(__file__).resolve().parent.parent / "athcodec" / "viewer" / "ath_decoder.mjs"
@@ -53,6 +59,8 @@ ERRORS = tuple(
 )
 NO_ANSWER = ("strict", "open")
 SECONDS = 120
+PROFILES = ("full", "small")
+APPROXIMATE = "valid/real-size-*"  # Vectors whose positions an approximate decoder is asked for.
 LISTING = """\
 Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, ITEM=RESULT for each item, then # and the
 reason. RESULT is ok, the name of an error, or the CRC-32C (FORMAT.md, "Checksums") of these bytes, little-endian,
@@ -153,8 +161,14 @@ def with_quiet_nans(answer: bytes, kind: str) -> bytes:
 
 def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
     """A line for each item whose result differs from expected.txt."""
+    jobs = asked(chosen, without)
+    for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
+        yield from complaint(vector, item, result_of(vector.path.read_bytes(), item, answer))
+
+
+def asked(chosen: list[Vector], without: Iterable[str] = ()) -> list[tuple[Vector, str]]:
     left_out = set(without)
-    jobs = [
+    return [
         (vector, item)
         for vector in chosen
         for item, result in vector.results.items()
@@ -162,10 +176,79 @@ def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()
         and not ("levels" in left_out and item.isdecimal())
         and not ("limits" in left_out and result == "LIMIT_EXCEEDED")
     ]
-    for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
-        expected, got = vector.results[item], result_of(vector.path.read_bytes(), item, answer)
-        if got != expected:
-            yield f"{vector.name}, {item}: got {got}; expected {expected}: {vector.reason}"
+
+
+def complaint(vector: Vector, item: str, got: str) -> Iterator[str]:
+    expected = vector.results[item]
+    if got != expected:
+        yield f"{vector.name}, {item}: got {got}; expected {expected}: {vector.reason}"
+
+
+class Approximately:
+    """Tests a decoder of the approximate class; `largest` is the largest distance so far, in tolerances."""
+
+    def __init__(self) -> None:
+        self.largest = 0.0
+
+    def failures(self, decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
+        """A line for each item whose result is not what it should be, positions within their tolerance."""
+        jobs = [job for job in asked(chosen, without) if not is_position(*job) or is_measured(*job)]
+        for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
+            if not is_position(vector, item) or isinstance(answer, Exception):
+                yield from complaint(vector, item, result_of(vector.path.read_bytes(), item, answer))
+                continue
+            got = self.tolerances(vector, int(item), answer)
+            self.largest = max(self.largest, got)
+            if not got <= 1.0:
+                yield f"{vector.name}, {item}: got positions {got:.3g} tolerances from those of an exact decoder"
+
+    def tolerances(self, vector: Vector, level: int, answer: bytes) -> float:
+        """How far the furthest vertex of an answer is from where it should be."""
+        data = vector.path.read_bytes()
+        kind = positions_type(data)
+        exact, deepest = (np.frombuffer(package(data, str(at), vector.mesh), kind) for at in (level, last_level(data)))
+        if len(answer) != exact.nbytes:
+            return np.inf
+        distances = np.linalg.norm((np.frombuffer(answer, kind).astype(float) - exact).reshape(-1, 3), axis=1)
+        return float(distances.max() / tolerance(deepest.reshape(-1, 3), rules.read_front(data)[0].max_error))
+
+
+def is_position(vector: Vector, item: str) -> bool:
+    """Whether the expected answer to an item is positions or a rest pose."""
+    return needs_rest(item) and vector.results[item] not in ERRORS
+
+
+def is_measured(vector: Vector, item: str) -> bool:
+    return item.isdecimal() and fnmatch(vector.name, APPROXIMATE)
+
+
+def last_level(data: bytes) -> int:
+    return rules.read_front(data)[0].level_count - 1
+
+
+def tolerance(deepest: np.ndarray, max_error: float) -> float:
+    """How far positions may be off that are given with Origin added; deepest: those of the deepest level, (V, 3)."""
+    diagonal = float(np.linalg.norm(np.ptp(deepest.astype(float), axis=0)))
+    return max(max_error / 16, diagonal * 2.0**-18, float(np.abs(deepest).max()) * 2.0**-22)
+
+
+@contextmanager
+def profile(name: str) -> Iterator[None]:
+    """The code of FORMAT.md with the limits of a profile."""
+    kept, rules.limit = rules.limit, limits_of(name).__getitem__
+    try:
+        yield
+    finally:
+        rules.limit = kept
+
+
+def of_profile(vector: Vector, name: str) -> Vector:
+    """The vector with the results that a decoder of a profile gives."""
+    jobs = [(vector, item) for item in ("open", "static") if item in vector.results]
+    answers = one_by_one({"full": document, "small": small_document}[name])(jobs)
+    beyond = {item for (_, item), answer in zip(jobs, answers) if str(answer) == "LIMIT_EXCEEDED"}
+    changed = set(vector.results) if "open" in beyond else beyond
+    return replace(vector, results=vector.results | dict.fromkeys(changed, "LIMIT_EXCEEDED"))
 
 
 def result_of(data: bytes, item: str, answer: bytes | Exception) -> str:
@@ -245,13 +328,25 @@ def document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
         raise Refused(str(error)) from None
 
 
-def package(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+def small_document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+    """The code of FORMAT.md with the limits of the small profile."""
+    with profile("small"):
+        opened.cache_clear()
+        try:
+            return document(data, item, mesh)
+        finally:
+            opened.cache_clear()
+
+
+def package(data: bytes, item: str, mesh: bytes | None = None, is_small: bool = False) -> bytes:
     """The C core through Python, and the package's reader of static data."""
     import athcodec
+    from athcodec.decoding.container import Limits
     from athcodec.errors import FormatError, LevelUnavailable
 
+    limits = Limits.small() if is_small else None
     try:
-        with athcodec.open(BytesIO(data), strict=item == "strict") as decoder:
+        with athcodec.open(BytesIO(data), strict=item == "strict", limits=limits) as decoder:
             if mesh is not None and needs_rest(item):
                 decoder.file.set_host_mesh(np.frombuffer(mesh, "<f4").reshape(-1, 3))
             return ask_package(decoder, item)
@@ -321,7 +416,7 @@ const positions = (file, level) => {
   return all;
 };
 const answer = ({ path, item, mesh }) => {
-  const file = AthFile.open(new Uint8Array(readFileSync(path)));
+  const file = AthFile.open(new Uint8Array(readFileSync(path)), { profile: jobs.profile });
   if (mesh) file.setHostMesh(new Float32Array(new Uint8Array(readFileSync(mesh)).buffer));
   const array = items[item] ? items[item](file) : positions(file, Number(item));
   const bytes = Buffer.from(array.buffer, array.byteOffset, array.byteLength).toString("base64");
@@ -339,7 +434,7 @@ console.log(JSON.stringify(answers));
 """
 
 
-def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
+def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[bytes | Exception]:
     """The decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
     node = shutil.which("node")
     if node is None:
@@ -349,7 +444,7 @@ def web_assembly(jobs: list[tuple[Vector, str]]) -> list[bytes | Exception]:
         | ({"mesh": str(vector.mesh_path)} if vector.mesh_path and needs_rest(item) else {})
         for vector, item in jobs
     ]
-    request = {"module": DECODER_MODULE.as_uri(), "jobs": asked}
+    request = {"module": DECODER_MODULE.as_uri(), "jobs": asked, "profile": profile}
     done = subprocess.run(
         [node, "--input-type=module", "-e", NODE_SCRIPT],
         input=json.dumps(request),
@@ -373,17 +468,36 @@ def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
     return Refused(answer["error"])
 
 
+def gpu_form(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
+    """The passes of docs/gpu.md in float32, whose positions Origin is added to; all else is the package's answer."""
+    from athcodec.gpu import GpuFile
+    from athcodec.gpu.evaluate import Passes, Source
+
+    if not item.isdecimal():
+        return package(data, item, mesh)
+    gpu, blocks = GpuFile(data, None if mesh is None else np.frombuffer(mesh, "<f4").reshape(-1, 3)), []
+    info, level = gpu.core.info, int(item)
+    starts = gpu.core.segment_starts(range(info.segment_count + 1))
+    for segment in range(info.segment_count):
+        coded = np.array([gpu.coded_frame(frame) for frame in range(starts[segment], starts[segment + 1])])
+        blocks.append(Passes(gpu.level(level), Source(gpu.segment(segment, level), coded)).vertices())
+    positions = np.concatenate(blocks).astype(float)[:, gpu.core.vertex_places()] + np.array(info.origin)
+    return positions.astype(positions_type(data)).tobytes()
+
+
 @dataclass(frozen=True)
 class Own:
     decoder: Decoder
+    small: Decoder  # With the limits of the small profile.
     without: tuple[str, ...] = ()
 
 
 OWN = {
-    "c": Own(one_by_one(package)),
-    "wasm": Own(web_assembly, ("strict", "static")),
-    "document": Own(one_by_one(document)),
+    "c": Own(one_by_one(package), one_by_one(partial(package, is_small=True))),
+    "wasm": Own(web_assembly, partial(web_assembly, profile="small"), ("strict", "static")),
+    "document": Own(one_by_one(document), one_by_one(small_document)),
 }
+OWN_APPROXIMATE = {"gpu": Own(one_by_one(gpu_form), one_by_one(gpu_form), ("static",))}
 
 
 # ---- command -----------------------------------------------------------------------------------------------
@@ -395,7 +509,9 @@ def main(words: list[str] | None = None) -> int:
         description="Tests a decoder of .ath files against the vectors of spec/vectors.",
         epilog="spec/conformance.py describes how DECODER-COMMAND is called.",
     )
-    parser.add_argument("--own", choices=OWN, help="a decoder of this repository")
+    parser.add_argument("--own", choices=OWN | OWN_APPROXIMATE, help="a decoder of this repository")
+    parser.add_argument("--approximate", action="store_true", help="a decoder of the approximate class")
+    parser.add_argument("--profile", choices=PROFILES, default="full", help="that of the decoder (default: full)")
     parser.add_argument("--only", metavar="GLOB", default="*", help="vectors whose name matches")
     parser.add_argument(
         "--without",
@@ -411,13 +527,19 @@ def main(words: list[str] | None = None) -> int:
         parser.error("expected a DECODER-COMMAND or --own")
     decoder, without = command(options.command), tuple(options.without)
     if options.own:
-        decoder, without = OWN[options.own].decoder, without + OWN[options.own].without
+        own = (OWN | OWN_APPROXIMATE)[options.own]
+        decoder, without = own.small if options.profile == "small" else own.decoder, without + own.without
     chosen = [vector for vector in vectors() if fnmatch(vector.name, options.only)]
-    failed = 0
-    for line in failures(decoder, chosen, without):
+    if options.profile != "full":
+        chosen = [of_profile(vector, options.profile) for vector in chosen]
+    approximately, failed = Approximately(), 0
+    is_approximate = options.approximate or options.own in OWN_APPROXIMATE
+    for line in (approximately.failures if is_approximate else failures)(decoder, chosen, without):
         print(line)
         failed += 1
     print(f"{len(chosen)} vectors, {failed} wrong" + (f", without {', '.join(without)}" if without else ""))
+    if is_approximate:
+        print(f"the furthest vertex is {approximately.largest:.3g} tolerances off")
     return 1 if failed or not chosen else 0
 
 

@@ -53,6 +53,11 @@ def table(title: str, first_column: str) -> list[dict[str, str]]:
     return [dict(zip(rows[0], row)) for row in rows[2:]]
 
 
+def limits_of(profile: str) -> dict[str, int]:
+    """The limits of a profile, "full" or "small"."""
+    return {row["Limit"]: int(row[profile.capitalize()]) for row in table("Limits", "Limit")}
+
+
 def reader(code: str):
     form = struct.Struct("<" + code)
     return lambda data, at: form.unpack_from(data, at)[0]
@@ -120,7 +125,7 @@ TAKEN_FOR_GRANTED = {
     "single": single,
     "to_bits": lambda x, n: int.from_bytes(struct.pack(FLOATS[n], x), "little"),
     "from_bits": lambda b, n: struct.unpack(FLOATS[n], b.to_bytes(n // 8, "little"))[0],
-    "limit": {row["Limit"]: int(row["Value"]) for row in table("Limits", "Limit")}.__getitem__,
+    "limit": limits_of("full").__getitem__,
     "is_json_object": is_json_object,
     "zstd_frame": zstd_frame,
 }
@@ -195,7 +200,7 @@ class File:
     def deepest(self) -> int:
         """The deepest complete level."""
         late = [key[1] for key, chunk in self.chunks.items() if key[1] is not None and not chunk.is_there]
-        levels = self.header.shown[: self.header.level_count]
+        levels = self.header.stages[: self.header.level_count]
         deepest = sum(level < min(late, default=32) for level in levels) - 1
         self.rules.require(deepest >= 0, "TRUNCATED")
         return deepest
@@ -215,8 +220,8 @@ class File:
         if file.is_host:
             points = np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
             return points[file.vertex_source][file.vertex_of]
-        level = self.header.shown[level]
-        plans = rules.shown_plans(file, min(level, file.lossy - 1))
+        level = self.header.stages[level]
+        plans = rules.plans_of(file, min(level, file.lossy_stages - 1))
         method = self.content(rules.REST)[0]
         if (rules.SOURCE_REST, None, 0) in self.chunks:
             points, is_exact = rules.source_rest(file, plans), self.content(rules.SOURCE_REST)[0] == 1

@@ -301,10 +301,10 @@ class FrontScript:
             int(counts["is_predicted"]),
             *_bits(rules.to_bits(counts["max_error"], 64), 63),
         ]
-        shown, count = [-1, *counts.get("shown", ())], min(counts["full_level_count"], 32)
-        shown += range(shown[-1] + 1, shown[-1] + 1 + count)  # Where none are given, none is left out.
-        for before, level in pairwise(shown[: count + 1]):
-            self.values += [1] * (level - before - 1) + [0]
+        stages, count = [-1, *counts.get("stages", ())], min(counts["full_level_count"], 32)
+        stages += range(stages[-1] + 1, stages[-1] + 1 + count)  # Where none are given, none is left out.
+        for before, stage in pairwise(stages[: count + 1]):
+            self.values += [1] * (stage - before - 1) + [0]
         self.bits, self.before, self.was_motion, self.place = [8] * (rules.OTHER + 1), rules.OTHER, False, (0, 0)
 
     def add_chunk(self, entry: Entry) -> None:

@@ -82,7 +82,7 @@ def draft_of(data: bytes) -> Draft:
     """The file with a front that can have any values."""
     parts = Parts.of(data)
     entries = tuple(Entry(chunk.kind, payload, chunk.stage, chunk.segment) for chunk, payload in parts.chunks)
-    counts = {name: getattr(parts.header, name) for name in COUNTS} | {"shown": parts.header.stages}
+    counts = {name: getattr(parts.header, name) for name in COUNTS} | {"stages": parts.header.stages}
     joins = tuple(Join(join % 128, join >= 128) for join in parts.header.joins.ravel().tolist())
     repeats = tuple(parts.header.repeats.astype(int).tolist())
     return Draft(counts, entries, tuple(ct.short_floats(parts.errors).ravel().tolist()), joins, repeats)

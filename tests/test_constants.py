@@ -45,12 +45,6 @@ def js_constants(path: str) -> dict[str, int]:
     return {name: int(value, 0) for line in lines for name, value in re.findall(r"([A-Z_]+) = (\w+)", line)}
 
 
-def default_limits() -> core_file.Limits:
-    limits = core_file.Limits()
-    lib.ath_default_limits(byref(limits))
-    return limits
-
-
 def test_the_version_of_the_format_is_the_same_everywhere():
     version = C["FORMAT_MAJOR"], C["FORMAT_MINOR"]
     assert version == (container.MAJOR, container.MINOR)
@@ -79,12 +73,20 @@ def test_levels_layers_and_errors_are_the_same_everywhere():
 
 
 def test_limits_are_the_same_everywhere():
-    rows = re.findall(r"^\| Max_(\w+) \| (\d+) \|", FORMAT, flags=re.M)
-    assert {name.lower(): int(value) for name, value in rows} == vars(container.Limits())
-    limits = default_limits()
-    for name, _ in core_file.Limits._fields_:
-        if name != "reserved":
-            assert getattr(limits, name) == getattr(container.Limits, name)
+    rows = re.findall(r"^\| Max_(\w+) \| (\d+) \| (\d+) \|", FORMAT, flags=re.M)
+    full, small = ({name.lower(): int(limits[i]) for name, *limits in rows} for i in range(2))
+    assert full == vars(container.Limits()) and small == vars(container.Limits.small())
+    for start, limits in ((lib.ath_default_limits, full), (lib.ath_small_limits, small)):
+        of_core = core_file.Limits()
+        start(byref(of_core))
+        assert {name: getattr(of_core, name) for name, _ in of_core._fields_ if name != "reserved"}.items() <= (
+            limits.items()
+        )
+
+
+def test_what_is_within_the_small_profile_is_within_the_full_one():
+    full, small = vars(container.Limits()), vars(container.Limits.small())
+    assert all(small[name] <= full[name] for name in full) and small != full
 
 
 @pytest.mark.parametrize("vertices, frames", [(1, 1), (7, 256), (8000, 33)])

@@ -251,15 +251,32 @@ def unknown(kind: int, data: bytes = b"from the future") -> tuple[ct.Chunk, byte
     return ct.Chunk(kind, ct.NO_LEVEL, 0, len(data), 0), data
 
 
-def test_a_file_with_unknown_optional_chunks_can_be_truncated(parts, played, tmp_path):
-    place = parts.index(ct.AFFINES)
-    (tmp_path / "new.ath").write_bytes(
-        parts.with_chunks(parts.chunks[:place] + [unknown(0x8009)] + parts.chunks[place:] + [unknown(0x8064)])
-    )
-    athcodec.truncate(tmp_path / "new.ath", tmp_path / "cut.ath", 1)
-    with athcodec.open(tmp_path / "cut.ath", strict=True) as decoder:
-        decoder.file.check()
-        assert np.array_equal(decoder.positions(), played[1])
+def unknown_chunks(path) -> list[tuple[int, int, int, bytes, int]]:
+    with athcodec.open(path, strict=True) as decoder:
+        file = decoder.file
+        unknown = [chunk for chunk in file.all_chunks if chunk.kind not in ct.KIND_NAMES]
+        return [(chunk.kind, chunk.level, chunk.segment, file.stored(chunk), chunk.checksum) for chunk in unknown]
+
+
+@pytest.mark.parametrize(
+    "name, going", [("unknown-optional", 1), ("unknown-optional-damaged", 0), ("private-kinds", 0)]
+)
+def test_truncation_keeps_unknown_optional_chunks_but_those_of_levels_that_go(name, going, tmp_path):
+    """Bytes and checksums stay as they are, so that what was damaged stays so."""
+    source, target = conformance.FOLDER / f"valid/{name}.ath", tmp_path / "cut.ath"
+    athcodec.truncate(source, target, 1)
+    before, after = unknown_chunks(source), unknown_chunks(target)
+    assert after == [chunk for chunk in before if chunk[1] != 2] and len(before) - len(after) == going
+    with athcodec.open(source) as whole, athcodec.open(target) as cut:
+        assert np.array_equal(cut.positions(), whole.positions(level=1))
+
+
+def test_private_chunks_are_found_by_the_name_that_metadata_gives_their_kind():
+    data = (conformance.FOLDER / "valid/private-kinds.ath").read_bytes()
+    with opened(data) as decoder:
+        assert decoder.file.private_chunks("org.example.leaf_age") == [b"from the future", b""]
+        assert decoder.file.private_chunks("org.example.licence") == [b"from the future"]
+        assert decoder.file.private_chunks("org.example.bark") == []
 
 
 def test_a_chunk_that_must_be_there_is_missed_by_name(fine_parts):

@@ -149,7 +149,10 @@ MISTAKES = {  # By a vector that tells it: what the document says, and what a de
     "gaps": ("gaps.append(64 if quarters >= 64.0", "gaps.append(65 if quarters >= 64.0"),
     "rigid-diagonal": ("norm2 * 1e-30:\n            continue", "norm2 * 1e-30:\n            pass"),
     "sheet-mode-below": ("if after > before * keep:", "if True:"),
-    "tangent-short-above": ("\n    if not squared(tangent) > 1e-200:", "\n    if not squared(tangent) > 1.0625e-200:"),
+    "tangent-short-above": (
+        "\n    if not squared(tangent) > LEAST_SQUARE:",
+        "\n    if not squared(tangent) > 1.0625e-200:",
+    ),
     "smallest": ("if self.range < (1 << 32):", "if self.range < (1 << 31):"),
 }
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import re
 import struct
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -20,7 +21,6 @@ import numpy as np
 import pytest
 import test_document
 from files import Parts, exact_rest_chunk, opened, roots, still_file
-from plants import clip_of
 from test_document import assert_same_bits
 
 import athcodec
@@ -28,7 +28,8 @@ from athcodec import errors
 from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding import streams, writing
-from spec.document import TEXT, rules, section, table
+from spec.document import TEXT, File, rules, section, table
+from spec.dump import lines as dump_lines
 from spec.scripted import Script, write
 
 FORMAT = Path(__file__).resolve().parents[1] / "FORMAT.md"
@@ -103,20 +104,69 @@ def test_every_error_that_the_code_names_exists():
     assert used <= names and {"TRUNCATED", "BAD_HEADER", "BAD_CHUNK_TABLE", "LIMIT_EXCEEDED"} <= used
 
 
+@pytest.mark.parametrize(
+    "own, known, unknown",
+    [((0, 14), [(0, 14)], [(0, 13), (0, 15), (1, 0)]), ((1, 0), [(1, 0), (1, 7), (1, 255)], [(0, 14), (2, 0), (2, 7)])],
+)
+def test_a_decoder_before_1_0_takes_its_own_version_and_one_of_1_x_every_minor_version(spec, own, known, unknown):
+    rule = type(spec.is_known_version)(spec.is_known_version.__code__, {"VERSION": own})
+    assert all(rule(*version) for version in known) and not any(rule(*version) for version in unknown)
+
+
 def test_checksum_has_the_check_value_of_the_document(spec):
     text = " ".join(section("Checksums").split())
     value = int(re.search(r'bytes "123456789" is (0x[0-9A-F]{8})', text)[1], 16)
     assert crc32c(b"123456789") == spec.crc32c(b"123456789") == value == 0xE3069283
 
 
-def test_smallest_file_is_what_the_encoder_writes(spec, tmp_path):
-    clip = clip_of([[[1, 2, 3]]], [[1, 2, 3]], [0], [-1])
-    athcodec.encode(clip, tmp_path / "smallest.ath", max_error=2**-7, attributes="none")
-    data = dump(section("Smallest file"))
-    assert (tmp_path / "smallest.ath").read_bytes() == data
+def test_the_dump_is_that_of_a_vector_as_the_command_prints_it(spec):
+    data, text = (VALID / "traced.ath").read_bytes(), section("A file in bytes")
+    assert dump(text) == data
+    assert "\n".join(dump_lines(data)) in text
     assert_same_bits(data)
     with athcodec.open(io.BytesIO(data), strict=True) as decoder:
-        assert decoder.positions().tolist() == [[[1.0, 2.0, 3.0]]]
+        rows = {row["Quantity"]: row["Numbers"] for row in table("A level traced", "Quantity")}
+        assert decoder.positions()[0, 2].tolist() == [float(x) for x in rows["as put out"].split(", ")]
+
+
+def sections_of_the_first_decoder() -> set[str]:
+    rows = table("A way for a first decoder", "Step")
+    return {name for row in rows for name in re.findall(r"\[(.+?)\]\(#", row["Sections"])}
+
+
+def test_the_way_for_a_first_decoder_has_all_that_its_vectors_need():
+    """No function outside of the sections that it names is called for a vector that it names."""
+    headings = [(i, line.lstrip("# ")) for i, line in enumerate(text_without_code().splitlines(), 1) if line[:1] == "#"]
+    names = {name for row in table("A way for a first decoder", "Step") for name in re.findall(r"(\S+)\.ath", str(row))}
+    called: set[int] = set()
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code.co_filename == str(FORMAT):
+            called.add(frame.f_code.co_firstlineno)
+
+    for name in sorted(name.strip("`") for name in names):
+        data = (VALID / f"{name}.ath").read_bytes()
+        sys.setprofile(note)
+        try:
+            file = File(data)
+            file.positions(file.header.level_count - 1)
+        finally:
+            sys.setprofile(None)
+    used = {[title for at, title in headings if at <= line][-1] for line in called}
+    assert len(names) > 6 and len(called) > 100 and used - sections_of_the_first_decoder() == set()
+
+
+def test_every_section_stands_on_the_way_for_a_first_decoder_or_beside_the_feature_that_needs_it():
+    named = set(re.findall(r"\[([^\]]+)\]\(#", section("A way for a first decoder")))
+    with_code = set()
+    for title, text in re.findall(r"^#+ (.+)\n((?:(?!#+ ).*\n)*?(?=^#+ |\Z))", text_without_code(), re.M):
+        with_code |= {title} if "CODE" in text else set()
+    assert len(with_code) > 30 and with_code - named == set()
+
+
+def text_without_code() -> str:
+    """FORMAT.md with as many lines, those of code replaced."""
+    return re.sub(r"^```python\n.*?^```", lambda code: "CODE\n" * code[0].count("\n") + "CODE", TEXT, flags=re.M | re.S)
 
 
 # ---- the pseudo-code ----

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import re
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
+import numpy as np
 import pytest
 from programs import printed
 
@@ -14,6 +16,7 @@ from athcodec import errors
 from athcodec.decoding import container
 from athcodec.decoding.ath_file import AthFile
 from spec import conformance, document, real_size
+from spec.document import rules
 
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = conformance.vectors()
@@ -137,6 +140,51 @@ def test_own_decoders_answer_as_expected(name):
     if name == "wasm" and conformance.shutil.which("node") is None:
         pytest.fail("node: got none on PATH, expected Node.js 18 or newer to test the WebAssembly decoder in")
     assert list(conformance.failures(own.decoder, VECTORS, own.without)) == []
+
+
+BEYOND_SMALL = ["valid/depth-4096.ath", "valid/metadata-longest.ath", "invalid/table-longest-chunk.ath"]
+
+
+def test_decoders_of_the_small_profile_refuse_what_is_beyond_it():
+    """And open what is within it: one vector stands here for all that `--profile small` asks."""
+    chosen = [vector for vector in VECTORS if vector.name in BEYOND_SMALL]
+    small = [conformance.of_profile(vector, "small") for vector in chosen]
+    assert all("LIMIT_EXCEEDED" in vector.results.values() for vector in small)
+    within = next(vector for vector in VECTORS if vector.name == "valid/private-kinds.ath")
+    assert conformance.of_profile(within, "small") == within
+    for name in ("c", "wasm"):
+        own = conformance.OWN[name]
+        assert list(conformance.failures(own.small, [*small, within], own.without)) == []
+
+
+@pytest.mark.parametrize("off, passes", [(0.5, True), (2.0, False)])
+def test_an_approximate_decoder_passes_within_the_tolerance_and_not_beyond_it(off, passes):
+    """Every vertex is off by the given number of tolerances along an axis."""
+    vector = min((v for v in VECTORS if fnmatch(v.name, conformance.APPROXIMATE)), key=lambda v: v.path.stat().st_size)
+    data, test = vector.path.read_bytes(), conformance.Approximately()
+    kind = conformance.positions_type(data)
+
+    def decode(data, item, mesh):
+        answer = conformance.package(data, item, mesh)
+        if not item.isdecimal():
+            return answer
+        deepest = np.frombuffer(conformance.package(data, str(conformance.last_level(data)), mesh), kind)
+        length = conformance.tolerance(deepest.reshape(-1, 3), rules.read_front(data)[0].max_error)
+        moved = np.frombuffer(answer, kind).reshape(-1, 3) + np.array([off * length, 0, 0])
+        return moved.astype(kind).tobytes()
+
+    complaints = list(test.failures(conformance.one_by_one(decode), [vector]))
+    levels = [item for item in vector.results if item.isdecimal()]
+    assert (complaints == []) == passes and len(complaints) in (0, len(levels))
+    assert test.largest == pytest.approx(off, rel=0.05)
+
+
+@pytest.mark.web
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_the_form_for_a_gpu_is_an_approximate_decoder():
+    own, test = conformance.OWN_APPROXIMATE["gpu"], conformance.Approximately()
+    chosen = [vector for vector in VECTORS if fnmatch(vector.name, conformance.APPROXIMATE)]
+    assert list(test.failures(own.decoder, chosen, own.without)) == [] and 0.0 < test.largest < 1.0
 
 
 def test_the_document_decodes_the_smallest_vectors():

@@ -182,7 +182,7 @@ class AthFile(StaticData, SegmentDecoder):
             "predicted_error_share": self._predicted_error_share,
             "complete": self.complete,
             "full_level_count": self.full_level_count,
-            "format": f"{ct.MAJOR}.{ct.MINOR}",
+            "format": "{}.{}".format(*self.core.prelude[8:10]),
             "rest_bytes": sum(chunk.length for chunk in self.chunks if chunk.kind in (ct.REST, ct.REFINED_REST)),
             "host_mesh": None if self.host_checksum is None else {"checksum": self.host_checksum},
             "ath": self.table1(),

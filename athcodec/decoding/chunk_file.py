@@ -184,14 +184,20 @@ class ChunkFile:
     @cached_property
     def chunks(self) -> list[Chunk]:
         """The chunk table without unknown kinds, in file order."""
-        return self._chunks_at(slice(None))
+        return self._chunks_at(self._index)
+
+    @property
+    def all_chunks(self) -> list[Chunk]:
+        """The chunk table, those of unknown optional kinds among it, in file order."""
+        return self._chunks_at(np.arange(len(self.core.chunks())))
 
     def _chunks_of(self, kind: int) -> list[Chunk]:
-        return self._chunks_at(np.flatnonzero(self._table["kind"] == kind))
+        return self._chunks_at(self._index[self._table["kind"] == kind])
 
-    def _chunks_at(self, rows: Any) -> list[Chunk]:
-        columns = (self._table[name][rows].tolist() for name in CHUNK_FIELDS)
-        return list(map(Chunk, *columns, self._index[rows].tolist(), self._table["stage"][rows].tolist()))
+    def _chunks_at(self, indices: np.ndarray) -> list[Chunk]:
+        table = self.core.chunks()[indices]
+        columns = (table[name].tolist() for name in CHUNK_FIELDS)
+        return list(map(Chunk, *columns, indices.tolist(), table["stage"].tolist()))
 
     def find(self, kind: int) -> Chunk | None:
         """Return the first chunk of a kind (FORMAT.md, "Chunk table"), or None if the file has none."""
@@ -205,8 +211,16 @@ class ChunkFile:
         """Return whether the file was cut off before a chunk of this kind."""
         return not all(map(self.is_available, self._chunks_of(kind)))
 
+    def stored(self, chunk: Chunk) -> bytes:
+        """Return the bytes of a chunk as they stand, for one that is written to another file. Raises Truncated and, if
+        the kind is known, BadChecksum."""
+        if chunk.kind in ct.KIND_NAMES:
+            return self.payload(chunk)
+        with self._lock:
+            return self._read(chunk.offset, chunk.length, str(chunk))
+
     def payload(self, chunk: Chunk) -> bytes:
-        """Return the stored bytes of a chunk, one of `chunks`. Raises Truncated, BadChecksum."""
+        """Return the stored bytes of a chunk, one of `all_chunks`. Raises Truncated, BadChecksum."""
         with self._lock:
             data = self._read(chunk.offset, chunk.length, str(chunk))
             try:

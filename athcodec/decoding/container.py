@@ -28,6 +28,8 @@ NO_LEVEL = 255
 STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
+FIRST_PRIVATE = 0xC000  # The first kind of chunk that other programs may define.
+PRIVATE_KINDS = "private_kinds"  # Key of metadata: names of the kinds of chunks that other programs define.
 
 HIERARCHY, REST, TIME = 1, 2, 3
 METADATA, FACES, EDGES = OPTIONAL | 4, 5, OPTIONAL | 6
@@ -63,7 +65,7 @@ _FRONT_BYTES, _FRONT_BYTES_OF_EACH, _FRONT_BYTES_OF_FRAME = 512, 128, 2
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits on what a reader accepts; FORMAT.md, "Limits".
+    """Limits on what a reader accepts; FORMAT.md, "Limits". The defaults are those of the full profile.
 
     Attributes
     ----------
@@ -96,6 +98,24 @@ class Limits:
     def __post_init__(self) -> None:
         set_numbers(self, wholes=self.__dataclass_fields__)
 
+    @classmethod
+    def small(cls) -> Limits:
+        """Return the limits of the small profile, which telephones and web pages decode."""
+        return cls(
+            chunks=1 << 16,
+            table_bytes=1 << 20,
+            metadata_bytes=1 << 18,
+            vertices=1 << 20,
+            branches=1 << 16,
+            frames=1 << 16,
+            hierarchy_depth=1024,
+            attributes=64,
+            chunk_bytes=32 << 20,
+            decoded_chunk_bytes=32 << 20,
+            memory_bytes=256 << 20,
+            corners=1 << 23,
+        )
+
 
 def _array() -> Any:
     return field(default=None, compare=False, repr=False)
@@ -120,7 +140,7 @@ class Header:
     is_predicted: bool = False
     chunk_count: int = 0
     file_length: int = 0
-    stages: tuple[int, ...] = ()  # Of each of the full_level_count levels; (): no stage is left out.
+    stages: tuple[int, ...] = ()  # Stage of each of the full_level_count levels; (): every stage is a level.
     joins: np.ndarray | None = _array()  # (levels, segments) uint8; None: all are 0
     repeats: np.ndarray | None = _array()  # (frames,) bool: like the one before; None: none
 
@@ -147,7 +167,7 @@ class Chunk:
     checksum: int
     offset: int = 0
     index: int = -1
-    stage: int | None = None  # Level in the table, which counts what is not shown too; None: `level`.
+    stage: int | None = None  # Stage in the table, which counts those that are no levels too; None: `level`.
 
     @property
     def is_motion(self) -> bool:

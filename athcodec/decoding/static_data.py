@@ -37,6 +37,31 @@ class StaticData(FileTables):
         chunk = self.find(ct.METADATA)
         return ct.parse_metadata(self.payload(chunk), self.limits) if chunk else {}
 
+    def private_chunks(self, name: str) -> list[bytes]:
+        """Return the chunks that another program added under a name (FORMAT.md, "Chunk table", private kinds).
+
+        Parameters
+        ----------
+        name : str
+            The name of what they hold, which begins with a domain, backwards: "org.example.leaf_age".
+
+        Returns
+        -------
+        list of bytes
+            Their contents in file order; none if METADATA does not have the name.
+
+        Raises
+        ------
+        Truncated
+            If the file was cut off before one of them.
+        BadChecksum
+            If one is damaged.
+        """
+        named = self.metadata.get(ct.PRIVATE_KINDS)
+        kinds = {kind for kind, stated in named.items() if stated == name} if isinstance(named, dict) else set()
+        private = (chunk for chunk in self.all_chunks if chunk.kind >= ct.FIRST_PRIVATE)
+        return [self.payload(chunk) for chunk in private if f"{chunk.kind:04X}" in kinds]
+
     def level_within(self, max_error: LengthLike, segments: range | None = None) -> int:
         """Return the coarsest stored level whose largest error is at most `max_error`.
 

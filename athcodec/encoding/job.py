@@ -794,7 +794,7 @@ class EncodingJob:
         source, places = self.placed.source, self.placed.places
         if places.are_shared:
             store.add(ct.PLACES, polygons.pack_places(places))
-        kept = source.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
+        kept = source.metadata.keys() - {THRESHOLDS, ct.PRIVATE_KINDS} if self._keeps_static else STATIC_METADATA
         metadata = {key: value for key, value in source.metadata.items() if key in kept}
         metadata |= stated_scene(metadata)
         if self.options.tam is not None:

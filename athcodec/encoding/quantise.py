@@ -1,6 +1,6 @@
 """Steps from an error bound: what the encoder tries, and how real numbers become the integers that a file stores.
 
-The ratios were measured on finite-element trees (spec/rationale.md): the cheapest file quantises coarser than its bound
+The ratios were measured on finite-element trees: the cheapest file quantises coarser than its bound
 and corrects the few vertices that end up beyond it.
 """
 

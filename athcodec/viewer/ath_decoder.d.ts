@@ -243,8 +243,9 @@ export class AthFile {
   static front(bytes: Uint8Array): { ready: boolean; needed: number };
 
   /** Opens a file from its front; what follows the prelude is fed. Copies what it keeps. Throws AthError,
-   * "MISSING" with `needed` where the front is too short. hostMesh: for setHostMesh(). */
-  static open(bytes: Uint8Array, options?: { hostMesh?: Float32Array | null }): AthFile;
+   * "MISSING" with `needed` where the front is too short. hostMesh: for setHostMesh(). profile: whose limits a file
+   * has to keep (FORMAT.md, "Limits"); "small" suits telephones, "full" is the default. */
+  static open(bytes: Uint8Array, options?: { hostMesh?: Float32Array | null; profile?: "full" | "small" }): AthFile;
 
   /** Gives the mesh that is the rest pose of a file that does not hold one (info.restIsHost): three numbers per vertex as
    * they were in the source, bit for bit and in its order. Copies them; other files pass it over. Throws AthError,

@@ -32,7 +32,7 @@ const CHUNK_SIZE = 32;
 const BRANCH = ["parent", "count", "attach", "flags", "lag", "first", "subtree", "depth", "rigid", "detail", "ring"];
 const PART = ["first", "count", "branch", "index"];
 const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text reads the rest
-const FAULT_SIZE = 56, FAULT_TEXT = 256, LEVEL_NAME = 32;
+const FAULT_SIZE = 56, LIMITS_SIZE = 40, FAULT_TEXT = 256, LEVEL_NAME = 32;
 const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed: "u8", isDerived: "u8" };
 const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 5, edges: 0x8006 };
 const RANGE = { offset: "u64", size: "u64" };
@@ -91,6 +91,7 @@ class Core {
     this.end = Math.ceil(this.c.__heap_base.value / 16) * 16;
     this.free = []; // {at, size}, ascending, never neighbours
     this.sizes = new Map();
+    this.small = 0;
   }
 
   take(bytes) {
@@ -222,15 +223,23 @@ class Core {
     return this.error(code, message, { chunk, ...more });
   }
 
+  // Where the ath_limits of a profile stand; 0 for "full", whose limits are the default.
+  limits(profile) {
+    if (profile === "full") return 0;
+    if (profile !== "small") throw new RangeError(`profile: got ${profile}, expected "full" or "small"`);
+    if (!this.small) this.c.ath_small_limits(this.small = this.take(LIMITS_SIZE));
+    return this.small;
+  }
+
   // Looks at more and more of the front: {needed, error, memory, at}; `at` is a copy of the prelude if error is null.
-  front(bytes) {
+  front(bytes, limits = 0) {
     return this.with(FAULT_SIZE + 8, (fault) => {
       const sizes = fault + FAULT_SIZE;
       let needed = HEADER_SIZE, code, memory;
       do {
         const available = Math.min(bytes.length, Math.max(needed, HEADER_SIZE));
         const at = this.put(bytes.subarray(0, available));
-        code = this.c.ath_front(at, available, 0, sizes, sizes + 4, fault);
+        code = this.c.ath_front(at, available, limits, sizes, sizes + 4, fault);
         [needed, memory] = this.copy(Uint32Array, sizes, 2);
         if (code === OK) return { needed, error: null, memory, at };
         this.give(at);
@@ -377,20 +386,20 @@ export class AthFile {
     return { ready: !front.error, needed: front.needed };
   }
 
-  static open(bytes, { hostMesh = null } = {}) {
+  static open(bytes, { hostMesh = null, profile = "full" } = {}) {
     const file = new AthFile();
-    file.#open(asBytes(bytes));
+    file.#open(asBytes(bytes), profile);
     if (hostMesh) file.setHostMesh(hostMesh);
     return file;
   }
 
-  #open(bytes) {
-    const core = new Core(), c = core.c;
-    const front = core.front(bytes);
+  #open(bytes, profile) {
+    const core = new Core(), c = core.c, limits = core.limits(profile);
+    const front = core.front(bytes, limits);
     if (front.error) throw front.error;
     this.#own = core;
     this.#at = core.take(front.memory);
-    this.#checkFault((fault) => c.ath_open(this.#at, front.memory, front.at, front.needed, 0, fault));
+    this.#checkFault((fault) => c.ath_open(this.#at, front.memory, front.at, front.needed, limits, fault));
     this.info = this.#info();
     this.#chunks = this.#chunkTable();
     this.clips = this.#clipTable();

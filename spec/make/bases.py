@@ -111,16 +111,16 @@ motion(
     lambda: struct.pack("<fBBHBI", 0.5, 0, 3, 1, 255, 100) + basis_stream([[64, 128]]),
 )
 for name, level, reason, base in (
-    ("own", 1, "Basis_Level is the level itself", 1),
-    ("later", 1, "Basis_Level is a later level", 2),
-    ("waves", 2, "Basis_Level is a level in waves", 1),
-    ("missing", 2, "Basis_Level is a level without STEMS", 0),
+    ("own", 1, "Basis_Stage is the level itself", 1),
+    ("later", 1, "Basis_Stage is a later level", 2),
+    ("waves", 2, "Basis_Stage is a level in waves", 1),
+    ("missing", 2, "Basis_Stage is a level without STEMS", 0),
 ):
     motion(
         STEMS, level, f"basis-level-{name}: {reason}", lambda base=base: stems_head(0.5, 0, 3, 1, base=base), segment=1
     )
 invalid(
-    "stems-basis-level-rank BAD_CHUNK 2: Basis_Rank 1 though Basis_Level has a basis of two rows",
+    "stems-basis-level-rank BAD_CHUNK 2: Basis_Rank 1 though Basis_Stage has a basis of two rows",
     lambda: forked(heads={1: stems_head(0.5, 0, 3, 2, basis_stream([[64, 128], [192, 256]]))}).change(
         STEMS, 2, 0, content=stems_head(0.5, 0, 3, 1, base=1)
     ),

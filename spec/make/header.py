@@ -1,8 +1,6 @@
 """Header, counts, error table, and files that end early."""
 
-import re
-
-from spec.document import rules, section
+from spec.document import rules
 from spec.make.base import *
 from spec.make.corrections import corrected_lone
 from spec.make.predicted import SINGLE, predicted
@@ -10,10 +8,17 @@ from spec.make.source_rest import bent
 from spec.make.static import attributes, element
 
 
-def documented() -> bytes:
-    """The hex dump in FORMAT.md."""
-    dump = section("Smallest file")
-    return bytes.fromhex("".join(re.findall(r"^ {4}[0-9a-f]{8}  ((?:[0-9a-f]{2} ?)+)", dump, re.M)))
+def traced() -> Plant:
+    """The file of "A file in bytes" and "A level traced" in FORMAT.md."""
+    stem = [Stem(-1, 3)]
+    return Plant(
+        stem,
+        frames=4,
+        rest=exact_rest(stem, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0], False),
+        time=whole_rates(25),
+        scripts={(STEMS, 0): Script(*row(), *row((3, 0, 0), (-1, 0, 0)))},
+        default_head=stems_head(0.25),
+    )
 
 
 def first_bytes(count: int, change: bytes = b"") -> bytes:
@@ -73,15 +78,38 @@ def of_range(max_error: int) -> Draft:
     )
 
 
+def later_minor() -> Draft:
+    return fork().add(
+        Entry(METADATA, b'\0{"unit":"m","new":[1,{}]}'),
+        Entry(0x800A, FUTURE),
+        Entry(0x8019, FUTURE, 1, 0),
+        Entry(0x8025, FUTURE),
+        Entry(0xA025, FUTURE),
+    )
+
+
+def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().draft(), **fields) -> None:
+    """Declare a vector with a Minor_Version, which a decoder takes or not by the rule of its own version."""
+    name, reason = title.split(": ", 1)
+    name, *errors = name.split()
+
+    def make() -> Draft:
+        return made().with_header(minor=minor, **fields)
+
+    if not rules.is_known_version(rules.VERSION[0], minor):
+        errors = ["UNSUPPORTED_VERSION"]
+    (invalid if errors else valid)(f"{' '.join([name, *errors])}: {reason}", make)
+
+
 def shown(*levels: int) -> Draft:
     """The fork, of which these levels are shown."""
-    draft = fork().with_header(shown=levels, level_count=len(levels), full_level_count=len(levels))
+    draft = fork().with_header(stages=levels, level_count=len(levels), full_level_count=len(levels))
     for segment in range(2 if 0 not in levels else 0):
         draft = draft.without(AFFINES, 0, segment)
     return draft
 
 
-valid("documented: the smallest file, as FORMAT.md has it", documented)
+valid("traced: a stem of three vertices that bends, whose bytes and numbers FORMAT.md has", traced)
 valid("uneven-segments: 7 frames in 3 segments, of 2, 2 and 3", moving, FORK, 25, frames=7, segments=3, heads=HEADS)
 valid("segment-per-frame: as many segments as frames", lambda: moving(FORK, 26, frames=3, segments=3, heads=HEADS))
 valid("level-0-alone: shortened: level 0 of 3", lambda: fork().upto(0))
@@ -104,7 +132,7 @@ invalid(
 )
 invalid(
     "last-not-shown BAD_HEADER: the last level is not shown",
-    lambda: fork().upto(1).with_header(shown=(0, 1), full_level_count=2),
+    lambda: fork().upto(1).with_header(stages=(0, 1), full_level_count=2),
 )
 invalid("level-32-shown BAD_HEADER: level 32 is shown", lambda: shown(0, 1, 32))
 invalid("empty NOT_AN_ATH_FILE: a file of no bytes", b"")
@@ -126,15 +154,17 @@ invalid(
 invalid("cut-in-header TRUNCATED: 23 bytes", lambda: first_bytes(23))
 invalid("cut-in-front-stream TRUNCATED: ends inside the front stream", lambda: first_bytes(40))
 invalid("cut-in-checksums TRUNCATED: ends inside the checksums", lambda: first_bytes(rules.u32(lone().file(), 16) - 1))
-header("major-1 UNSUPPORTED_VERSION: Major_Version 1, which is to come", major=1, minor=0)
-header("minor-before UNSUPPORTED_VERSION: Minor_Version 13", minor=13)
-header("minor-later UNSUPPORTED_VERSION: Minor_Version 15", minor=15)
+header("major-next UNSUPPORTED_VERSION: the next Major_Version", major=rules.VERSION[0] + 1, minor=0)
+header("major-last UNSUPPORTED_VERSION: the last Major_Version", major=255)
+version("minor-7: Minor_Version 7, an earlier or a later one", 7)
+version("minor-last: Minor_Version 255", 255)
+version("minor-7-with-what-is-new: Minor_Version 7, with optional kinds and members that are new", 7, made=later_minor)
+version("minor-7-feature UNSUPPORTED_FEATURE: Minor_Version 7, with a feature that is new", 7, features=1 << 6)
 header("feature-first UNSUPPORTED_FEATURE: the lowest bit of Features is set", features=1)
 header("feature-last UNSUPPORTED_FEATURE: the highest bit of Features is set", features=1 << 15)
-header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=1, features=1)
+header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=254, features=1)
 invalid(
-    "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature",
-    lambda: first_bytes(12, b"\0\x0e\0\1"),
+    "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature", lambda: first_bytes(12, b"\0\1")
 )
 header("vertices-limit LIMIT_EXCEEDED: Vertex_Count 2^26 + 1", place_count=(1 << 26) + 1)
 header("branches-limit LIMIT_EXCEEDED: Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1)

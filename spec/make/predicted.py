@@ -78,7 +78,7 @@ PREDICTED_PLACE = PREDICTED, 1, 1
 def with_source(draft: Draft, seed: int) -> Draft:
     """A last level that is up to 2^22 numbers away from the one before it."""
     file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
-    plans = rules.shown_plans(file, level - 1)
+    plans = rules.plans_of(file, level - 1)
 
     def stream(s: int) -> bytes:
         positions = rules.decode_segment(file, plans, s, level - 1)

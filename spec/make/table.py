@@ -49,6 +49,17 @@ valid(
     ),
 )
 valid(
+    "private-kinds: private kinds that METADATA names, one of them twice, and one that it does not name",
+    lambda: fork().add(
+        Entry(METADATA, b'\0{"private_kinds":{"C000":"org.example.leaf_age","E0A1":"org.example.licence"}}'),
+        Entry(0xC000, FUTURE),
+        Entry(0xC000, b""),
+        Entry(0xC001, FUTURE),
+        Entry(0xE0A1, FUTURE),
+    ),
+)
+table("private-required UNKNOWN_CHUNK: a private kind without Is_Optional", lambda: fork().add(Entry(0x4000, FUTURE)))
+valid(
     "unknown-optional-damaged: what is skipped is not read: its Checksum does not fit",
     lambda: fork().add(Entry(0x8009, FUTURE, checksum=0), Entry(0x8064, FUTURE, checksum=0)),
 )

@@ -89,7 +89,8 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-/* A decoder of format 0.x reads files of its own version only. ATH_FEATURES has a bit for each known feature. */
+/* A decoder of format 0.x reads files of its own version only, one of format 1.x those of every 1.y. ATH_FEATURES has a
+ * bit for each known feature. */
 enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 14, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. A decoder skips unknown kinds with the bit ATH_OPTIONAL. */
@@ -193,7 +194,8 @@ typedef struct ath_file ath_file;       /* an opened file */
 typedef struct ath_work ath_work;       /* scratch memory and state of one preparation at a time */
 typedef struct ath_segment ath_segment; /* one prepared segment at one level */
 
-/* Largest counts and sizes that a file may have. FORMAT.md, "Limits", gives the defaults. */
+/* Largest counts and sizes that a file may have. FORMAT.md, "Limits", has those of both profiles. The defaults are those
+ * of the full profile; the small one is for telephones and web pages. */
 typedef struct ath_limits {
     uint32_t chunks, table_bytes, vertices, branches, frames, hierarchy_depth, chunk_bytes;
     uint32_t reserved;
@@ -201,6 +203,7 @@ typedef struct ath_limits {
 } ath_limits;
 
 ATH_API void ath_default_limits(ath_limits *limits);
+ATH_API void ath_small_limits(ath_limits *limits);
 
 /* Looks at the front of a file, of which `available` bytes are there. ATH_OK: the prelude, up to the first motion
  * chunk, has *front_bytes, and ath_open needs *memory_bytes. ATH_MISSING: call again with at least *front_bytes. If
@@ -379,7 +382,7 @@ typedef struct ath_chunk {
     uint32_t segment;
     uint16_t kind;
     uint8_t level; /* the first level that needs the chunk; ATH_NO_LEVEL: it belongs to no level */
-    uint8_t stage; /* Level in the chunk table; deeper than `level` where some are not shown */
+    uint8_t stage; /* Stage in the chunk table; more than `level` if there are stages that are no levels */
 } ath_chunk;
 
 ATH_API const ath_chunk *ath_chunks(const ath_file *file);
@@ -482,7 +485,7 @@ ATH_API int32_t ath_joined_to(const ath_file *file, int32_t segment, int32_t lev
  * is added if velocities are joined, too. */
 enum { ATH_JOIN_SLOPED = 128 };
 ATH_API const uint8_t *ath_joins(const ath_file *file);
-/* Returns the stage of each of the full_level_count levels: what FORMAT.md numbers as a level, whether shown or not. */
+/* Returns the stage of each of the full_level_count levels: a stage of FORMAT.md. */
 ATH_API const uint8_t *ath_stages(const ath_file *file);
 
 /* Returns frame_count flags: 1 if the frame shows the positions of the frame before. Such frames take no bytes. */
