@@ -118,8 +118,10 @@ export interface ATHClip {
   readonly index: number;
   /** Empty where the only clip of a file has none. */
   readonly name: string;
-  /** Seconds from the first frame to the last. */
+  /** Seconds of the clip played once: for a loop a whole round, with the way from its last frame back to its first. */
   readonly duration: number;
+  /** Seconds from the first frame to the last. */
+  readonly lastTime: number;
   readonly frameCount: number;
   /** The frames of a file are numbered over all its clips. */
   readonly firstFrame: number;

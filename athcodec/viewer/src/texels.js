@@ -1,6 +1,6 @@
 // Texels fills textures for the GPU: nodes' matrices, then exact vertices, with rotations of normals where the mesh has faces.
 
-import { normals, turns } from "./normals.js";
+import { normals } from "./normals.js";
 import { pause } from "./pause.js";
 
 export const WIDTH = 1024; // Width of a texture in texels, each of four numbers.
@@ -116,4 +116,20 @@ export class Texels {
         turns(this.#restNormals, now, first[part] + i, data, at + 8 * (index[part] + i) + 4);
     }
   }
+}
+
+// Writes the smallest rotation that takes normal `vertex` of `from` to that of `to`, as a quaternion at out[at].
+function turns(from, to, vertex, out, at) {
+  const i = 3 * vertex, ax = from[i], ay = from[i + 1], az = from[i + 2], bx = to[i], by = to[i + 1], bz = to[i + 2];
+  const x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx, w = 1 + ax * bx + ay * by + az * bz;
+  const length = Math.hypot(x, y, z, w);
+  if (length < 1e-6) { // opposite: half a turn about anything across
+    const across = Math.hypot(ax, ay) || 1;
+    out.set(Math.hypot(ax, ay) > 1e-3 ? [-ay / across, ax / across, 0, 0] : [1, 0, 0, 0], at);
+    return;
+  }
+  out[at] = x / length;
+  out[at + 1] = y / length;
+  out[at + 2] = z / length;
+  out[at + 3] = w / length;
 }
