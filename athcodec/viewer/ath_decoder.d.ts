@@ -64,7 +64,7 @@ export interface AthInfo {
   /** Largest distance of any vertex in any frame from the clip that was encoded, promised for the deepest
    * level of the file as encoded (fullLevelCount - 1). */
   readonly maxError: number;
-  /** x, y, z that the file's numbers are relative to. For information: positions are absolute. */
+  /** x, y, z that the file's numbers are relative to. Positions are absolute unless you ask for `relative` ones. */
   readonly origin: readonly [number, number, number];
   /** Vertices of the source, which order "source" has. */
   readonly vertexCount: number;
@@ -300,12 +300,12 @@ export class AthFile {
   /** The rest pose of the source, 3 numbers per vertex; order "source" by default. Where the source gave none it is the
    * finest reference pose that has been read; after levelRest() of a deeper level it is closer to the source's. Throws
    * MISSING where its chunk, SOURCE_REST, which stands behind the motion, is still to come: no player needs it. */
-  rest(order?: Order): Float32Array;
-  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
+  rest(order?: Order, options?: { relative?: boolean }): Float32Array;
+  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T; relative?: boolean }): T;
   /** The reference pose of a level, which it moves and which its matrices apply to. It is the same for all levels with
    * nodes above 0. Throws MISSING where bytes of it are still to come. */
-  levelRest(level: number, order?: Order): Float32Array;
-  levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T }): T;
+  levelRest(level: number, order?: Order, options?: { relative?: boolean }): Float32Array;
+  levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T; relative?: boolean }): T;
   /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): Errors;
   /** Describes a level for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
@@ -394,11 +394,13 @@ export class AthFile {
    * frame.
    */
 
-  /** All vertices, 3 numbers each; order "source" by default. */
-  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null }): Float32Array;
-  positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array;
+  /** All vertices, 3 numbers each; order "source" by default. relative: less info.origin, for an object that an engine puts there.
+   * Floats of positions far from 0, such as UTM coordinates, are too coarse; these are not. */
+  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null; relative?: boolean }): Float32Array;
+  positions(segments: Segments, frame: number,
+            options: { out: Float32Array; order?: Order; fade: Fading; relative?: boolean }): Float32Array;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                   options: { out: T; order?: Order }): T;
+                                                   options: { out: T; order?: Order; relative?: boolean }): T;
   /** Up to four clips blended along the branches, each at its own frame and level: branches stay attached, edges of stems
    * are as long as those of the clips in their weighted mean. Weights need not add up to 1; a share of none is passed over,
    * and one that is left alone has the bits of positions(). */

@@ -590,14 +590,14 @@ export class AthFile {
     return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
   }
 
-  rest(order = "source", { out } = {}) {
+  rest(order = "source", { out, relative = false } = {}) {
     this.#checkFault((fault) => this.#c.ath_read_rest(this.#at, fault));
-    return this.#pose(out, order, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
+    return this.#pose(out, order, relative, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
   }
 
-  levelRest(level, order = "source", { out } = {}) {
+  levelRest(level, order = "source", { out, relative = false } = {}) {
     this.#refineSize(this.#level(level));
-    return this.#pose(out, order, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
+    return this.#pose(out, order, relative, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
   }
 
   // Its number, and the numbers of all its vertices.
@@ -606,10 +606,18 @@ export class AthFile {
     return [which, 3 * (which === ORDERS.file ? this.info.placeCount : this.info.vertexCount)];
   }
 
-  #pose(out, order, fill) {
+  #pose(out, order, relative, fill) {
     const [which, length] = this.#order(order), result = asOut(out, length, [Float32Array, Float64Array]);
-    result.set(this.#fill(new Float64Array(length), length, (at) => fill(which, at)));
+    const pose = this.#fill(new Float64Array(length), length, (at) => fill(which, at));
+    result.set(relative ? this.#relative(pose) : pose);
     return result;
+  }
+
+  // Takes the origin from positions, before they become floats.
+  #relative(positions) {
+    const { origin } = this.info;
+    for (let i = 0; i < positions.length; i++) positions[i] -= origin[i % 3];
+    return positions;
   }
 
   levelError(level, first = 0, last = this.info.segmentCount - 1) {
@@ -1108,14 +1116,35 @@ export class AthFile {
     return Math.max(0, ...Array.from(levels, (level) => this.#cutSize(this.#level(level))[k]));
   }
 
-  positions(segments, frame, { out, order = "source", fade = null } = {}) {
+  positions(segments, frame, { out, order = "source", fade = null, relative = false } = {}) {
     const c = this.#c, [which, length] = this.#order(order);
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (relative) return this.#relativePositions(segments, frame, result, length, order, fade);
     if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
       c.ath_faded_positions(this.#at, array, count, frame, faded, which, at, 12));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_positions_float64(this.#at, array, count, frame, which, at, 24)
       : c.ath_positions(this.#at, array, count, frame, which, at, 12));
+  }
+
+  // The levels of a fade are added up here, as the core adds up floats, which are too coarse far from the origin.
+  #relativePositions(segments, frame, result, length, order, fade) {
+    const shown = (some) => this.#relative(this.positions(some, frame, { out: new Float64Array(length), order }));
+    if (!fade) {
+      result.set(shown(segments));
+      return result;
+    }
+    const shares = new Map();
+    fade.levels.forEach((level, i) => shares.set(level, (shares.get(level) ?? 0) + fade.weights[i]));
+    const sum = new Float64Array(length), all = Array.from(segments).filter((segment) => segment && !segment.freed);
+    for (const [level, weight] of shares) {
+      if (weight === 0) continue;
+      const own = all.filter((segment) => segment.level === level);
+      if (own.length === 0) throw this.#core.error(NOT_PREPARED, this.#lacking(segments, frame, [level]));
+      shown(own).forEach((value, i) => { sum[i] += weight * value; });
+    }
+    result.set(sum);
+    return result;
   }
 
   // Shares are { segments, frame, weight }.
