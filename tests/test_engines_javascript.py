@@ -1,5 +1,6 @@
-"""The examples for engines in JavaScript: what is shown is what the decoder of Python gives, at the level that a distance asks for,
-and no more is fetched than that level takes. PlayCanvas, Babylon.js and three.js draw the shipped tree in Chromium, in software."""
+"""The examples for engines in JavaScript: what is shown is what the decoder of Python gives, at the level that a
+distance asks for, and no more is fetched than that level takes. PlayCanvas, Babylon.js and three.js draw the shipped
+tree in Chromium, in software."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ import base64
 import hashlib
 import io
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -31,7 +33,8 @@ ENGINES = {"playcanvas": "engines_page.mjs", "babylon": "engines_page.mjs", "thr
 
 PLAY = """
 import { openPlant } from "./plant.js";
-const [url, distance, ...seconds] = process.argv.slice(2), view = { distance: Number(distance), fov: 0.8, height: 1080, budget: 50 };
+const [url, distance, ...seconds] = process.argv.slice(2);
+const view = { distance: Number(distance), fov: 0.8, height: 1080, budget: 50 };
 const plant = await openPlant(url), shown = [];
 for (const at of seconds.map(Number)) {
   const wanted = plant.file.levelFor(view.distance, view.fov, view.height, 1, 0, 1, "p99");
@@ -40,10 +43,12 @@ for (const at of seconds.map(Number)) {
     await new Promise((done) => setTimeout(done, 2));
     now = plant.update(at, view);
   }
-  shown.push({ level: now?.level ?? -1, wanted, positions: [...now?.positions ?? []], normals: [...(now?.normals ?? []).slice(0, 300)] });
+  const positions = [...now?.positions ?? []], normals = [...(now?.normals ?? []).slice(0, 300)];
+  shown.push({ level: now?.level ?? -1, wanted, positions, normals });
 }
-console.log(JSON.stringify({ shown, failure: plant.failure?.message ?? null, source: [...plant.mesh.source], uv: plant.mesh.uv?.length ?? 0,
-  triangles: [...plant.mesh.triangles], origin: plant.origin }));
+const { failure, mesh, origin } = plant;
+console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [...mesh.source], origin,
+  triangles: [...mesh.triangles] }));
 """
 
 
@@ -87,6 +92,19 @@ def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(
             assert distance == NEAR or fetched < len(data) / 3
 
 
+def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
+    page = (ROOT / "docs" / "engines.md").read_text("utf-8")
+    section = page[page.index("## JavaScript") :]
+    assert re.search(r"```js\n(.*?)```\n", section, re.DOTALL)[1] == (EXAMPLES / "plant.js").read_text("utf-8")
+    for packages in APPS.values():
+        for package in packages.split():
+            name, version = package.rsplit("@", 1)
+            example = next(each for each in ENGINES if each in name)
+            code = (EXAMPLES / f"{example}.js").read_text("utf-8").splitlines()
+            lines = [line for line in code if line.strip() and not re.match(r"\s*(//|/\*|\*|import)", line)]
+            assert re.search(rf"\| {version} \| \[{example}.js\][^|]*(\|[^|]*)?\| {len(lines)} \|", section), name
+
+
 @pytest.mark.web
 def test_a_file_that_is_cut_off_or_not_there_is_an_error(tmp_path):
     with ThrottledServer({"cut.ath": TREE.read_bytes()[:20_000]}) as server:
@@ -98,7 +116,7 @@ def test_a_file_that_is_cut_off_or_not_there_is_an_error(tmp_path):
             (folder / "package.json").write_text('{"type": "module"}')
             script = f"""
             import {{ openPlant }} from "./plant.js";
-            await openPlant("{server.address}{name}").then(() => console.log("none"), (error) => console.log(error.message));
+            await openPlant("{server.address}{name}").catch((error) => console.log(error.message));
             """
             (folder / "open.mjs").write_text(script)
             assert message in printed("node", folder / "open.mjs")
@@ -113,6 +131,10 @@ def test_an_engine_that_is_not_three_asks_for_no_three():
 
 
 # ---- engines, in Chromium ----
+
+
+def numbers(text: str, dtype) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype)
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +167,7 @@ def test_an_app_of_another_engine_installs_no_three(app):
 @pytest.mark.programs
 @pytest.mark.browser
 @pytest.mark.parametrize("engine", ENGINES)
-def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(
-    engine, app, browser, tmp_path, record_property
-):
+def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(engine, app, browser, tmp_path):
     from PIL import Image
 
     folder = app(ENGINES[engine])
@@ -156,22 +176,21 @@ def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(
     printed(folder / "node_modules" / ".bin" / "esbuild", ENGINES[engine], *bundle, cwd=folder)
     files = {path.name: path.read_bytes() for path in tmp_path.glob("*.js")} | {"tree.ath": TREE.read_bytes()}
     files["ath_worker.js"] = (VIEWER / "web" / "ath_worker.js").read_bytes()
-    files["page.html"] = b'<canvas width="480" height="360"></canvas><script type="module" src="/page.js"></script>'
+    files["page.html"] = b'<canvas width="320" height="240"></canvas><script type="module" src="/page.js"></script>'
     page, errors = browser.new_page(), []
     page.on("pageerror", lambda error: errors.append(str(error)))
     pictures, levels, spent = [], [], []
     with ThrottledServer(files) as server:
         page.goto(f"{server.address}page.html")
         page.wait_for_function("() => globalThis.engines", timeout=60_000)
-        page.evaluate(
-            "async (name) => { globalThis.player = await engines[name](document.querySelector('canvas'), '/tree.ath', 4); }",
-            engine,
-        )
+        draws = "engines[name](document.querySelector('canvas'), '/tree.ath', 4)"
+        page.evaluate(f"async (name) => {{ globalThis.player = await {draws}; }}", engine)
         for distance in (FAR, NEAR):
             for frame in FRAMES:
                 shown = page.evaluate("([seconds, distance]) => player.play(seconds, distance)", [frame / 30, distance])
-                wanted = decoded(shown["level"], frame)[shown["source"]]
-                assert np.abs(np.reshape(shown["positions"], (-1, 3)) - wanted).max() < 1e-5 * np.abs(wanted).max()
+                positions = numbers(shown["positions"], np.float32).reshape(-1, 3)
+                wanted = decoded(shown["level"], frame)[numbers(shown["source"], np.uint32)]
+                assert np.abs(positions - wanted).max() < 1e-5 * np.abs(wanted).max()
                 spent.append(shown["ms"])
             levels.append(shown["level"])
             url = page.evaluate("(distance) => player.picture(0.5, distance)", distance)
@@ -182,6 +201,5 @@ def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(
         Image.fromarray(picture.astype(np.uint8)).save(tmp_path / f"{engine}_{name}.png")
     shares = [(np.abs(picture - picture[0, 0]).max(axis=2) > 20).mean() for picture in pictures]
     assert 0.0005 < shares[0] < shares[1] / 4 and shares[1] > 0.05, "the tree is drawn, and larger from near"
-    print(
-        f"{engine}: {np.median(spent[10:]):.1f} ms a frame at level {levels[1]}, {np.median(spent[:10]):.1f} at {levels[0]}"
-    )
+    far, near = np.median(spent[:10]), np.median(spent[10:])
+    print(f"{engine}: {near:.1f} ms a frame at level {levels[1]}, {far:.1f} at level {levels[0]}")

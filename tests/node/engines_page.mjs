@@ -11,11 +11,12 @@ import { Vector3 } from "@babylonjs/core/Maths/math.vector.js";
 import { addPlant } from "athcodec-three/examples/babylon.js";
 import { AthPlant } from "athcodec-three/examples/playcanvas.js";
 
-const FOV = 0.8, SLOWEST = 60_000, PLACES = [[0, 0, 0], [6, 0, -4]];
+const FOV = 0.8, packed = (values) => btoa(Array.from(new Uint8Array(values.buffer), (byte) => String.fromCharCode(byte)).join(""));
+const SLOWEST = 60_000, PLACES = [[0, 0, 0], [6, 0, -4]];
 const frame = () => new Promise((done) => requestAnimationFrame(done));
 
 // Draws until the wanted level of a time is shown, then measures one drawing of it.
-function player(canvas, { draw, level, wanted, positions, source }) {
+function player(canvas, { draw, level, wanted, positions, plant }) {
   const context = canvas.getContext("webgl2");
   return {
     async play(seconds, distance) {
@@ -29,7 +30,8 @@ function player(canvas, { draw, level, wanted, positions, source }) {
       draw(seconds, distance);
       context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4)); // waits for the card
       const ms = performance.now() - start;
-      return { level: level(), positions: Array.from(await positions()), source: Array.from(source()), ms };
+      const at = Float32Array.from(positions(), (value, i) => value + plant().origin[i % 3]);
+      return { level: level(), positions: packed(at), source: packed(plant().mesh.source), ms };
     },
     picture(seconds, distance) {
       draw(seconds, distance);
@@ -38,8 +40,8 @@ function player(canvas, { draw, level, wanted, positions, source }) {
   };
 }
 
-const wantedOf = ({ file, clip = file.clips[0] }, canvas) => (distance) =>
-  file.levelFor(distance, FOV, canvas.height, 1, clip.firstSegment, clip.firstSegment + clip.segmentCount - 1, "p99");
+const wantedOf = ({ file, origin: [x, y, z], clip = file.clips[0] }, canvas, distance, height) =>
+  file.levelFor(Math.hypot(x, y - height, z - distance), FOV, canvas.height, 1, clip.firstSegment, clip.firstSegment + clip.segmentCount - 1, "p99");
 
 export const engines = {
   async playcanvas(canvas, url, height) {
@@ -52,7 +54,7 @@ export const engines = {
     for (const each of [camera, light, tree]) app.root.addChild(each);
     app.scene.ambientLight = new pc.Color(0.4, 0.4, 0.4);
     app.timeScale = 0;
-    const script = tree.script.create(AthPlant, { properties: { url, camera } });
+    const script = tree.script.create(AthPlant, { properties: { url, camera, budget: 50 } });
     app.start();
     while (!script.object) await frame();
     return player(canvas, {
@@ -64,9 +66,9 @@ export const engines = {
         app.render();
       },
       level: () => script.shown?.level ?? -1,
-      wanted: (distance) => wantedOf(script.plant, canvas)(Math.hypot(distance, height)),
+      wanted: (distance) => wantedOf(script.plant, canvas, distance, height),
       positions: () => { const out = []; script.mesh.getPositions(out); return out; },
-      source: () => script.plant.mesh.source,
+      plant: () => script.plant,
     });
   },
 
@@ -77,7 +79,7 @@ export const engines = {
     const camera = new FreeCamera("camera", new Vector3(0, height, 20), scene);
     camera.fov = FOV;
     new HemisphericLight("light", new Vector3(0.3, 1, 0.5), scene);
-    const { plant, mesh, show } = await addPlant(scene, url, PLACES.map((place) => new Vector3(...place)));
+    const { plant, mesh, show } = await addPlant(scene, url, { places: PLACES.map((place) => new Vector3(...place)), budget: 50 });
     const material = mesh.material = new StandardMaterial("leaves", scene);
     material.backFaceCulling = false;
     material.twoSidedLighting = true;
@@ -92,9 +94,9 @@ export const engines = {
         scene.render();
       },
       level: () => shown?.level ?? -1,
-      wanted: (distance) => wantedOf(plant, canvas)(Math.hypot(distance, height)),
+      wanted: (distance) => wantedOf(plant, canvas, distance, height),
       positions: () => mesh.getVerticesData("position"),
-      source: () => plant.mesh.source,
+      plant: () => plant,
     });
   },
 };

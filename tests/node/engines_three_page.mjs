@@ -2,6 +2,7 @@
 import * as three from "three";
 import { addPlant } from "athcodec-three/examples/three.js";
 
+const packed = (values) => btoa(Array.from(new Uint8Array(values.buffer), (byte) => String.fromCharCode(byte)).join(""));
 const FOV = 0.8, SLOWEST = 60_000, frame = () => new Promise((done) => requestAnimationFrame(done));
 globalThis.engines = {
   async three(canvas, url, height) {
@@ -32,8 +33,9 @@ globalThis.engines = {
         const start = performance.now(), context = renderer.getContext();
         draw(seconds, distance);
         context.readPixels(0, 0, 1, 1, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(4));
-        const ms = performance.now() - start, positions = Array.from(motion.uploaded());
-        return { level: motion.level, positions, source: Array.from(positions.slice(0, positions.length / 3), (_, i) => i), ms };
+        const ms = performance.now() - start, positions = motion.uploaded();
+        const source = Uint32Array.from({ length: positions.length / 3 }, (_, i) => i);
+        return { level: motion.level, positions: packed(positions), source: packed(source), ms };
       },
       picture(seconds, distance) {
         draw(seconds, distance);

@@ -6,7 +6,7 @@ import { VertexData } from "@babylonjs/core/Meshes/mesh.vertexData.js";
 import "@babylonjs/core/Meshes/thinInstanceMesh.js";
 import { openPlant } from "./plant.js";
 
-export async function addPlant(scene, url, places = [Vector3.Zero()]) {
+export async function addPlant(scene, url, { places = [Vector3.Zero()], budget = 2 } = {}) {
   const plant = await openPlant(url), mesh = new Mesh("ath", scene), { triangles, uv, colors } = plant.mesh;
   mesh.position.fromArray(plant.origin);
   mesh.isVisible = false;
@@ -15,7 +15,7 @@ export async function addPlant(scene, url, places = [Vector3.Zero()]) {
   let shown = null;
   function show(seconds, camera = scene.activeCamera) {
     const distance = Math.min(...places.map((place) => Vector3.Distance(place.add(mesh.position), camera.globalPosition)));
-    const now = plant.update(seconds, { distance, fov: camera.fov, height: scene.getEngine().getRenderHeight() });
+    const now = plant.update(seconds, { distance, fov: camera.fov, height: scene.getEngine().getRenderHeight(), budget });
     if (!now) return shown; // Nothing is decoded yet, or the next segment is late.
     if (shown) {
       mesh.updateVerticesData(VertexBuffer.PositionKind, now.positions);

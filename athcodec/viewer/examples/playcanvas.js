@@ -1,5 +1,5 @@
 // A plant in PlayCanvas, as an ESM script: entity.addComponent("script"); entity.script.create(AthPlant, { properties: { url } }).
-import { BoundingBox, Entity, Mesh, MeshInstance, Script, StandardMaterial, Vec3, math } from "playcanvas";
+import { Entity, Mesh, MeshInstance, Script, StandardMaterial, math } from "playcanvas";
 import { openPlant } from "./plant.js";
 
 export class AthPlant extends Script {
@@ -9,6 +9,9 @@ export class AthPlant extends Script {
   url = "";
   /** @attribute @type {Entity} */
   camera = null;
+  /** Milliseconds of decoding in a frame.
+   * @attribute */
+  budget = 2;
   seconds = 0;
 
   async initialize() {
@@ -26,9 +29,9 @@ export class AthPlant extends Script {
   update(dt) {
     if (!this.object) return; // The front of the file is still to come.
     this.seconds += dt;
-    const { fov, horizontalFov } = this.camera.camera, distance = this.camera.getPosition().distance(this.entity.getPosition());
-    const { height, width } = this.app.graphicsDevice, vertical = horizontalFov ? 2 * Math.atan(Math.tan(fov * math.DEG_TO_RAD / 2) * height / width) : fov * math.DEG_TO_RAD;
-    this.shown = this.plant.update(this.seconds, { distance, fov: vertical, height }) ?? this.shown;
+    const { budget } = this, { height } = this.app.graphicsDevice, fov = this.camera.camera.fov * math.DEG_TO_RAD; // horizontalFov: false
+    const distance = this.camera.getPosition().distance(this.object.getPosition());
+    this.shown = this.plant.update(this.seconds, { distance, fov, height, budget }) ?? this.shown;
     if (!this.shown) return;
     this.mesh.setPositions(this.shown.positions);
     this.mesh.setNormals(this.shown.normals);
