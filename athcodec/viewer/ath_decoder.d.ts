@@ -417,11 +417,11 @@ export class AthFile {
   ): number[];
 
   /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
-   * positions.
+   * positions; with `relative`, which takes no fade, from relative ones to relative ones.
    * Vertices of exact runs have none, exact() has them. */
   matrices(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
   matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                  options: { out: T }): T;
+                                                  options: { out?: T; relative?: boolean }): T;
   /** parts().exactCount positions of 3 numbers, in file order. */
   exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
 

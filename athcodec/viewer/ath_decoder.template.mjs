@@ -1184,14 +1184,24 @@ export class AthFile {
     });
   }
 
-  matrices(segments, frame, { out, fade = null } = {}) {
+  matrices(segments, frame, { out, fade = null, relative = false } = {}) {
     const c = this.#c, length = 12 * this.#most(segments, fade, 1);
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (relative && fade) throw new TypeError("relative: got true and a fade, expected one of the two");
+    if (relative) return this.#relativeMatrices(segments, frame, result, length);
     if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
       c.ath_faded_matrices(this.#at, array, count, frame, faded, at, 48));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_matrices_float64(this.#at, array, count, frame, at, 96)
       : c.ath_matrices(this.#at, array, count, frame, at, 48));
+  }
+
+  // Matrices that take a rest pose less the origin to positions less the origin.
+  #relativeMatrices(segments, frame, result, length) {
+    const m = this.matrices(segments, frame, { out: new Float64Array(length) }), { origin: [x, y, z] } = this.info;
+    for (let i = 0; i < length; i += 4) m[i + 3] += m[i] * x + m[i + 1] * y + m[i + 2] * z - this.info.origin[i / 4 % 3];
+    result.set(m);
+    return result;
   }
 
   exact(segments, frame, { out, fade = null } = {}) {

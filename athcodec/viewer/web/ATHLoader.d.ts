@@ -94,6 +94,10 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly lines: BufferGeometry | null;
   /** Edges (u, v) in source order, stored or following from the branches. */
   readonly skeleton: Uint32Array;
+  /** x, y, z in the axes of the file that all positions are relative to: 0, 0, 0 unless the plant is so far from there that floats would
+   * break the file's bound, as in map coordinates. `object` and ATHLimbs stand there; put objects of your own there, too. Instances of
+   * forests are relative to it. Levels of such a file change without a fade. */
+  readonly origin: readonly [number, number, number];
   /** Rest pose in source order, 3 numbers per vertex. In files whose level 1 refines it, the numbers change when that
    * level is here, and attributes, `box` and `sphere` with them. */
   readonly rest: Float32Array;
