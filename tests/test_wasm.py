@@ -692,23 +692,27 @@ def test_arrays_that_are_still_to_come_are_missing_and_not_absent(tmp_path):
 
 FAR = """
 const file = AthFile.open(read(path)), { origin, levelCount } = file.info, frame = 2.25;
-const largest = (numbers) => Math.max(...numbers.map(Math.abs)), wide = () => new Float64Array(3 * file.info.vertexCount);
+const largest = (numbers) => Math.max(...numbers.map(Math.abs));
+const wide = () => new Float64Array(3 * file.info.vertexCount);
 const off = (shown, wanted) => largest(Array.from(shown, (value, i) => value - wanted[i]));
 const segments = each(levelCount, (level) => prepareAll(file, level));
 const absolute = segments.map((some) => file.positions(some, frame, { out: wide() }));
 const less = (numbers) => numbers.map((value, i) => value - origin[i % 3]);
 const moved = (level) => {
-  const rest = file.levelRest(level, "file", { relative: true }), m = file.matrices(segments[level], frame, { relative: true });
-  const xyz = file.positions(segments[level], frame, { relative: true, order: "file" }), parts = file.parts(level);
-  return Math.max(0, ...each(parts.partCount, (part) => (parts.branch[part] < 0 ? 0 : largest(each(3 * parts.count[part], (i) => {
+  const rest = file.levelRest(level, "file", { relative: true }), parts = file.parts(level);
+  const m = file.matrices(segments[level], frame, { relative: true });
+  const xyz = file.positions(segments[level], frame, { relative: true, order: "file" });
+  const offIn = (part) => largest(each(3 * parts.count[part], (i) => {
     const v = 3 * (parts.first[part] + Math.floor(i / 3)), row = 12 * parts.index[part] + 4 * (i % 3);
     return m[row] * rest[v] + m[row + 1] * rest[v + 1] + m[row + 2] * rest[v + 2] + m[row + 3] - xyz[v + i % 3];
-  })))));
+  }));
+  return Math.max(0, ...each(parts.partCount, (part) => (parts.branch[part] < 0 ? 0 : offIn(part))));
 };
 const fade = { levels: [0, levelCount - 1], weights: [0.25, 0.75] }, both = [...segments[0], ...segments.at(-1)];
 const mean = absolute[0].map((value, i) => 0.25 * value + 0.75 * absolute.at(-1)[i]);
-answer({ origin, alone: each(levelCount, (level) => off(file.positions(segments[level], frame, { relative: true }), less(absolute[level]))),
-         faded: off(file.positions(both, frame, { fade, relative: true }), less(mean)), moved: each(levelCount, moved),
+const alone = (level) => off(file.positions(segments[level], frame, { relative: true }), less(absolute[level]));
+answer({ origin, alone: each(levelCount, alone), moved: each(levelCount, moved),
+         faded: off(file.positions(both, frame, { fade, relative: true }), less(mean)),
          rest: off(file.rest("source", { relative: true }), less(file.rest("source", { out: wide() }))),
          lacking: thrown(() => file.positions(segments[0], frame, { fade, relative: true })),
          both: thrown(() => file.matrices(both, frame, { fade, relative: true })) });
