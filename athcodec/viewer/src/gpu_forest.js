@@ -340,7 +340,9 @@ export class ATHForest extends Group {
     const hidden = this.#look(camera, height);
     this.#loadNext(hidden);
     this.#place(seconds);
-    for (const own of this.levels) if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+    for (const own of this.levels)
+      if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+      else own.before.fill(null); // What a level showed earlier is not the image before the one that shows it again.
     this.#select();
   }
 
