@@ -26,6 +26,7 @@ SHOWN = (
     "athcodec/sample/*.ath",
     "athcodec/viewer/web/*",
     "athcodec/viewer/*.d.ts",
+    "athcodec/viewer/examples/*",
     "athcodec/viewer/src/*.d.ts",
     "athcodec/exporters/vat.md",
     "athcodec/usd/*.md",

@@ -109,6 +109,22 @@ def test_plants_of_a_forest_are_where_the_decoder_has_them(opened, grove):
     assert np.array_equal(before, got), "the previous positions are those of the picture before"
 
 
+def test_a_level_that_was_not_shown_in_the_picture_before_has_no_velocity(opened, grove):
+    """Its positions of some earlier picture would be a jump for motion blur."""
+    page = opened(grove, 4)
+    with athcodec.open(grove) as decoder:
+        level = decoder.levels[-1].level
+    shown(page, 0.0, level)
+    page.evaluate(
+        "() => { const { forest, camera } = athcodecForest; camera.position.set(0, 1, 1e7);"
+        " camera.updateMatrixWorld(); forest.update(camera, 100, 0.4); }"
+    )
+    again = shown(page, 0.8, level)
+    assert np.array_equal(again[..., 6:], again[..., :3])
+    after = shown(page, 0.85, level)
+    assert np.array_equal(after[..., 6:], again[..., :3]) and not np.array_equal(after[..., 6:], after[..., :3])
+
+
 def blocks_show(path: Path, seconds: float, weights: dict[str, float], phase: float = 0.0) -> np.ndarray:
     """(N, 3): what the blocks of the file show of its clips, each around its own time."""
     file = GpuFile(path.read_bytes())

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plants import bending_tube, distance, ring_quads, tube
+from plants import bending_tube, distance, plant, ring_quads, tube
 from programs import CACHE, install_once, printed
 from test_gltf_motion import encoded
 
@@ -53,6 +53,34 @@ def mesh_ath(tmp_path_factory):
     clip.check()
     path = tmp_path_factory.mktemp("mesh") / "mesh.ath"
     return athcodec.encode(clip, path, rel_error=1e-3, segment_frames=16).path
+
+
+# ---- far from the origin ----
+
+
+@pytest.mark.parametrize("away", [np.array([5e5, 4e6, 100.0]), np.zeros(3)])
+def test_a_plant_in_map_coordinates_keeps_its_millimetres(away, tmp_path):
+    """As floats these coordinates are a quarter of a metre apart."""
+    clip = plant(seed=4, branches=12, frames=9, dtype=np.float64)
+    clip = clip.replace(
+        positions=np.asarray(clip.positions) + away, rest=clip.rest + away, metadata={"unit": "m", "up_axis": "z"}
+    )
+    athcodec.encode(clip, tmp_path / "far.ath", max_error=1e-3, effort="fast")
+    times = [0.0, 0.11, float(clip.time[-1] - clip.time[0])]
+    result = run_node("far", tmp_path / "far.ath", *times)
+    origin = np.array(result["origin"])
+    assert np.any(origin != 0) == np.any(away != 0)
+    x, y, z = origin
+    assert np.allclose(result["place"], [x, z, -y])  # upright
+    assert np.abs(result["box"]).max() < 100 and np.abs(result["rest"]).max() < 100
+    with athcodec.open(tmp_path / "far.ath") as decoder:
+        assert len(result["shown"]) == len(times) * len(decoder.levels)
+        for shown in result["shown"]:
+            frames = decoder.at_level(shown["level"])
+            low, share = int(shown["frame"]), shown["frame"] % 1
+            between = frames[low] * (1 - share) + frames[min(low + 1, len(frames) - 1)] * share
+            for name in ("drawn", "alone"):
+                assert np.abs(np.reshape(shown[name], (-1, 3)) + origin - between[::9]).max() < 2e-4, name
 
 
 # ---- it never stops for good ----

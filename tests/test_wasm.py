@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from files import Parts
 from header import core
 from plants import awkward, clip_of, grow, plant, random_hierarchy
 from programs import printed
@@ -21,13 +22,14 @@ from test_core import FILE_ORDER, OK, SOURCE_ORDER, Player, cut
 
 import athcodec
 from athcodec._native import MEASURES
+from athcodec.decoding import container as ct
 from athcodec.decoding.container import MAJOR, MINOR
 
 pytestmark = pytest.mark.web
 
 VIEWER = Path(__file__).resolve().parent.parent / "athcodec" / "viewer"
 MODULE = VIEWER / "ath_decoder.mjs"
-MOST_BYTES = 172_000
+MOST_BYTES = 196_000
 
 
 # ---- Node ----
@@ -197,7 +199,7 @@ answer({
   errors: levels.map((level) => [0, info.segmentCount - 1].map((first) => file.levelError(level, first))),
   frameAt: ["clamp", "loop", "pingpong", "marked"].map((wrap) => file.clips.map(
     (_, clip) => seconds.map((s) => file.frameAt(s, wrap, clip)))),
-  clips: file.clips.map((clip, i) => [clip.name, clip.duration, clip.firstFrame, clip.frameCount, clip.firstSegment,
+  clips: file.clips.map((clip, i) => [clip.name, clip.lastTime, clip.firstFrame, clip.frameCount, clip.firstSegment,
                                       clip.segmentCount, clip.loop, levels.map((level) => file.seamError(i, level))]),
   names: levels.map((level) => file.levelName(level)),
   levelFor: [0, 0.1, 1, 10, 100, 1e4, 1e6].map((d) => file.levelFor(d, 0.8, 1080, 1)),
@@ -565,6 +567,216 @@ def test_a_frame_of_a_segment_that_is_not_prepared_is_an_error_that_says_which_t
     )
 
 
+# ---- static data and surfaces ----
+
+CORNERS = [0, 1, 2, 3, 2, 1, 4, 3, 4, 5]  # Of a triangle, a quad and a triangle.
+SIZES = [3, 4, 3]
+REST = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0.5], [2, 1, 0]], np.float32)
+
+
+def static_arrays() -> dict[str, np.ndarray]:
+    """One of each kind; u and v are stored per corner."""
+    uv = REST[CORNERS, :2].copy()
+    uv[3] += 0.5  # The second face has another u and v at vertex 3 than the third.
+    return {
+        "uv": uv,
+        "radius": np.random.default_rng(2).random(6),
+        "halves": np.float16([0, -2.5, 6e-8, np.inf, 0.1, 65504]),
+        "wide": np.int64([-(2**40), 2**60]),
+        "hidden": np.array([True, False, True]),
+        "colors": np.uint8([[255, 0, 51]] * 6),
+        "labels": np.char.encode(np.array(["oak", "föhre"]), "utf-8"),
+        "none": np.zeros((0, 3), np.float32),
+    }
+
+
+def surfaces(folder: Path) -> Path:
+    """Six vertices under faces of two sizes, in a loop, with static arrays."""
+    positions = REST + 0.1 * np.sin(np.arange(7))[:, None, None] * REST[None, :, ::-1]
+    clip = athcodec.MotionClip(
+        positions.astype(np.float32),
+        np.arange(7) / 24,
+        rest=REST,
+        attributes=static_arrays() | {"face_vertex_counts": np.int32(SIZES), "face_vertex_indices": np.int32(CORNERS)},
+        metadata={"unit": "cm", "domains": {"uv": "corner"}, "note": "é" * 3000},
+    )
+    athcodec.encode(athcodec.looped(clip), folder / "surfaces.ath", rel_error=1e-4, effort="fast")
+    return folder / "surfaces.ath"
+
+
+STATICS = """
+const file = AthFile.open(read(path)), names = file.attributeNames();
+const written = (value) => (Number.isFinite(value) ? value : String(value));
+const plain = ({ array, shape }) => ({ type: array.constructor.name, shape, values: Array.from(array, written) });
+answer({ metadata: file.metadata(), names, none: file.attribute("nothing"), ranges: file.attributeRanges(),
+         arrays: Object.fromEntries(names.map((name) => [name, plain(file.attribute(name))])) });
+"""
+
+
+def test_static_arrays_and_metadata_are_those_that_were_encoded(tmp_path):
+    result, wanted = run_node(tmp_path, STATICS, surfaces(tmp_path)), static_arrays()
+    assert result["metadata"]["note"] == "é" * 3000 and result["metadata"]["domains"]["uv"] == "corner"
+    assert sorted(result["names"]) == sorted(wanted)
+    types = {"halves": "Float32Array", "hidden": "Uint8Array", "labels": "Array", "wide": "BigInt64Array"}
+    types |= {"uv": "Float32Array", "radius": "Float64Array", "colors": "Uint8Array", "none": "Float32Array"}
+    for name, values in wanted.items():
+        shown = result["arrays"][name]
+        assert (shown["type"], shown["shape"]) == (types[name], list(values.shape))
+        if values.dtype.kind == "S":
+            assert shown["values"] == ["oak", "föhre"]
+        else:
+            numbers = [float(value) if value != "Infinity" else np.inf for value in shown["values"]]
+            assert np.array_equal(np.array(numbers).astype(values.dtype), values.reshape(-1))
+    assert result["none"] is None and result["ranges"] == []
+
+
+SURFACE = """
+const file = AthFile.open(read(path)), mesh = file.mesh(), positions = file.rest(), plain = AthFile.open(read(option));
+const out = new Float32Array(positions.length), normals = file.normals(positions, { out });
+answer({ triangles: [...file.triangles()], normals: [...normals], same: normals === out, rest: [...positions],
+         source: [...mesh.source], mesh: [...mesh.triangles], uv: [...mesh.uv], colors: [...mesh.colors],
+         gathered: [...mesh.gather(positions)], few: thrown(() => file.normals(positions.subarray(3))),
+         clips: file.clips, plain: [plain.triangles(), plain.mesh()] });
+"""
+
+
+def test_triangles_normals_and_a_mesh_come_without_the_loader(sample_ath, tmp_path):
+    result = run_node(tmp_path, SURFACE, surfaces(tmp_path), sample_ath)
+    rest = np.array(result["rest"]).reshape(-1, 3)
+    assert result["triangles"] == [0, 1, 2, 3, 2, 1, 3, 1, 4, 3, 4, 5]
+    normals = np.zeros((6, 3))
+    for triangle in np.reshape(result["triangles"], (-1, 3)):
+        a, b, c = rest[triangle]
+        normals[triangle] += np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    assert np.allclose(np.reshape(result["normals"], (-1, 3)), normals, atol=1e-6) and result["same"]
+    # Vertex 3 is there twice, as its u and v differ; of each corner the mesh has the vertex, u and v of the source.
+    assert sorted(result["source"]) == [0, 1, 2, 3, 3, 4, 5]
+    source, uv = np.array(result["source"]), np.reshape(result["uv"], (-1, 2))
+    corners = [0, 1, 2, 3, 4, 5, 3, 5, 6, 7, 8, 9]
+    assert source[result["mesh"]].tolist() == result["triangles"]
+    assert np.array_equal(uv[result["mesh"]], static_arrays()["uv"][corners])
+    assert np.allclose(np.reshape(result["colors"], (-1, 4)), [1, 0, 0.2, 1])
+    assert np.array_equal(np.reshape(result["gathered"], (-1, 3)), rest[source])
+    assert result["few"]["type"] == "RangeError" and result["plain"] == [None, None]
+
+
+def test_the_duration_of_a_loop_is_its_round_and_that_of_others_the_time_of_their_last_frame(sample_ath, tmp_path):
+    (loop,) = run_node(tmp_path, SURFACE, surfaces(tmp_path), sample_ath)["clips"]
+    assert loop["loop"] and loop["duration"] == pytest.approx(7 / 24) and loop["lastTime"] == pytest.approx(6 / 24)
+    script = """
+    const file = AthFile.open(read(path)), [clip] = file.clips;
+    const at = (rounds) => file.frameAt(rounds * clip.duration, "marked");
+    answer({ ...clip, end: at(1), beyond: at(8) });
+    """
+    still = run_node(tmp_path, script, sample_ath)
+    assert not still["loop"] and still["duration"] == still["lastTime"] > 0
+    assert still["end"] == still["beyond"] == still["frameCount"] - 1
+    turned = run_node(tmp_path, script, surfaces(tmp_path))
+    assert turned["end"] == turned["beyond"] == 0
+
+
+ABSENT = """
+const bytes = read(path), whole = AthFile.open(bytes), file = AthFile.open(bytes.subarray(0, whole.info.preludeLength));
+const first = thrown(() => file.attribute("uv")), mesh = thrown(() => file.mesh()), ranges = file.attributeRanges();
+for (const { offset, size } of ranges) file.feed(bytes.subarray(offset, offset + size), offset);
+answer({ first, mesh, count: ranges.length, fed: file.attributeNames(), uv: [...file.attribute("uv").array] });
+"""
+
+
+def test_arrays_that_are_still_to_come_are_missing_and_not_absent(tmp_path):
+    result = run_node(tmp_path, ABSENT, surfaces(tmp_path))
+    assert result["first"]["codeName"] == result["mesh"]["codeName"] == "MISSING"
+    assert "attributeRanges()" in result["first"]["message"] and result["count"] == 1
+    assert len(result["fed"]) == 8 and len(result["uv"]) == 20
+
+
+FAR = """
+const file = AthFile.open(read(path)), { origin, levelCount } = file.info, frame = 2.25;
+const largest = (numbers) => Math.max(...numbers.map(Math.abs));
+const wide = () => new Float64Array(3 * file.info.vertexCount);
+const off = (shown, wanted) => largest(Array.from(shown, (value, i) => value - wanted[i]));
+const segments = each(levelCount, (level) => prepareAll(file, level));
+const absolute = segments.map((some) => file.positions(some, frame, { out: wide() }));
+const less = (numbers) => numbers.map((value, i) => value - origin[i % 3]);
+const moved = (level) => {
+  const rest = file.levelRest(level, "file", { relative: true }), parts = file.parts(level);
+  const m = file.matrices(segments[level], frame, { relative: true });
+  const xyz = file.positions(segments[level], frame, { relative: true, order: "file" });
+  const offIn = (part) => largest(each(3 * parts.count[part], (i) => {
+    const v = 3 * (parts.first[part] + Math.floor(i / 3)), row = 12 * parts.index[part] + 4 * (i % 3);
+    return m[row] * rest[v] + m[row + 1] * rest[v + 1] + m[row + 2] * rest[v + 2] + m[row + 3] - xyz[v + i % 3];
+  }));
+  return Math.max(0, ...each(parts.partCount, (part) => (parts.branch[part] < 0 ? 0 : offIn(part))));
+};
+const fade = { levels: [0, levelCount - 1], weights: [0.25, 0.75] }, both = [...segments[0], ...segments.at(-1)];
+const mean = absolute[0].map((value, i) => 0.25 * value + 0.75 * absolute.at(-1)[i]);
+const alone = (level) => off(file.positions(segments[level], frame, { relative: true }), less(absolute[level]));
+answer({ origin, alone: each(levelCount, alone), moved: each(levelCount, moved),
+         faded: off(file.positions(both, frame, { fade, relative: true }), less(mean)),
+         rest: off(file.rest("source", { relative: true }), less(file.rest("source", { out: wide() }))),
+         lacking: thrown(() => file.positions(segments[0], frame, { fade, relative: true })),
+         both: thrown(() => file.matrices(both, frame, { fade, relative: true })) });
+"""
+
+
+def test_relative_positions_are_fine_far_from_the_origin(tmp_path):
+    """As floats the coordinates themselves are a quarter of a metre apart."""
+    clip = plant(seed=4, branches=12, frames=9, dtype=np.float64, offset=4e6)
+    athcodec.encode(clip, tmp_path / "far.ath", max_error=1e-3, effort="fast")
+    result = run_node(tmp_path, FAR, tmp_path / "far.ath")
+    assert max(result["origin"]) > 1e6
+    assert max(*result["alone"], *result["moved"], result["faded"], result["rest"]) < 2e-5
+    assert result["lacking"]["codeName"] == "NOT_PREPARED" and result["both"]["type"] == "TypeError"
+
+
+REFUSED = """
+const refusal = (name) => thrown(() => AthFile.open(read(`${path}/${name}`)).attribute("a"));
+answer(JSON.parse(option).map((name) => refusal(name)?.codeName ?? null));
+"""
+
+
+def test_static_arrays_that_are_damaged_are_refused(tmp_path):
+    """With the codes of FORMAT.md; the checksums of these chunks fit."""
+    from test_damage import attribute, zstd
+
+    values = np.float32([1, 2, 3, 4])
+    body, twice = zstd(values.view(np.uint8).reshape(-1, 4).T.tobytes()), zstd(bytes(32))
+    bad, most = "BAD_CHUNK", "LIMIT_EXCEEDED"
+    cases = [
+        (attribute(body), None),
+        (attribute(body[:-1]), bad),
+        (attribute(twice), bad),
+        (attribute(body + body), bad),
+        (attribute(b"1234" + body), bad),
+        (attribute(body, kind=5), bad),
+        (attribute(body, size=3), bad),
+        (attribute(body, name=b""), bad),
+        (attribute(body, name=b"\xff"), bad),
+        (attribute(body, name=b"a" * 5000), most),
+        (attribute(body, shape=[2**31, 0, 4]), most),
+        (attribute(body, shape=[0]), bad),
+        (attribute(b"", shape=[4]), bad),
+        (attribute(body)[:7], bad),
+        (attribute(body)[:11], bad),
+    ]
+    names = []
+    for i, (payload, _) in enumerate(cases):
+        names.append(f"{i}.ath")
+        (tmp_path / names[-1]).write_bytes(with_array(tmp_path, payload))
+    assert run_node(tmp_path, REFUSED, tmp_path, json.dumps(names)) == [code for _, code in cases]
+
+
+def with_array(folder: Path, payload: bytes) -> bytes:
+    """A small file whose only static array is this chunk."""
+    path = folder / "one.ath"
+    if not path.exists():
+        clip = key_framed()
+        clip.attributes["a"] = np.zeros(4, np.float32)
+        athcodec.encode(clip, path, effort="fast")
+    return Parts.of(path.read_bytes()).with_payload(ct.ATTRIBUTE, payload)
+
+
 # ---- the module ----
 
 
@@ -575,6 +787,7 @@ def test_the_module_is_small_imports_nothing_and_fetches_nothing():
 
 
 MEMBERS = """
+const leafy = AthFile.open(read(option));
 const file = AthFile.open(read(path)), segment = file.prepare(0, 0), preparation = file.preparation(0, 0);
 const of = (value) => [value, Object.getPrototypeOf(value)].flatMap((one) => Object.getOwnPropertyNames(one))
   .filter((name) => name !== "constructor").sort();
@@ -583,6 +796,7 @@ answer({ AthFile: [...of(file), "front", "open"].sort(), AthFade: of(new AthFade
          AthInfo: Object.keys(file.info).sort(), Branches: Object.keys(file.branches()).sort(),
          Parts: Object.keys(file.parts(0)).sort(), Chunk: Object.keys(file.chunks()[0]).sort(),
          Polygons: Object.keys(file.polygons("edges")).sort(),
+         Attribute: Object.keys(leafy.attribute("uv")).sort(), Mesh: of(leafy.mesh()),
          Clip: Object.keys(file.clips[0]).sort(), ByteRange: Object.keys(file.ranges(0, 0, 0, true)[0]).sort() });
 """
 
@@ -595,7 +809,7 @@ def test_every_member_is_declared_for_typescript_and_no_others(sample_ath, tmp_p
         members = re.findall(r"^  (?:(?:readonly|static) )*(\w+)(?:<[^(]*>)?[(:?]", body, flags=re.M)
         declared[name] = sorted(set(members) - {"private", "constructor"})
     del declared["AthError"]
-    assert run_node(tmp_path, MEMBERS, sample_ath) == declared
+    assert run_node(tmp_path, MEMBERS, sample_ath, surfaces(tmp_path)) == declared
 
 
 def check_build(viewer: Path) -> subprocess.CompletedProcess:

@@ -64,7 +64,7 @@ export interface AthInfo {
   /** Largest distance of any vertex in any frame from the clip that was encoded, promised for the deepest
    * level of the file as encoded (fullLevelCount - 1). */
   readonly maxError: number;
-  /** x, y, z that the file's numbers are relative to. For information: positions are absolute. */
+  /** x, y, z that the file's numbers are relative to. Positions are absolute unless you ask for `relative` ones. */
   readonly origin: readonly [number, number, number];
   /** Vertices of the source, which order "source" has. */
   readonly vertexCount: number;
@@ -101,8 +101,10 @@ export interface AthInfo {
 export interface Clip {
   /** Empty where the only clip of a file has none. */
   readonly name: string;
-  /** Seconds from the first frame to the last. */
+  /** Seconds of the clip played once: for a loop a whole round, with the way from its last frame back to its first. */
   readonly duration: number;
+  /** Seconds from the first frame to the last. */
+  readonly lastTime: number;
   readonly firstFrame: number;
   readonly frameCount: number;
   readonly firstSegment: number;
@@ -159,8 +161,32 @@ export interface Polygons {
   derived: boolean;
 }
 
-/** Kinds and what they hold: FORMAT.md, "Chunk table". Static data, as stored, zstd frames and all:
- * METADATA 0x8004, ATTRIBUTE 0x8020; for FACES 0x8005 and EDGES 0x8006 see AthFile.polygons(). */
+/** A static array of the source, row by row. Booleans are a Uint8Array in which 0 is false, halves a Float32Array, integers of 8
+ * bytes a BigInt64Array or BigUint64Array, texts strings. */
+export interface Attribute {
+  readonly array: Uint8Array | Uint16Array | Uint32Array | Int8Array | Int16Array | Int32Array | Float32Array | Float64Array
+    | BigInt64Array | BigUint64Array | string[];
+  /** Rows, then numbers per row; empty for a single element. */
+  readonly shape: readonly number[];
+}
+
+/** What an engine's buffers hold beside positions and normals. A vertex of the source is one vertex of the mesh, or several where uv or
+ * colors are stored per corner and differ between its faces. */
+export interface Mesh {
+  /** The vertex of the source that each vertex of the mesh is. */
+  readonly source: Uint32Array;
+  /** Three vertices of the mesh each, in the order of the faces; faces of more corners are fans. */
+  readonly triangles: Uint32Array;
+  /** Texture coordinates as the source has them, 2 numbers per vertex of the mesh; null: the file has none. */
+  readonly uv: Float32Array | null;
+  /** Red, green, blue and alpha from 0 to 1, 4 numbers per vertex of the mesh; null: the file has none. */
+  readonly colors: Float32Array | null;
+  /** Positions or normals of the source's vertices, 3 numbers each, as those of the mesh. They go to `out` if given. */
+  gather(values: ArrayLike<number>, out?: Float32Array): Float32Array;
+}
+
+/** Kinds and what they hold: FORMAT.md, "Chunk table". For METADATA 0x8004 see AthFile.metadata(), for ATTRIBUTE 0x8020
+ * attribute(), for FACES 0x8005 and EDGES 0x8006 polygons(). */
 export interface Chunk {
   readonly kind: number;
   /** 255: not of a level. */
@@ -275,12 +301,12 @@ export class AthFile {
   /** The rest pose of the source, 3 numbers per vertex; order "source" by default. Where the source gave none it is the
    * finest reference pose that has been read; after levelRest() of a deeper level it is closer to the source's. Throws
    * MISSING where its chunk, SOURCE_REST, which stands behind the motion, is still to come: no player needs it. */
-  rest(order?: Order): Float32Array;
-  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T }): T;
+  rest(order?: Order, options?: { relative?: boolean }): Float32Array;
+  rest<T extends Float32Array | Float64Array>(order: Order, options: { out: T; relative?: boolean }): T;
   /** The reference pose of a level, which it moves and which its matrices apply to. It is the same for all levels with
    * nodes above 0. Throws MISSING where bytes of it are still to come. */
-  levelRest(level: number, order?: Order): Float32Array;
-  levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T }): T;
+  levelRest(level: number, order?: Order, options?: { relative?: boolean }): Float32Array;
+  levelRest<T extends Float32Array | Float64Array>(level: number, order: Order, options: { out: T; relative?: boolean }): T;
   /** Error of showing a level, measured by the encoder, over the segments `first` to `last` (default: all). */
   levelError(level: number, first?: number, last?: number): Errors;
   /** Describes a level for people: "depth 1", "layer 2 of 3", "all branches", "lossless". */
@@ -298,6 +324,25 @@ export class AthFile {
   /** Faces or edges, null where the file has none: vertices in source order, of `columns` corners each or, where there are
    * `counts`, of these. Edges that are `derived` are not stored: they follow from the branches. */
   polygons(name: "faces" | "edges"): Polygons | null;
+
+  /** What the source said of itself, such as { unit: "m", up_axis: "y" }: a JSON object, empty where it said nothing. */
+  metadata(): Record<string, any>;
+  /** Names of the static arrays whose bytes are here, such as "uv" or "radius". */
+  attributeNames(): string[];
+  /** Bytes of static arrays that are not here. No level needs them; they may stand behind the motion. */
+  attributeRanges(): ByteRange[];
+  /** A static array, unpacked; null where the file has none of that name. Throws AthError: "MISSING" while the array may be among
+   * those that are still to come, "BAD_CHECKSUM", "BAD_CHUNK", "LIMIT_EXCEEDED". */
+  attribute(name: string): Attribute | null;
+
+  /** The faces as triangles, three vertices of the source each; faces of more corners are fans. Null: the file has no faces. */
+  triangles(): Uint32Array | null;
+  /** Unit normals of vertices at `positions`, both in the source's order, 3 numbers each: those of the triangles around each, weighted
+   * by area. A vertex without triangles gets one that points away from the middle. They go to `out` if given. */
+  normals(positions: ArrayLike<number>, options?: { out?: Float32Array }): Float32Array;
+  /** Triangles, texture coordinates and colours for an engine; null: the file has no faces. Feed attributeRanges() before: throws
+   * AthError, "MISSING", as attribute() does. */
+  mesh(): Mesh | null;
 
   /** Hands over `bytes`, the file's from `offset` on. Chunks that lie inside can be used from now on; one
    * that begins inside goes on with the piece that continues it, so the pieces of one download can be fed
@@ -350,11 +395,13 @@ export class AthFile {
    * frame.
    */
 
-  /** All vertices, 3 numbers each; order "source" by default. */
-  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null }): Float32Array;
-  positions(segments: Segments, frame: number, options: { out: Float32Array; order?: Order; fade: Fading }): Float32Array;
+  /** All vertices, 3 numbers each; order "source" by default. relative: less info.origin, for an object that an engine puts there.
+   * Floats of positions far from 0, such as UTM coordinates, are too coarse; these are not. */
+  positions(segments: Segments, frame: number, options?: { order?: Order; fade?: Fading | null; relative?: boolean }): Float32Array;
+  positions(segments: Segments, frame: number,
+            options: { out: Float32Array; order?: Order; fade: Fading; relative?: boolean }): Float32Array;
   positions<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                   options: { out: T; order?: Order }): T;
+                                                   options: { out: T; order?: Order; relative?: boolean }): T;
   /** Up to four clips blended along the branches, each at its own frame and level: branches stay attached, edges of stems
    * are as long as those of the clips in their weighted mean. Weights need not add up to 1; a share of none is passed over,
    * and one that is left alone has the bits of positions(). */
@@ -371,11 +418,11 @@ export class AthFile {
   ): number[];
 
   /** For skinning on the GPU: parts().nodeCount matrices of 12 numbers, from levelRest(level, "file") to
-   * positions.
+   * positions; with `relative`, which takes no fade, from relative ones to relative ones.
    * Vertices of exact runs have none, exact() has them. */
   matrices(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
   matrices<T extends Float32Array | Float64Array>(segments: Segments, frame: number,
-                                                  options: { out: T }): T;
+                                                  options: { out?: T; relative?: boolean }): T;
   /** parts().exactCount positions of 3 numbers, in file order. */
   exact(segments: Segments, frame: number, options?: { out?: Float32Array; fade?: Fading | null }): Float32Array;
 

@@ -5,7 +5,10 @@
 
 const WASM = "@WASM@"; // zlib, base64
 
-const OK = 0, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
+// @include web/zstd.js
+// @include src/normals.js
+
+const OK = 0, BAD_CHUNK = 9, LIMIT_EXCEEDED = 10, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };
 const MEASURES = { max: 0, p99: 1, rms: 2 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
@@ -21,7 +24,7 @@ const INFO = {
 };
 const INFO_SIZE = 120;
 const CLIP = {
-  name: "u32", duration: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
+  name: "u32", lastTime: "f64", firstFrame: "i32", frameCount: "i32", firstSegment: "i32", segmentCount: "i32",
   loop: "i32",
 };
 const CLIP_SIZE = 40;
@@ -35,6 +38,15 @@ const FAULT = { code: "i32", field: "i32", chunk: "i32" }; // ath_fault_text rea
 const FAULT_SIZE = 56, LIMITS_SIZE = 40, FAULT_TEXT = 256, LEVEL_NAME = 32;
 const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed: "u8", isDerived: "u8" };
 const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 5, edges: 0x8006 };
+const METADATA = 0x8004, ATTRIBUTE = 0x8020;
+const MOST_TEXT = 2 ** 20, MOST_ARRAY = 2 ** 28, MOST_NAME = 4096, MOST_WINDOW = 2 ** 23, MOST_DIMENSIONS = 32; // FORMAT.md, "Limits"
+// The arrays that hold the elements of each kind, by their bytes. Halves are widened, and texts become strings.
+const [FLOATS, TEXTS] = [3, 4], ELEMENTS = [
+  { 1: Uint8Array },
+  { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array, 8: BigUint64Array },
+  { 1: Int8Array, 2: Int16Array, 4: Int32Array, 8: BigInt64Array },
+  { 2: Uint16Array, 4: Float32Array, 8: Float64Array },
+];
 const RANGE = { offset: "u64", size: "u64" };
 const RANGE_SIZE = 16;
 const SHARE_SIZE = 24, BLEND_CLIPS = 4;
@@ -279,6 +291,67 @@ function asOut(out, length, types) {
   throw new RangeError(`out: got ${got}, expected ${names} of ${length}`);
 }
 
+// ---- static data ----
+
+const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
+
+// Returns {window, size} of the frame's header: 0 for no window beside the content, -1 for a size that is not stated; null: this is no frame.
+function zstdHeader(frame) {
+  if (frame.length < 6 || frame[0] !== 0x28 || frame[1] !== 0xb5 || frame[2] !== 0x2f || frame[3] !== 0xfd) return null;
+  const descriptor = frame[4], single = (descriptor >> 5) & 1, window = single ? 0 : (8 + (frame[5] & 7)) * 2 ** (7 + (frame[5] >> 3));
+  const bytes = [single, 2, 4, 8][descriptor >> 6], at = 5 + (single ? 0 : 1) + [0, 1, 2, 4][descriptor & 3];
+  if (bytes === 0 || at + bytes > frame.length) return { window, size: -1 };
+  let size = 0;
+  for (let i = bytes - 1; i >= 0; i--) size = size * 256 + frame[at + i];
+  return { window, size: bytes === 2 ? size + 256 : size };
+}
+
+// Puts planes of bytes back into elements of `size` bytes.
+function unshuffle(planes, count, size) {
+  if (size === 1) return planes;
+  const out = new Uint8Array(count * size);
+  for (let k = 0; k < size; k++)
+    for (let i = 0, from = k * count, to = k; i < count; i++, to += size) out[to] = planes[from + i];
+  return out;
+}
+
+function widened(halves) {
+  return Float32Array.from(halves, (bits) => {
+    const sign = bits & 0x8000 ? -1 : 1, exponent = (bits >> 10) & 31, fraction = bits & 1023;
+    if (exponent === 31) return fraction ? NaN : sign * Infinity;
+    return sign * (exponent ? (1 + fraction / 1024) * 2 ** (exponent - 15) : fraction * 2 ** -24);
+  });
+}
+
+function stringsOf(bytes, size) {
+  return Array.from({ length: bytes.length / size }, (_, i) =>
+    new TextDecoder().decode(bytes.subarray(i * size, (i + 1) * size)).replace(/\0+$/, ""));
+}
+
+// Returns the triangles of polygons as fans, as the C player makes them: `at(k)` is what stands for corner k.
+function fans({ array, columns, counts }, at) {
+  const faces = counts ? counts.length : array.length / (columns || 1), sizeOf = (face) => (counts ? counts[face] : columns);
+  let count = 0, to = 0;
+  for (let face = 0; face < faces; face++) count += Math.max(sizeOf(face) - 2, 0);
+  const out = new Uint32Array(3 * count);
+  for (let face = 0, first = 0; face < faces; first += sizeOf(face++))
+    for (let k = 2; k < sizeOf(face); k++, to += 3) out.set([at(first), at(first + k - 1), at(first + k)], to);
+  return out;
+}
+
+class Mesh {
+  constructor(source, triangles, uv, colors) {
+    Object.assign(this, { source, triangles, uv, colors });
+  }
+
+  gather(values, out) {
+    const { source } = this, result = asOut(out, 3 * source.length, [Float32Array]);
+    for (let i = 0; i < source.length; i++)
+      for (let k = 0; k < 3; k++) result[3 * i + k] = values[3 * source[i] + k];
+    return result;
+  }
+}
+
 // ---- from level to level ----
 
 export class AthFade {
@@ -377,6 +450,7 @@ export class AthFile {
   #works = [];            // ath_works that nobody uses
   #scratch = { at: 0, size: 0 };
   #cutSizes = [];
+  #triangles = null;      // those of normals()
 
   static front(bytes) {
     shared ??= new Core();
@@ -441,8 +515,9 @@ export class AthFile {
   #clipTable() {
     const at = this.#core.c.ath_clips(this.#at) >>> 0;
     return Object.freeze(Array.from({ length: this.info.clipCount }, (_, i) => {
-      const { name, loop, ...clip } = this.#core.struct(CLIP, at + i * CLIP_SIZE);
-      return Object.freeze({ name: this.#core.text(name), loop: loop !== 0, ...clip });
+      const { name, loop, ...clip } = this.#core.struct(CLIP, at + i * CLIP_SIZE), { lastTime, frameCount } = clip;
+      const back = loop && frameCount > 1 ? lastTime / (frameCount - 1) : 0; // from the last frame to the first
+      return Object.freeze({ name: this.#core.text(name), loop: loop !== 0, duration: lastTime + back, ...clip });
     }));
   }
 
@@ -524,14 +599,14 @@ export class AthFile {
     return this.#core.copy(Float64Array, this.#c.ath_times(this.#at), this.info.frameCount);
   }
 
-  rest(order = "source", { out } = {}) {
+  rest(order = "source", { out, relative = false } = {}) {
     this.#checkFault((fault) => this.#c.ath_read_rest(this.#at, fault));
-    return this.#pose(out, order, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
+    return this.#pose(out, order, relative, (which, at) => this.#c.ath_rest_float64(this.#at, which, at, 24));
   }
 
-  levelRest(level, order = "source", { out } = {}) {
+  levelRest(level, order = "source", { out, relative = false } = {}) {
     this.#refineSize(this.#level(level));
-    return this.#pose(out, order, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
+    return this.#pose(out, order, relative, (which, at) => this.#c.ath_level_rest(this.#at, level, which, at, 24));
   }
 
   // Its number, and the numbers of all its vertices.
@@ -540,10 +615,18 @@ export class AthFile {
     return [which, 3 * (which === ORDERS.file ? this.info.placeCount : this.info.vertexCount)];
   }
 
-  #pose(out, order, fill) {
+  #pose(out, order, relative, fill) {
     const [which, length] = this.#order(order), result = asOut(out, length, [Float32Array, Float64Array]);
-    result.set(this.#fill(new Float64Array(length), length, (at) => fill(which, at)));
+    const pose = this.#fill(new Float64Array(length), length, (at) => fill(which, at));
+    result.set(relative ? this.#relative(pose) : pose);
     return result;
+  }
+
+  // Takes the origin from positions, before they become floats.
+  #relative(positions) {
+    const { origin } = this.info;
+    for (let i = 0; i < positions.length; i++) positions[i] -= origin[i % 3];
+    return positions;
   }
 
   levelError(level, first = 0, last = this.info.segmentCount - 1) {
@@ -606,6 +689,181 @@ export class AthFile {
         derived: isDerived === 1,
       };
     });
+  }
+
+  // ---- static data ----
+
+  #wrong(index, what, code = BAD_CHUNK) {
+    return this.#core.error(code, what, { chunk: index });
+  }
+
+  // Returns what a frame holds. size: the bytes that it has to have; null: up to `most`, as it states.
+  #unpack(index, frame, size, most) {
+    const header = zstdHeader(frame);
+    if (!header || header.size <= 0 || (size !== null && header.size !== size))
+      throw this.#wrong(index, `chunk ${index}: got a zstd frame of ${header?.size ?? "no"} bytes, expected ${size ?? "its size"}`);
+    if (header.size > most || header.window > Math.max(MOST_WINDOW, size ?? 0))
+      throw this.#wrong(index, `chunk ${index}: got ${header.size} bytes in a zstd frame, expected at most ${most}`, LIMIT_EXCEEDED);
+    let content = null;
+    try {
+      content = zstd.decompress(frame);
+    } catch {
+      // A frame that is damaged gives no content.
+    }
+    if (content?.length === header.size) return content;
+    throw this.#wrong(index, `chunk ${index}: got a damaged zstd frame, expected ${header.size} bytes in it`);
+  }
+
+  #text(index, bytes, what) {
+    try {
+      return utf8.decode(bytes);
+    } catch {
+      throw this.#wrong(index, `${what}: got bytes that are no UTF-8`);
+    }
+  }
+
+  // The bytes of a chunk, which has to be here.
+  #here(index) {
+    const bytes = this.chunkBytes(index);
+    if (bytes) return bytes;
+    const { offset, length } = this.#chunks[index];
+    throw this.#core.error(MISSING, `chunk ${index}: got none of its bytes, expected ${length} from ${offset} on`, { chunk: index });
+  }
+
+  metadata() {
+    const index = this.#chunks.findIndex(({ kind }) => kind === METADATA);
+    if (index < 0) return {};
+    const bytes = this.#here(index), body = bytes.subarray(1);
+    if (bytes.length < 1 || bytes[0] > 1) throw this.#wrong(index, `metadata: got form ${bytes[0]}, expected 0 or 1`);
+    const text = this.#text(index, bytes[0] === 1 ? this.#unpack(index, body, null, MOST_TEXT) : body, "metadata");
+    try {
+      return JSON.parse(text);
+    } catch {
+      throw this.#wrong(index, "metadata: got something else, expected a JSON object");
+    }
+  }
+
+  // The head of a static array, and its packed body.
+  #array(index) {
+    const bytes = this.#here(index), view = new DataView(bytes.buffer), wrong = (what) => this.#wrong(index, `static array: got ${what}`);
+    if (bytes.length < 8) throw wrong(`${bytes.length} bytes, expected a head of at least 8`);
+    const [kind, dimensions] = bytes, start = 8 + 4 * dimensions, nameEnd = start + view.getUint16(2, true), size = view.getUint32(4, true);
+    if (nameEnd > bytes.length || nameEnd === start || dimensions > MOST_DIMENSIONS) throw wrong(`no head in ${bytes.length} bytes`);
+    if (kind > TEXTS || !(kind === TEXTS ? size >= 1 && size <= MOST_TEXT : ELEMENTS[kind][size])) throw wrong(`kind ${kind} of ${size} bytes`);
+    if (nameEnd - start > MOST_NAME) throw this.#wrong(index, `static array: got a name of ${nameEnd - start} bytes`, LIMIT_EXCEEDED);
+    const name = this.#text(index, bytes.subarray(start, nameEnd), "name of a static array");
+    const shape = Array.from({ length: dimensions }, (_, d) => view.getUint32(8 + 4 * d, true));
+    if (shape.reduce((product, n) => product * (n || 1), size) > MOST_ARRAY)
+      throw this.#wrong(index, `static array ${name}: got a shape of ${shape.join(" x ")}, expected at most ${MOST_ARRAY} bytes`, LIMIT_EXCEEDED);
+    return { name, kind, size, shape, body: bytes.subarray(nameEnd) };
+  }
+
+  // The chunks of static arrays, as {index, fed}.
+  #arrays() {
+    return this.#chunks.flatMap(({ kind, fed }, index) => (kind === ATTRIBUTE ? [{ index, fed }] : []));
+  }
+
+  attributeNames() {
+    return this.#arrays().filter(({ fed }) => fed).map(({ index }) => this.#array(index).name);
+  }
+
+  attributeRanges() {
+    const ranges = [];
+    for (const { index, fed } of this.#arrays()) {
+      const { offset, length } = this.#chunks[index], last = ranges.at(-1);
+      if (fed) continue;
+      if (last && last.offset + last.size === offset) last.size += length;
+      else ranges.push({ offset, size: length });
+    }
+    return ranges;
+  }
+
+  attribute(name) {
+    const arrays = this.#arrays(), left = arrays.find(({ fed }) => !fed);
+    let failure = null; // of an array before, whose name may be this one
+    for (const { index } of arrays.filter(({ fed }) => fed)) {
+      try {
+        if (this.#array(index).name !== name) continue;
+      } catch (error) {
+        failure ??= error;
+        continue;
+      }
+      return this.#elements(index);
+    }
+    if (failure) throw failure;
+    if (left) throw this.#core.error(MISSING, `static array ${name}: got no bytes of chunk ${left.index}, which may hold it; expected those `
+      + "of attributeRanges()", { chunk: left.index });
+    return null;
+  }
+
+  #elements(index) {
+    const { name, kind, size, shape, body } = this.#array(index), count = shape.reduce((product, n) => product * n, 1);
+    if (count === 0 && body.length > 0) throw this.#wrong(index, `static array ${name}: got ${body.length} bytes of no elements`);
+    const bytes = count > 0 ? unshuffle(this.#unpack(index, body, count * size, MOST_ARRAY), count, size) : new Uint8Array(0);
+    if (kind === TEXTS) return { array: stringsOf(bytes, size), shape };
+    const whole = bytes.byteOffset % size ? bytes.slice() : bytes, array = new ELEMENTS[kind][size](whole.buffer, whole.byteOffset, count);
+    return { array: kind === FLOATS && size === 2 ? widened(array) : array, shape };
+  }
+
+  // ---- surfaces ----
+
+  // The faces of FACES, or of the two arrays that other programs keep faces of different sizes in; null where there are none.
+  #faces() {
+    const faces = this.polygons("faces"), names = faces ? [] : this.attributeNames();
+    if (faces || !["face_vertex_counts", "face_vertex_indices"].every((name) => names.includes(name))) return faces;
+    const [counts, array] = ["face_vertex_counts", "face_vertex_indices"].map((name) => Uint32Array.from(this.attribute(name).array, Number));
+    const corners = counts.reduce((sum, count) => sum + count, 0), vertex = array.find((each) => each >= this.info.vertexCount);
+    if (corners === array.length && vertex === undefined) return { array, columns: 0, counts };
+    throw this.#core.error(BAD_CHUNK, `face_vertex_indices: got ${array.length} corners${vertex === undefined ? "" : ` and vertex ${vertex}`}, `
+      + `expected ${corners} of ${this.info.vertexCount} vertices`);
+  }
+
+  triangles() {
+    const faces = this.#faces();
+    return faces && fans(faces, (corner) => faces.array[corner]);
+  }
+
+  normals(positions, { out } = {}) {
+    const result = asOut(out, positions.length, [Float32Array]);
+    if (positions.length !== 3 * this.info.vertexCount)
+      throw new RangeError(`positions: got ${positions.length} numbers, expected ${3 * this.info.vertexCount}, in the source's order`);
+    this.#triangles ??= this.triangles() ?? new Uint32Array(0);
+    result.set(normals(positions, { array: this.#triangles, columns: 3 }));
+    return result;
+  }
+
+  // An array with a row per corner or vertex, as floats; null where there is none that fits.
+  #rows(name, sizes, perCorner, rows) {
+    const found = this.attribute(name), { shape, array } = found ?? {};
+    if (shape?.length !== 2 || shape[0] !== rows || !sizes.includes(shape[1]) || typeof array[0] !== "number") return null;
+    const scale = array instanceof Uint8Array ? 1 / 255 : 1;
+    return { values: Float32Array.from(array, (value) => value * scale), size: shape[1], perCorner };
+  }
+
+  mesh() {
+    const faces = this.#faces();
+    if (!faces) return null;
+    const domains = this.metadata().domains ?? {}, { vertexCount } = this.info, corners = faces.array;
+    const [uv, colors] = [["uv", [2]], ["colors", [3, 4]]].map(([name, sizes]) =>
+      this.#rows(name, sizes, domains[name] === "corner", domains[name] === "corner" ? corners.length : vertexCount));
+    const split = [uv, colors].filter((rows) => rows?.perCorner);
+    let source = Uint32Array.from({ length: vertexCount }, (_, i) => i), first = source, at = (corner) => corners[corner];
+    if (split.length > 0) { // corners of one vertex and one look are one vertex of the mesh
+      const numbers = new Map(), of = new Uint32Array(corners.length), kept = [];
+      corners.forEach((vertex, corner) => {
+        const look = split.flatMap(({ values, size }) => [...values.subarray(corner * size, (corner + 1) * size)]), key = `${vertex},${look}`;
+        if (!numbers.has(key)) numbers.set(key, kept.push(corner) - 1);
+        of[corner] = numbers.get(key);
+      });
+      first = Uint32Array.from(kept);
+      source = first.map((corner) => corners[corner]);
+      at = (corner) => of[corner];
+    }
+    const taken = (rows, size) => rows && Float32Array.from({ length: size * source.length }, (_, i) => {
+      const from = rows.perCorner ? first[Math.floor(i / size)] : source[Math.floor(i / size)], k = i % size;
+      return k < rows.size ? rows.values[from * rows.size + k] : 1;
+    });
+    return new Mesh(source, fans(faces, at), taken(uv, 2), taken(colors, 4));
   }
 
   // ---- bytes ----
@@ -867,14 +1125,35 @@ export class AthFile {
     return Math.max(0, ...Array.from(levels, (level) => this.#cutSize(this.#level(level))[k]));
   }
 
-  positions(segments, frame, { out, order = "source", fade = null } = {}) {
+  positions(segments, frame, { out, order = "source", fade = null, relative = false } = {}) {
     const c = this.#c, [which, length] = this.#order(order);
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (relative) return this.#relativePositions(segments, frame, result, length, order, fade);
     if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
       c.ath_faded_positions(this.#at, array, count, frame, faded, which, at, 12));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_positions_float64(this.#at, array, count, frame, which, at, 24)
       : c.ath_positions(this.#at, array, count, frame, which, at, 12));
+  }
+
+  // The levels of a fade are added up here, as the core adds up floats, which are too coarse far from the origin.
+  #relativePositions(segments, frame, result, length, order, fade) {
+    const shown = (some) => this.#relative(this.positions(some, frame, { out: new Float64Array(length), order }));
+    if (!fade) {
+      result.set(shown(segments));
+      return result;
+    }
+    const shares = new Map();
+    fade.levels.forEach((level, i) => shares.set(level, (shares.get(level) ?? 0) + fade.weights[i]));
+    const sum = new Float64Array(length), all = Array.from(segments).filter((segment) => segment && !segment.freed);
+    for (const [level, weight] of shares) {
+      if (weight === 0) continue;
+      const own = all.filter((segment) => segment.level === level);
+      if (own.length === 0) throw this.#core.error(NOT_PREPARED, this.#lacking(segments, frame, [level]));
+      shown(own).forEach((value, i) => { sum[i] += weight * value; });
+    }
+    result.set(sum);
+    return result;
   }
 
   // Shares are { segments, frame, weight }.
@@ -914,14 +1193,24 @@ export class AthFile {
     });
   }
 
-  matrices(segments, frame, { out, fade = null } = {}) {
+  matrices(segments, frame, { out, fade = null, relative = false } = {}) {
     const c = this.#c, length = 12 * this.#most(segments, fade, 1);
     const result = asOut(out, length, [Float32Array, Float64Array]);
+    if (relative && fade) throw new TypeError("relative: got true and a fade, expected one of the two");
+    if (relative) return this.#relativeMatrices(segments, frame, result, length);
     if (fade) return this.#showFaded(fade, segments, frame, result, length, (array, count, faded, at) =>
       c.ath_faded_matrices(this.#at, array, count, frame, faded, at, 48));
     return this.#show(segments, frame, result, length, (array, count, at) => result instanceof Float64Array
       ? c.ath_matrices_float64(this.#at, array, count, frame, at, 96)
       : c.ath_matrices(this.#at, array, count, frame, at, 48));
+  }
+
+  // Matrices that take a rest pose less the origin to positions less the origin.
+  #relativeMatrices(segments, frame, result, length) {
+    const m = this.matrices(segments, frame, { out: new Float64Array(length) }), { origin: [x, y, z] } = this.info;
+    for (let i = 0; i < length; i += 4) m[i + 3] += m[i] * x + m[i + 1] * y + m[i + 2] * z - this.info.origin[i / 4 % 3];
+    result.set(m);
+    return result;
   }
 
   exact(segments, frame, { out, fade = null } = {}) {

@@ -45,6 +45,14 @@ function names(text) {
     .flatMap(([, list]) => list.split(",").map((name) => name.trim().split(" as ")[0]));
 }
 
+const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
+const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;
+
+// build_decoder.py puts this into the decoder, which then is whole without a package; the notice goes with it.
+await esbuild.build({ stdin: { contents: 'export { decompress } from "fzstd";', resolveDir: modules }, outfile: join(out, "zstd.js"), bundle: true,
+  minify: true, format: "iife", globalName: "zstd", target: "es2022", banner: { js: `/*! fzstd ${version("fzstd")}\n${licence("fzstd")} */` },
+  nodePaths: [modules], legalComments: "none", charset: "utf8", logLevel: "error" });
+
 const orbit = "three/addons/controls/OrbitControls.js", outside = ["three", "three/webgpu", "athcodec-three", "athcodec-three/webgpu", "athcodec-three/model", orbit];
 const loader = await bundle({ entryPoints: [join(here, "src/index.js")] }, "ATHLoader.js", outside);
 await bundle({ entryPoints: [join(here, "src/webgpu.js")] }, "ATHForestGPU.js", outside);
@@ -70,7 +78,5 @@ for (const name of ["index.html", "forest.html", "gallery.html"]) {
 copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
 copyFileSync(join(here, "src/element.d.ts"), join(out, "ath-viewer.d.ts"));
 copyFileSync(join(here, "src/webgpu.d.ts"), join(out, "ATHForestGPU.d.ts"));
-const licence = (name) => readFileSync(join(modules, name, "LICENSE"), "utf8").trim();
-const version = (name) => JSON.parse(readFileSync(join(modules, name, "package.json"), "utf8")).version;
-writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js, model.js"], ["fzstd", "in ath_worker.js"]]
+writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js, model.js"], ["fzstd", "zstd.js, in ath_worker.js and ath_decoder.mjs"]]
   .map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`).join(`\n${"-".repeat(80)}\n\n`));

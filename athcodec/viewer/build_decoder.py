@@ -71,6 +71,8 @@ FLAGS = [
 # Zig puts the stack below the data, where an overflow traps
 LINKING = ["-Wl,--no-entry", f"-Wl,-z,stack-size={STACK_BYTES}"]
 
+INCLUDE = re.compile(r"^// @include (\S+)\n", re.MULTILINE)
+"""A line of the template in whose place the text of a file stands, without its exports."""
 PAYLOAD = re.compile(r'(const WASM = ")([^"]*)(";)')
 
 
@@ -126,9 +128,16 @@ def pack(template: str, wasm: bytes) -> str:
     """The module's text."""
     payload = base64.b64encode(zlib.compress(wasm, 9)).decode("ascii")
     head, code = template.split("\n\n", 1)
-    # comments and indentation stay in the template, none of whose strings goes over several lines
-    lean = re.sub(r"^ +|^ *//.*\n|^\n", "", code, flags=re.MULTILINE)
+    pieces = INCLUDE.split(code)  # Text of the template and names of files take turns.
+    texts = [(VIEWER / text).read_text("utf-8") if i % 2 else text for i, text in enumerate(pieces)]
+    lean = "".join(_lean(text) for text in texts)
     return PAYLOAD.sub(lambda found: found[1] + payload + found[3], f"{head}\n\n{lean}", count=1)
+
+
+def _lean(text: str) -> str:
+    """Text without comments and indentation, none of whose strings goes over several lines."""
+    text = re.sub(r"^/\*\*.*?\*/\n", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"^ +|^ *//.*\n|^\n|^export (?=function)", "", text, flags=re.MULTILINE)
 
 
 def unpack(module: str) -> tuple[str, bytes]:

@@ -40,6 +40,19 @@ cases.between = async () => {
   return (stuck);
 };
 
+// Where a plant is, and what each level shows of it: what the shader makes of the texture, and positions alone.
+cases.far = async () => {
+  const { ath, motion } = await load(), shown = [], some = (numbers) => Array.from(numbers).filter((_, i) => i % 27 < 3);
+  await ath.loaded;
+  motion.fade = 0;
+  for (let level = 0; level < motion.levelCount; level++)
+    for (const seconds of words.map(Number)) {
+      await motion.show(seconds, level);
+      shown.push({ level, frame: motion.frame, drawn: some(motion.uploaded()), alone: some(await motion.positions(seconds, level)) });
+    }
+  return { origin: ath.origin, place: ath.object.position.toArray(), box: [ath.box.min.toArray(), ath.box.max.toArray()], rest: some(ath.rest), shown };
+};
+
 // Two pictures under way, the first of a level that is not known yet: whether the second is shown.
 cases.overtaken = async () => {
   const { motion } = await load();

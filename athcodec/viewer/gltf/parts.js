@@ -55,14 +55,9 @@ export function startOf(motion, name) {
   return Number.isFinite(said) ? said : 0;
 }
 
-/** Seconds that a clip takes, with the way back to its first frame where it is a loop. */
-export function roundOf({ duration, frameCount, loop }) {
-  return loop && frameCount > 1 ? duration * frameCount / (frameCount - 1) : duration;
-}
-
 /** Two keys, [seconds of the animation, seconds of the clip], between which both run alike; one of a clip without duration. */
-export function keysOf(start, clip) {
-  const round = roundOf(clip), first = Math.max(start, 0);
+export function keysOf(start, { duration: round }) {
+  const first = Math.max(start, 0);
   return round > first - start ? [[first, first - start], [start + round, round]] : [[first, 0]];
 }
 

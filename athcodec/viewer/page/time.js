@@ -28,13 +28,13 @@ function limit() {
 /** By frames; pauses. */
 function step(frames) {
   setPlaying(false);
-  const { duration, frameCount } = app.plants[0].motion.clip, rate = duration > 0 ? (frameCount - 1) / duration : 1;
-  seek(Math.min((Math.round(state.time * rate) + frames) / rate, duration));
+  const { lastTime, frameCount } = app.plants[0].motion.clip, rate = lastTime > 0 ? (frameCount - 1) / lastTime : 1;
+  seek(Math.min((Math.round(state.time * rate) + frames) / rate, lastTime));
 }
 
 function toEnd() {
   setPlaying(false);
-  seek(app.plants[0].motion.clip.duration);
+  seek(app.plants[0].motion.clip.lastTime);
 }
 
 function advance(seconds) {

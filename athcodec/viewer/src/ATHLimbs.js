@@ -2,7 +2,7 @@
 
 import { Color, Mesh, Vector4 } from "three";
 
-import { setValues, upright } from "./geometry.js";
+import { atOrigin, setValues } from "./geometry.js";
 import { limbGeometry, limbMaterial, setRadii } from "./limbs.js";
 import { radii } from "./radii.js";
 
@@ -21,7 +21,7 @@ export class ATHLimbs extends Mesh {
     this.#motion = motion;
     this.#onArrays = () => setRadii(geometry, radii(ath));
     ath.addEventListener("arrays", this.#onArrays);
-    upright(this, ath.metadata);
+    atOrigin(this, ath);
     this.frustumCulled = false; // an instance's own box is no edge's
     this.setColor(color);
   }

@@ -5,7 +5,7 @@ import { Box3, Group, LineBasicMaterial, LineSegments, Loader, Mesh, MeshStandar
   LoaderUtils, Object3D, Vector3 } from "three";
 
 import { ATHMotion, eased, failureOf, restBounds } from "./ATHMotion.js";
-import { addAttributes, lineGeometry, meshGeometry, polygonsOf, upright } from "./geometry.js";
+import { addAttributes, atOrigin, lineGeometry, meshGeometry, polygonsOf } from "./geometry.js";
 import { Presence } from "./presence.js";
 
 const EASING_MS = 16; // between two steps of the rest pose
@@ -336,7 +336,7 @@ export class ATH extends EventDispatcher {
   /** Something to add to a scene, upright: a Mesh of the faces, LineSegments where there are none. */
   get object() {
     if (!this.#object) {
-      this.#object = upright(new Group(), this.metadata);
+      this.#object = atOrigin(new Group(), this);
       this.#object.name = "ath";
       this.#draw();
     }
@@ -369,6 +369,11 @@ export class ATH extends EventDispatcher {
   /** Edges (u, v) in any case, the file's or those that follow from the branches. */
   get skeleton() {
     return this.#channel.statics.skeleton;
+  }
+
+  /** What all positions are relative to, in the axes of the file: 0, 0, 0 unless the plant is far from there. */
+  get origin() {
+    return this.#channel.origin;
   }
 
   /** Finer once levels above 0 are here, in the same array. */

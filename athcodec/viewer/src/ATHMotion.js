@@ -17,9 +17,9 @@ export function dataTexture(data) {
   return texture;
 }
 
-/** Seconds of a clip and of the way from its last frame back to the first. */
-export function roundOf({ duration, frameCount }) {
-  return frameCount > 1 ? duration * frameCount / (frameCount - 1) : 0;
+/** Seconds of a clip and of the way from its last frame back to the first, whether it is marked as a loop or not. */
+export function roundOf({ lastTime, frameCount }) {
+  return frameCount > 1 ? lastTime + lastTime / (frameCount - 1) : 0;
 }
 
 const CLOSED = { message: "ath: got a request after dispose(), expected none", codeName: "CLOSED" };
@@ -110,7 +110,7 @@ export class ATHMotion extends EventDispatcher {
   /** Seconds until the clip repeats or, where it does not, ends. */
   get duration() {
     if (this.loops) return roundOf(this.clip);
-    return this.clip.duration * (this.wrap === "pingpong" ? 2 : 1);
+    return this.clip.lastTime * (this.wrap === "pingpong" ? 2 : 1);
   }
 
   /** Whether the clip before is still shown: "waiting" for the one that plays, "fading" into it, else null. */

@@ -13,10 +13,16 @@ export function polygonsOf(statics, attributes) {
   return counts && indices ? { array: Uint32Array.from(indices.array, Number), counts: counts.array } : null;
 }
 
-/** Stands an object of a file upright, in the axes of three.js: y is up. */
+/** Stands an object of a file upright, in the axes of three.js, in which y is up. */
 export function upright(object, { up_axis: up }) {
   if (up === "z") object.rotation.x = -Math.PI / 2;
   if (up === "x") object.rotation.z = Math.PI / 2;
+  return object;
+}
+
+/** Puts an upright object where the plant is in its file. */
+export function atOrigin(object, { metadata, origin }) {
+  upright(object, metadata).position.fromArray(origin).applyEuler(object.rotation);
   return object;
 }
 

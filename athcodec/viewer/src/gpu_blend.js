@@ -43,14 +43,14 @@ export class Mixture {
 
 /** Returns the frames of a clip that goes around, `seconds` after it began: [{frame, weight}]. times: seconds of the file's frames. */
 export function framesAt(times, clip, seconds) {
-  const { firstFrame, frameCount, duration } = clip, round = roundOf(clip);
+  const { firstFrame, frameCount, lastTime } = clip, round = roundOf(clip);
   if (frameCount === 1 || !(round > 0)) return [{ frame: firstFrame, weight: 1 }];
   const passed = ((seconds % round) + round) % round;
-  if (passed < duration) return within(times, clip, passed);
-  return mixed(firstFrame + frameCount - 1, firstFrame, Math.min((passed - duration) / (round - duration), 1));
+  if (passed < lastTime) return within(times, clip, passed);
+  return mixed(firstFrame + frameCount - 1, firstFrame, Math.min((passed - lastTime) / (round - lastTime), 1));
 }
 
-// seconds: 0 to the clip's duration.
+// seconds: 0 to that of the clip's last frame.
 function within(times, { firstFrame, frameCount }, seconds) {
   const at = times[firstFrame] + seconds;
   let low = firstFrame, high = firstFrame + frameCount - 1;

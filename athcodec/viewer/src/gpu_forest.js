@@ -301,8 +301,8 @@ export class ATHForest extends Group {
   // The vertices of the plant that an instance shows, turned as it is and at its place; those of the image before, too.
   #bind(material, geometry, { passes, shared }, list) {
     const { Fn, storage, uint, float, vec3, attribute, instanceIndex, positionGeometry, positionPrevious, normalLocal, normalGeometry, select } = TSL;
-    const { metadata, channel: { info } } = this.#ath;
-    const upright = metadata.up_axis === "z", heading = this.#heading, origin = vec3(...info.origin), count = uint(passes.words[2]);
+    const { metadata, channel: { info }, origin: less } = this.#ath;
+    const upright = metadata.up_axis === "z", heading = this.#heading, origin = vec3(...info.origin.map((value, k) => value - less[k])), count = uint(passes.words[2]);
     const vertices = storage(shared, "float", shared.count).toReadOnly();
     const instances = storage(this.#instances, "vec4", 2 * Math.max(1, this.#count)).toReadOnly();
     const lists = storage(this.#lists, "uint", this.#lists.count).toReadOnly();
@@ -340,7 +340,9 @@ export class ATHForest extends Group {
     const hidden = this.#look(camera, height);
     this.#loadNext(hidden);
     this.#place(seconds);
-    for (const own of this.levels) if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+    for (const own of this.levels)
+      if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+      else own.before.fill(null); // What a level showed earlier is not the image before the one that shows it again.
     this.#select();
   }
 

@@ -94,6 +94,10 @@ export class ATH extends EventDispatcher<{ arrays: {} }> {
   readonly lines: BufferGeometry | null;
   /** Edges (u, v) in source order, stored or following from the branches. */
   readonly skeleton: Uint32Array;
+  /** x, y, z in the axes of the file that all positions are relative to: 0, 0, 0 unless the plant is so far from there that floats would
+   * break the file's bound, as in map coordinates. `object` and ATHLimbs stand there; put objects of your own there, too. Instances of
+   * forests are relative to it. Levels of such a file change without a fade. */
+  readonly origin: readonly [number, number, number];
   /** Rest pose in source order, 3 numbers per vertex. In files whose level 1 refines it, the numbers change when that
    * level is here, and attributes, `box` and `sphere` with them. */
   readonly rest: Float32Array;
@@ -118,8 +122,10 @@ export interface ATHClip {
   readonly index: number;
   /** Empty where the only clip of a file has none. */
   readonly name: string;
-  /** Seconds from the first frame to the last. */
+  /** Seconds of the clip played once: for a loop a whole round, with the way from its last frame back to its first. */
   readonly duration: number;
+  /** Seconds from the first frame to the last. */
+  readonly lastTime: number;
   readonly frameCount: number;
   /** The frames of a file are numbered over all its clips. */
   readonly firstFrame: number;

@@ -1,4 +1,4 @@
-// Normals of a mesh whose vertices move on their own, for the worker.
+// Normals of a mesh whose vertices move on their own, for the worker and the decoder, which takes the text of this file in.
 
 /** Smooth unit normals, 3 numbers per vertex: each face adds its normal, as long as twice its area, to its corners. Where that
  * is nothing, as of twigs without thickness, they point away from the middle: a zero normal is drawn black.
@@ -33,20 +33,4 @@ function add(out, p, a, b, c) {
     out[at + 1] += ny;
     out[at + 2] += nz;
   }
-}
-
-/** The smallest rotation that takes normal `vertex` of `from` to that of `to`, as a quaternion at out[at]. */
-export function turns(from, to, vertex, out, at) {
-  const i = 3 * vertex, ax = from[i], ay = from[i + 1], az = from[i + 2], bx = to[i], by = to[i + 1], bz = to[i + 2];
-  const x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx, w = 1 + ax * bx + ay * by + az * bz;
-  const length = Math.hypot(x, y, z, w);
-  if (length < 1e-6) { // opposite: half a turn about anything across
-    const across = Math.hypot(ax, ay) || 1;
-    out.set(Math.hypot(ax, ay) > 1e-3 ? [-ay / across, ax / across, 0, 0] : [1, 0, 0, 0], at);
-    return;
-  }
-  out[at] = x / length;
-  out[at + 1] = y / length;
-  out[at + 2] = z / length;
-  out[at + 3] = w / length;
 }

@@ -15,6 +15,7 @@ export class Session {
   #post; #clip; #download;
   #file; #texels; #jobs;  // These are there once the file's front is.
   #views = new Map();     // {id: {level, frames, wanted, mixing}}: #view explains them.
+  #relative;              // Positions are less the file's origin, as floats would break the file's bound there.
   #winds;                 // {strength, heading} for each clip; null: it has none.
   #known = new Set();     // The page knows the parts of these levels.
   #stateAt = 0; #stateTimer = 0;
@@ -55,9 +56,10 @@ export class Session {
     }
     this.#file = file;
     this.#winds = clips.map(({ name }) => windOf({ ...statics.metadata, ...statics.metadata.clips?.[name] }));
-    this.#texels = new Texels(file, statics.faces);
+    this.#relative = isFar(info);
+    this.#texels = new Texels(file, statics.faces, this.#relative);
     this.#post({
-      type: "opened", info: { ...info, levelNames }, statics, rest: this.#texels.rest, times: file.times(), branches: file.branches(),
+      type: "opened", origin: this.#relative ? info.origin : [0, 0, 0], info: { ...info, levelNames }, statics, rest: this.#texels.rest, times: file.times(), branches: file.branches(),
       vertexSource: file.vertexSource(), vertexPlaces: file.vertexPlaces(), branchSource: file.branchSource(), clips, first,
       chunks: file.chunks().map(({ kind, level, segment, length }) => ({ kind, level, segment, length })),
       segments: Array.from({ length: info.segmentCount + 1 }, (_, s) => file.segmentStart(s)),
@@ -159,9 +161,10 @@ export class Session {
     mixing.last = null;
     const shown = exactly ? this.#jobs.exactly(frame, level) : this.#viewed(message, frame, mixing);
     if (!shown) return { frame };
-    mixing.fading.goTo(shown.level, now, exactly ? 0 : fade);
+    const relative = this.#relative; // Matrices of such files do not fade.
+    mixing.fading.goTo(shown.level, now, exactly || relative ? 0 : fade);
     const { terms, cut } = mixing.faded(shown), data = sumOf(terms, positions
-      ? (term) => file.positions(term.segments, term.frame, { fade: term.fade })
+      ? (term) => file.positions(term.segments, term.frame, { fade: term.fade, relative })
       : (term, i) => this.#texels.pack(term, cut, i === 0 ? buffer : null));
     return { shown: cut, frame: shown.frame, fading: mixing.fading.underWay, clip: file.clips.indexOf(clipAt(file, shown.frame)),
       held: file.held, whole: positions, data, ...(heat && { heat: this.#distances(shown) }) };
@@ -179,10 +182,17 @@ export class Session {
     });
     if (shares.length === 0) return { frame };
     const mixing = this.#mixing(view), eases = !exactly && !aside, shown = Math.min(...shares.map((share) => share.level));
-    const mixed = eases ? mixing.eased(message, shares) : { shares, fading: false }, xyz = file.blended(mixed.shares);
+    const mixed = eases ? mixing.eased(message, shares) : { shares, fading: false }, xyz = this.#blended(mixed.shares);
     if (!aside) mixing.fading.goTo(shown);
     return { shown, cut: BLENDED, frame, fading: mixed.fading, clip, held: file.held, whole: positions,
       data: positions ? xyz : this.#texels.packExact(xyz, buffer) };
+  }
+
+  // The core blends floats. Far from the origin vertices are blended one by one, which keeps lengths less well.
+  #blended(shares) {
+    if (!this.#relative) return this.#file.blended(shares);
+    const whole = shares.reduce((sum, { weight }) => sum + weight, 0), terms = shares.map((share) => ({ ...share, share: share.weight / whole }));
+    return sumOf(terms, ({ segments, frame }) => this.#file.positions(segments, frame, { relative: true }));
   }
 
   // coarsely: level 0 for now, whatever is wanted.
@@ -196,7 +206,7 @@ export class Session {
   // Returns how far the shown position of each vertex is from the position at the deepest level that is here.
   #distances({ frame, segments }) {
     const file = this.#file, deepest = this.#jobs.show(frame, file.info.levelCount - 1);
-    const [a, b] = [segments, deepest.segments].map((each) => file.positions(each, frame));
+    const [a, b] = [segments, deepest.segments].map((each) => file.positions(each, frame, { relative: this.#relative }));
     return Float32Array.from({ length: a.length / 3 }, (_, i) =>
       Math.hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1], a[3 * i + 2] - b[3 * i + 2]));
   }
@@ -246,6 +256,13 @@ export class Session {
     this.#closing.abort();
     this.#download.abort();
   }
+}
+
+// Returns whether floats of positions are too coarse for the bound of a file or, if it has none, for its positions. A mesh that the
+// host has stays where it is.
+function isFar({ origin, maxError, isFloat64, restIsHost }) {
+  const away = restIsHost ? 0 : Math.max(...origin.map(Math.abs));
+  return maxError > 0 ? away * 2 ** -24 > maxError / 4 : isFloat64 && away > 0;
 }
 
 // Returns the clips with their numbers, and for every level the error and the one at the seam.

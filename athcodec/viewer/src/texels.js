@@ -1,6 +1,6 @@
 // Texels fills textures for the GPU: nodes' matrices, then exact vertices, with rotations of normals where the mesh has faces.
 
-import { normals, turns } from "./normals.js";
+import { normals } from "./normals.js";
 import { pause } from "./pause.js";
 
 export const WIDTH = 1024; // Width of a texture in texels, each of four numbers.
@@ -8,21 +8,23 @@ export const BLENDED = -1; // In place of a level: all vertices are exact, as bl
 const REFINED_REST = 0x15;
 
 export class Texels {
-  #file; #order; #places;
+  #file; #order; #places; #relative;
   #faces = null; // By places in file order.
   #parts = new Map();
   #finerRest; // The rest pose is level 0's, and levels above have another.
   #restNormals = null;
 
-  constructor(file, faces) {
+  /** relative: whether positions are less the file's origin. */
+  constructor(file, faces, relative = false) {
     this.#file = file;
+    this.#relative = relative;
     this.#order = file.vertexSource();
     this.#places = file.vertexPlaces();
     this.faces = faces;
     const exactCount = file.info.placeCount, [none, zero, all] = [-1, 0, exactCount].map((number) => Int32Array.of(number));
     this.#parts.set(BLENDED, { nodeCount: 0, exactCount, branch: none, first: zero, count: all, index: zero });
     this.#finerRest = file.chunks().some(({ kind, level }) => kind === REFINED_REST && level === 1);
-    this.rest = this.refine(file.readyLevel(0)) ?? file.levelRest(0);
+    this.rest = this.refine(file.readyLevel(0)) ?? this.#levelRest(0);
   }
 
   // All vertices of a place turn alike, and so do their normals.
@@ -37,10 +39,14 @@ export class Texels {
     this.#finerRest = false;
     try {
       this.#restNormals = null;
-      return this.rest = this.#file.levelRest(1);
+      return this.rest = this.#levelRest(1);
     } catch {
       return null; // The chunk is damaged: levels that need it will say so.
     }
+  }
+
+  #levelRest(level) {
+    return this.#file.levelRest(level, "source", { relative: this.#relative });
   }
 
   parts(level) {
@@ -94,16 +100,26 @@ export class Texels {
 
   #fill(data, at, { frame, segments, fade = null }, level) {
     const { nodeCount, exactCount } = this.parts(level), exactAt = at + 12 * nodeCount;
-    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt), fade });
+    const relative = this.#relative, positions = () => this.#file.positions(segments, frame, { fade, order: "file", relative });
+    this.#file.matrices(segments, frame, { out: data.subarray(at, exactAt), fade, relative });
     if (exactCount === 0) return data;
-    const exact = this.#file.exact(segments, frame, { fade }), stride = this.#faces ? 8 : 4;
+    const exact = relative ? this.#exactOf(positions(), level) : this.#file.exact(segments, frame, { fade }), stride = this.#faces ? 8 : 4;
     for (let i = 0, from = 0, to = exactAt; i < exactCount; i++, to += stride) {
       data[to] = exact[from++];
       data[to + 1] = exact[from++];
       data[to + 2] = exact[from++];
     }
-    if (this.#faces) this.#fillTurns(data, exactAt, level, this.#file.positions(segments, frame, { fade, order: "file" }));
+    if (this.#faces) this.#fillTurns(data, exactAt, level, positions());
     return data;
+  }
+
+  // The positions, in file order, of the exact vertices of a level.
+  #exactOf(positions, level) {
+    const { branch, first, count, index, exactCount } = this.parts(level), out = new Float32Array(3 * exactCount);
+    branch.forEach((node, part) => {
+      if (node < 0) out.set(positions.subarray(3 * first[part], 3 * (first[part] + count[part])), 3 * index[part]);
+    });
+    return out;
   }
 
   // How the normal of every exact vertex has turned since the rest pose. positions: in file order.
@@ -116,4 +132,20 @@ export class Texels {
         turns(this.#restNormals, now, first[part] + i, data, at + 8 * (index[part] + i) + 4);
     }
   }
+}
+
+// Writes the smallest rotation that takes normal `vertex` of `from` to that of `to`, as a quaternion at out[at].
+function turns(from, to, vertex, out, at) {
+  const i = 3 * vertex, ax = from[i], ay = from[i + 1], az = from[i + 2], bx = to[i], by = to[i + 1], bz = to[i + 2];
+  const x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx, w = 1 + ax * bx + ay * by + az * bz;
+  const length = Math.hypot(x, y, z, w);
+  if (length < 1e-6) { // opposite: half a turn about anything across
+    const across = Math.hypot(ax, ay) || 1;
+    out.set(Math.hypot(ax, ay) > 1e-3 ? [-ay / across, ax / across, 0, 0] : [1, 0, 0, 0], at);
+    return;
+  }
+  out[at] = x / length;
+  out[at + 1] = y / length;
+  out[at + 2] = z / length;
+  out[at + 3] = w / length;
 }

@@ -1,0 +1,205 @@
+"""The examples for engines in JavaScript: what is shown is what the decoder of Python gives, at the level that a
+distance asks for, and no more is fetched than that level takes. PlayCanvas, Babylon.js and three.js draw the shipped
+tree in Chromium, in software."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import CACHE, install_once, printed
+
+import athcodec
+from bench.throttled_server import ThrottledServer
+
+ROOT = Path(__file__).resolve().parent.parent
+VIEWER = ROOT / "athcodec" / "viewer"
+EXAMPLES = VIEWER / "examples"
+TREE = ROOT / "athcodec" / "sample" / "leafed_tree.ath"
+NODE = Path(__file__).resolve().parent / "node"
+NEAR, FAR = 12.0, 90.0  # Metres at which the tree is shown at two levels.
+FRAMES = range(0, 40, 4)
+ESBUILD = "esbuild@0.28.2"
+# Engines that a user of Babylon.js or PlayCanvas has, and those of a user of three.js.
+APPS = {"engines_page.mjs": "playcanvas@2.23.3 @babylonjs/core@9.35.0", "engines_three_page.mjs": "three@0.187.0"}
+ENGINES = {"playcanvas": "engines_page.mjs", "babylon": "engines_page.mjs", "three": "engines_three_page.mjs"}
+
+PLAY = """
+import { openPlant } from "./plant.js";
+const [url, distance, ...seconds] = process.argv.slice(2);
+const view = { distance: Number(distance), fov: 0.8, height: 1080, budget: 50 };
+const plant = await openPlant(url), shown = [];
+for (const at of seconds.map(Number)) {
+  const wanted = plant.file.levelFor(view.distance, view.fov, view.height, 1, 0, 1, "p99");
+  let now = plant.update(at, view);
+  for (let i = 0; i < 2000 && now?.level !== wanted && !plant.failure; i++) {
+    await new Promise((done) => setTimeout(done, 2));
+    now = plant.update(at, view);
+  }
+  const positions = [...now?.positions ?? []], normals = [...(now?.normals ?? []).slice(0, 300)];
+  shown.push({ level: now?.level ?? -1, wanted, positions, normals });
+}
+const { failure, mesh, origin } = plant;
+console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [...mesh.source], origin,
+  triangles: [...mesh.triangles] }));
+"""
+
+
+def package(folder: Path) -> None:
+    """The npm package, where programs of a folder find it."""
+    (folder / "node_modules").mkdir()
+    (folder / "node_modules" / "athcodec-three").symlink_to(VIEWER)
+
+
+def play(folder: Path, url: str, distance: float, *seconds: float, code: int = 0):
+    package(folder)
+    shutil.copy(EXAMPLES / "plant.js", folder)
+    (folder / "package.json").write_text('{"type": "module"}')
+    (folder / "play.mjs").write_text(PLAY)
+    return printed("node", folder / "play.mjs", url, distance, *seconds, code=code)
+
+
+def decoded(level: int, frame: int) -> np.ndarray:
+    with athcodec.open(TREE) as decoder:
+        return decoder.at_level(level)[frame]
+
+
+@pytest.mark.web
+@pytest.mark.parametrize("distance, ranges", [(NEAR, True), (400.0, True), (400.0, False)])
+def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(distance, ranges, tmp_path):
+    data = TREE.read_bytes()
+    with ThrottledServer({"tree.ath": data}, ranges=ranges) as server:
+        result = json.loads(play(tmp_path, f"{server.address}tree.ath", distance, 0.5, 3.5))
+        fetched = server.sent("tree.ath")
+    assert result["failure"] is None
+    for shown, frame in zip(result["shown"], (15, 105)):
+        assert shown["level"] == shown["wanted"]
+        wanted = decoded(shown["level"], frame)[result["source"]] - result["origin"]
+        assert np.abs(np.reshape(shown["positions"], (-1, 3)) - wanted).max() < 1e-6 * np.abs(wanted).max()
+        assert np.allclose(np.linalg.norm(np.reshape(shown["normals"], (-1, 3)), axis=1), 1, atol=1e-5)
+    with athcodec.open(TREE) as decoder:
+        level = decoder.levels[result["shown"][0]["level"]]
+        assert len(result["triangles"]) > 0 and max(result["triangles"]) < len(result["source"])
+        if ranges:  # prelude, arrays, and of the two segments of one clip what the level takes
+            assert fetched <= level.bytes + len(data) - decoder.levels[-1].bytes + (1 << 14)
+            assert distance == NEAR or fetched < len(data) / 3
+
+
+def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
+    page = (ROOT / "docs" / "engines.md").read_text("utf-8")
+    section = page[page.index("## JavaScript") :]
+    assert re.search(r"```js\n(.*?)```\n", section, re.DOTALL)[1] == (EXAMPLES / "plant.js").read_text("utf-8")
+    for packages in APPS.values():
+        for package in packages.split():
+            name, version = package.rsplit("@", 1)
+            example = next(each for each in ENGINES if each in name)
+            code = (EXAMPLES / f"{example}.js").read_text("utf-8").splitlines()
+            lines = [line for line in code if line.strip() and not re.match(r"\s*(//|/\*|\*|import)", line)]
+            assert re.search(rf"\| {version} \| \[{example}.js\][^|]*(\|[^|]*)?\| {len(lines)} \|", section), name
+
+
+@pytest.mark.web
+def test_a_file_that_is_cut_off_or_not_there_is_an_error(tmp_path):
+    with ThrottledServer({"cut.ath": TREE.read_bytes()[:20_000]}) as server:
+        for name, message in (("cut.ath", "MISSING"), ("none.ath", "got status 404")):
+            folder = tmp_path / name
+            folder.mkdir()
+            package(folder)
+            shutil.copy(EXAMPLES / "plant.js", folder)
+            (folder / "package.json").write_text('{"type": "module"}')
+            script = f"""
+            import {{ openPlant }} from "./plant.js";
+            await openPlant("{server.address}{name}").catch((error) => console.log(error.message));
+            """
+            (folder / "open.mjs").write_text(script)
+            assert message in printed("node", folder / "open.mjs")
+
+
+def test_an_engine_that_is_not_three_asks_for_no_three():
+    """In the first tier; `test_an_app_of_another_engine_installs_no_three` lets npm install the package."""
+    described = json.loads((VIEWER / "package.json").read_text())
+    assert all(described["peerDependenciesMeta"][name]["optional"] for name in described["peerDependencies"])
+    for name in ("plant.js", "playcanvas.js", "babylon.js"):
+        assert '"three' not in (EXAMPLES / name).read_text() and '"athcodec-three"' not in (EXAMPLES / name).read_text()
+
+
+# ---- engines, in Chromium ----
+
+
+def numbers(text: str, dtype) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype)
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory):
+    """A function that gives the folder with an app, whose packages npm has installed."""
+
+    def installed(page: str) -> Path:
+        folder, packed = CACHE / Path(page).stem, tmp_path_factory.mktemp("packed")
+        name = printed("npm", "pack", "--silent", "--pack-destination", packed, cwd=VIEWER).split()[-1]
+
+        def install() -> None:
+            (folder / "package.json").write_text('{"name": "app", "private": true, "type": "module"}')
+            packages = [*APPS[page].split(), ESBUILD, packed / name]
+            printed("npm", "install", "--no-audit", "--no-fund", *packages, cwd=folder)
+
+        state = hashlib.sha256((packed / name).read_bytes()).hexdigest()
+        install_once(folder, f"{APPS[page]} {ESBUILD} {state}", install)
+        return folder
+
+    return installed
+
+
+@pytest.mark.programs
+def test_an_app_of_another_engine_installs_no_three(app):
+    modules = app("engines_page.mjs") / "node_modules"
+    assert (modules / "athcodec-three").exists() and (modules / "playcanvas").exists()
+    assert not (modules / "three").exists()
+
+
+@pytest.mark.programs
+@pytest.mark.browser
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(engine, app, browser, tmp_path):
+    from PIL import Image
+
+    folder = app(ENGINES[engine])
+    shutil.copy(NODE / ENGINES[engine], folder)
+    bundle = ["--bundle", "--format=esm", f"--outfile={tmp_path / 'page.js'}", "--log-level=error"]
+    printed(folder / "node_modules" / ".bin" / "esbuild", ENGINES[engine], *bundle, cwd=folder)
+    files = {path.name: path.read_bytes() for path in tmp_path.glob("*.js")} | {"tree.ath": TREE.read_bytes()}
+    files["ath_worker.js"] = (VIEWER / "web" / "ath_worker.js").read_bytes()
+    files["page.html"] = b'<canvas width="320" height="240"></canvas><script type="module" src="/page.js"></script>'
+    page, errors = browser.new_page(), []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    pictures, levels, spent = [], [], []
+    with ThrottledServer(files) as server:
+        page.goto(f"{server.address}page.html")
+        page.wait_for_function("() => globalThis.engines", timeout=60_000)
+        draws = "engines[name](document.querySelector('canvas'), '/tree.ath', 4)"
+        page.evaluate(f"async (name) => {{ globalThis.player = await {draws}; }}", engine)
+        for distance in (FAR, NEAR):
+            for frame in FRAMES:
+                shown = page.evaluate("([seconds, distance]) => player.play(seconds, distance)", [frame / 30, distance])
+                positions = numbers(shown["positions"], np.float32).reshape(-1, 3)
+                wanted = decoded(shown["level"], frame)[numbers(shown["source"], np.uint32)]
+                assert np.abs(positions - wanted).max() < 1e-5 * np.abs(wanted).max()
+                spent.append(shown["ms"])
+            levels.append(shown["level"])
+            url = page.evaluate("(distance) => player.picture(0.5, distance)", distance)
+            pictures.append(np.array(Image.open(io.BytesIO(base64.b64decode(url.split(",")[1]))).convert("RGB"), int))
+    page.close()
+    assert errors == [] and levels[0] < levels[1]
+    for name, picture in zip(("far", "near"), pictures):
+        Image.fromarray(picture.astype(np.uint8)).save(tmp_path / f"{engine}_{name}.png")
+    shares = [(np.abs(picture - picture[0, 0]).max(axis=2) > 20).mean() for picture in pictures]
+    assert 0.0005 < shares[0] < shares[1] / 4 and shares[1] > 0.05, "the tree is drawn, and larger from near"
+    far, near = np.median(spent[:10]), np.median(spent[10:])
+    print(f"{engine}: {near:.1f} ms a frame at level {levels[1]}, {far:.1f} at level {levels[0]}")
