@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from athcodec.encoding import order
 from athcodec.encoding.choices import forms, learned_bases, learned_pieces, rotations
 from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes, work_of_steps
 from athcodec.encoding.choices.reference import mean_pose
@@ -103,6 +104,7 @@ CHOICES: dict[Choose, tuple[str, float]] = {
     best_node_steps: ("maps of coarse levels", 1.0),
     settled: ("all choices again", 0.7),
 }
+BY_NAME = {choose.__name__: choose for choose in CHOICES}
 
 
 @dataclass(eq=False)
@@ -116,7 +118,7 @@ class Search:
     def __post_init__(self) -> None:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
         self._forms: np.ndarray | None = None
-        self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
+        self.makes_all_again = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
 
     @classmethod
     def of(
@@ -135,7 +137,7 @@ class Search:
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
-        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search._is_small)
+        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
         return search
 
@@ -168,7 +170,7 @@ class Search:
         """Return the share of the work that is left for the search in the longest segments if it is made again in so
         many others: an equal one, but what a search takes that is not short of work."""
         trials, work = (self.of_sample or self).trials, self.trials.work
-        needed = TIGHT * expected_trials(self.effort, trials.is_layered, self._is_small) * trials.work_of_trial
+        needed = TIGHT * expected_trials(self.effort, trials.is_layered, self.makes_all_again) * trials.work_of_trial
         return min(1.0, max(1 / (1 + others), needed / max(work.allowed - work.done, 1.0)))
 
     def levels_need_own_bases(self) -> bool:
@@ -243,15 +245,7 @@ class Search:
         if self.effort == "fast":
             fast = [best_level_steps, rotations.fast_rotations, learned_bases.best_waves]
             return self._after(fast, self.trials.start)
-        choices: list[Choose] = [
-            best_freedom,
-            rotations.still_if_smaller,
-            forms.best_forms,
-            rotations.best_rotations,
-            learned_bases.best_bases,
-            forms.best_forms_again,
-            learned_pieces.best_pieces_in_any_basis,
-        ]
+        choices = [BY_NAME[name] for name in order.BEFORE_STEPS]
         work = self.trials.work
         if work.allowed - work.done < TIGHT * expected_trials(self.effort, False, False) * self.trials.work_of_trial:
             choices.insert(2, learned_bases.best_bases)  # Time bases may save most; again where work is left.
@@ -268,8 +262,7 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
-        choices = [calm_parts, best_slack, learned_bases.waves_if_smaller]
-        choices = [settled, *choices] if self._is_small else choices
+        choices = [BY_NAME[name] for name in order.AFTER_STEPS if self.makes_all_again or name != settled.__name__]
         if self.effort == "fast":
             choices = []
         if self.effort == "best" and self.trials.source.weights is None:
@@ -303,7 +296,7 @@ class Search:
         settings, trials = self.best, self.trials
         if not trials.is_layered or not any(settings.rotation_step_factors):
             yield settings
-            if trials.is_layered and self._is_small and settings.learned_pieces is not None:
+            if trials.is_layered and self.makes_all_again and settings.learned_pieces is not None:
                 yield replace(settings, learned_pieces=None)
             return
         main, least = settings.rotation_step_factors[trials.prelude(settings).plan.main_level], math.inf
@@ -335,19 +328,19 @@ class Search:
         work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
-        if not self._is_small:
+        if not self.makes_all_again:
             at_first = ((one, one.start) for one in (about_rest.trials, about_mean.trials))
             of_rest, of_mean = (np.array([one.cost(start), one.level_costs(start).sum()]) for one, start in at_first)
             if (of_rest > CLEAR_RATIO * of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
-        if not self._is_small:
+        if not self.makes_all_again:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
         return other if about_mean._cost_to_compare() < cost else self
 
     def _cost_to_compare(self) -> float:
         """Return what is compared with the cost about another reference pose."""
-        return cost_with_maps(self.at_best_step if self._is_small else self.at_first_step, self.trials)
+        return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
         """Return a search about the mean pose of the motion, which has chosen nothing yet."""

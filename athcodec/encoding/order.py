@@ -1,0 +1,16 @@
+"""The order in which a search makes its choices: what saves most bytes for its work comes first.
+
+`python -m bench effort` learns it on clips of one half of their makers, judges it on those of the other half, and
+prints both (bench/results/effort.json). The names are those of the functions that search.py makes choices by.
+"""
+
+BEFORE_STEPS = (
+    "best_freedom",
+    "still_if_smaller",
+    "best_forms",
+    "best_rotations",
+    "best_bases",
+    "best_forms_again",
+    "best_pieces_in_any_basis",
+)
+AFTER_STEPS = ("settled", "calm_parts", "best_slack", "waves_if_smaller")  # Small clips alone are settled.
