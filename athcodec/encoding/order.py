@@ -4,13 +4,19 @@
 prints both (bench/results/effort.json). The names are those of the functions that search.py makes choices by.
 """
 
-BEFORE_STEPS = (
-    "best_freedom",
+BEFORE_STEPS = (  # Learned modes are of pieces, which forms decide on, so they are chosen after these.
+    "best_bases",
     "still_if_smaller",
+    "best_forms_again",
+    "best_rotations",
+    "best_freedom",
     "best_forms",
+)
+AFTER_STEPS = (  # Small clips alone are settled.
+    "settled",
+    "calm_parts",
+    "best_slack",
+    "waves_if_smaller",
     "best_rotations",
     "best_bases",
-    "best_forms_again",
-    "best_pieces_in_any_basis",
 )
-AFTER_STEPS = ("settled", "calm_parts", "best_slack", "waves_if_smaller")  # Small clips alone are settled.
