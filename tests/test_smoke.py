@@ -152,6 +152,8 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "structure": "trellis --short",
     "split": "--help",
     "branches": "CLIP --results OUT",
+    "constants": "CLIP --modules rotations --frames 4 --rel-error 1e-2 --results OUT",
+    "effort": "--learning CLIP --judging CLIP --rel-error 1e-2 --results OUT",
 }
 
 

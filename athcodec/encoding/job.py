@@ -508,9 +508,9 @@ class EncodingJob:
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
         if self._has_usual_ladder and search.levels_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
-        shorter = search.shorter_segments() if self.options.segment_frames is None else []
-        with work.trying("segments", search.share_of_longest(len(shorter)) if shorter else 1.0):
+        with work.trying("segments"):
             best = self._searched(search, share, work)
+        shorter = search.shorter_segments() if self.options.segment_frames is None else []
         least, coding = self.size(best) if shorter else 0, self._coding_work(bound, self.clip.frame_count)
         for left, (length, price) in zip(range(len(shorter), 0, -1), shorter):
             with work.trying("segments", 1 / left), suppress(BoundError):

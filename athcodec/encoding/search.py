@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from athcodec.encoding import order
 from athcodec.encoding.choices import forms, learned_bases, learned_pieces, rotations
 from athcodec.encoding.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes, work_of_steps
 from athcodec.encoding.choices.reference import mean_pose
@@ -40,7 +41,6 @@ STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: 
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
-TIGHT = 2.0  # Work, in usual searches, below which time bases are tried before forms and rotations.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -80,29 +80,28 @@ def _learned_cost(trials: Trials) -> float:
     return min(trials.costs([with_bases, *learned_pieces.candidates(with_bases, trials)]))
 
 
-# What progress and summaries call a choice, and the largest share of the work that is left that it may take. Steps and
-# learned modes save most, and most for their work.
-CHOICES: dict[Choose, tuple[str, float]] = {
-    best_level_steps: ("steps of levels", 0.2),
-    best_freedom: ("freedom of rigid parts", 0.2),
-    forms.best_forms: ("forms", 0.4),
-    forms.best_forms_again: ("forms", 0.1),
-    rotations.still_if_smaller: ("branches whose bending turns nothing", 0.4),
-    rotations.best_rotations: ("rotations", 0.4),
-    rotations.fast_rotations: ("rotations", 1.0),
-    learned_bases.best_bases: ("time bases", 0.6),
-    learned_bases.best_waves: ("periodic waves", 1.0),
-    learned_bases.waves_if_smaller: ("time bases", 1.0),
-    learned_pieces.best_pieces: ("learned modes", 0.8),
-    learned_pieces.best_pieces_in_any_basis: ("learned modes", 0.8),
-    best_steps: ("steps", 0.8),
-    learned_pieces.learned_about_other_pose: ("learned modes", 0.8),
-    finer_steps: ("finer steps", 1.0),
-    calm_parts: ("calm parts", 0.5),
-    best_slack: ("precision of the rest pose", 0.5),
-    best_node_steps: ("maps of coarse levels", 1.0),
-    settled: ("all choices again", 0.7),
+CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
+    best_level_steps: "steps of levels",
+    best_freedom: "freedom of rigid parts",
+    forms.best_forms: "forms",
+    forms.best_forms_again: "forms",
+    rotations.still_if_smaller: "branches whose bending turns nothing",
+    rotations.best_rotations: "rotations",
+    rotations.fast_rotations: "rotations",
+    learned_bases.best_bases: "time bases",
+    learned_bases.best_waves: "periodic waves",
+    learned_bases.waves_if_smaller: "time bases",
+    learned_pieces.best_pieces: "learned modes",
+    learned_pieces.best_pieces_in_any_basis: "learned modes",
+    best_steps: "steps",
+    learned_pieces.learned_about_other_pose: "learned modes",
+    finer_steps: "finer steps",
+    calm_parts: "calm parts",
+    best_slack: "precision of the rest pose",
+    best_node_steps: "maps of coarse levels",
+    settled: "all choices again",
 }
+BY_NAME = {choose.__name__: choose for choose in CHOICES}
 
 
 @dataclass(eq=False)
@@ -116,7 +115,7 @@ class Search:
     def __post_init__(self) -> None:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
         self._forms: np.ndarray | None = None
-        self._is_small = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
+        self.makes_all_again = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
 
     @classmethod
     def of(
@@ -135,7 +134,7 @@ class Search:
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
-        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search._is_small)
+        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
         return search
 
@@ -163,13 +162,6 @@ class Search:
         shorter = list(zip(lengths, costs))[1 : best + 1]
         usual = 1 << round(math.log2(lengths[best]))
         return [*shorter, (usual, costs[best])] if shorter and usual != lengths[best] else shorter
-
-    def share_of_longest(self, others: int) -> float:
-        """Return the share of the work that is left for the search in the longest segments if it is made again in so
-        many others: an equal one, but what a search takes that is not short of work."""
-        trials, work = (self.of_sample or self).trials, self.trials.work
-        needed = TIGHT * expected_trials(self.effort, trials.is_layered, self._is_small) * trials.work_of_trial
-        return min(1.0, max(1 / (1 + others), needed / max(work.allowed - work.done, 1.0)))
 
     def levels_need_own_bases(self) -> bool:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
@@ -243,20 +235,10 @@ class Search:
         if self.effort == "fast":
             fast = [best_level_steps, rotations.fast_rotations, learned_bases.best_waves]
             return self._after(fast, self.trials.start)
-        choices: list[Choose] = [
-            best_freedom,
-            rotations.still_if_smaller,
-            forms.best_forms,
-            rotations.best_rotations,
-            learned_bases.best_bases,
-            forms.best_forms_again,
-            learned_pieces.best_pieces_in_any_basis,
-        ]
-        work = self.trials.work
-        if work.allowed - work.done < TIGHT * expected_trials(self.effort, False, False) * self.trials.work_of_trial:
-            choices.insert(2, learned_bases.best_bases)  # Time bases may save most; again where work is left.
+        choices = [BY_NAME[name] for name in order.BEFORE_STEPS]
+        last = [learned_pieces.best_pieces_in_any_basis, learned_bases.best_waves]
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
-            return self._after([best_level_steps, *choices, learned_bases.best_waves], self.trials.start)
+            return self._after([best_level_steps, *choices, *last], self.trials.start)
 
     @cached_property
     def at_best_step(self) -> Settings:
@@ -268,12 +250,10 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Settings of a file of one layer."""
-        choices = [calm_parts, best_slack, learned_bases.waves_if_smaller]
-        choices = [settled, *choices] if self._is_small else choices
-        if self.effort == "fast":
-            choices = []
+        names = () if self.effort == "fast" else order.AFTER_STEPS
+        choices = [BY_NAME[name] for name in names if self.makes_all_again or name != settled.__name__]
         if self.effort == "best" and self.trials.source.weights is None:
-            choices += [rotations.best_rotations, learned_bases.best_bases, finer_steps]
+            choices.append(finer_steps)
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
         return self._after(choices, self.at_best_step)
@@ -285,7 +265,7 @@ class Search:
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
         for choose in choices:
-            with self.trials.work.trying(*CHOICES[choose]):
+            with self.trials.work.trying(CHOICES[choose]):
                 settings = choose(settings, self.trials)
         return settings
 
@@ -303,7 +283,7 @@ class Search:
         settings, trials = self.best, self.trials
         if not trials.is_layered or not any(settings.rotation_step_factors):
             yield settings
-            if trials.is_layered and self._is_small and settings.learned_pieces is not None:
+            if trials.is_layered and self.makes_all_again and settings.learned_pieces is not None:
                 yield replace(settings, learned_pieces=None)
             return
         main, least = settings.rotation_step_factors[trials.prelude(settings).plan.main_level], math.inf
@@ -335,19 +315,19 @@ class Search:
         work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
-        if not self._is_small:
+        if not self.makes_all_again:
             at_first = ((one, one.start) for one in (about_rest.trials, about_mean.trials))
             of_rest, of_mean = (np.array([one.cost(start), one.level_costs(start).sum()]) for one, start in at_first)
             if (of_rest > CLEAR_RATIO * of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
-        if not self._is_small:
+        if not self.makes_all_again:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
         return other if about_mean._cost_to_compare() < cost else self
 
     def _cost_to_compare(self) -> float:
         """Return what is compared with the cost about another reference pose."""
-        return cost_with_maps(self.at_best_step if self._is_small else self.at_first_step, self.trials)
+        return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
         """Return a search about the mean pose of the motion, which has chosen nothing yet."""

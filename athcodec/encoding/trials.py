@@ -89,6 +89,13 @@ class Trials:
         other._preludes, other._seen_preludes = self._preludes, self._seen_preludes
         return other
 
+    def apart(self) -> Trials:
+        """Return trials that know what these know and count their work from zero, without a limit."""
+        other = replace(self, work=Work())
+        for name in ("_known", "_components", "_time_components", "_preludes", "_seen_preludes"):
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
     def without(self, feature: Feature) -> bool:
         """Return whether the file does without a feature."""
         return feature in self.source.without

@@ -1,0 +1,351 @@
+"""Constants that rule the encoder: what files and work change where each is halved or doubled.
+
+First the constants of a module are changed at once, then singly those of modules that change a file by more than the
+limits below, on the clips that changed. Every figure is stored as it is measured, and is not measured again; a run that
+was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import sys
+import time
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from itertools import product
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from unittest.mock import patch
+
+import athcodec
+from athcodec.encoding import progress
+from bench.clips import add_number, add_rel_error
+from bench.store import Store
+from bench.suite import cases
+from bench.tables import environment, table
+
+RESULTS = Path(__file__).parent / "results" / "constants.json"
+KEYS = {"files": ("clip", "frames", "bound", "constants", "factor")}
+FOLDERS = ("athcodec.encoding", "athcodec.motion.branches")
+CLIPS = (  # Clips of different makers. None is held out.
+    "helios_rice_8d",
+    "blender_bent_grass",
+    "mujoco_cable_vine",
+    "cplantbox_maize",
+    "shader_card_tree",
+    "lsystem_fern",
+    "scan_skeleton_tree",
+    "skfem_leaf",
+)
+FRAMES = 8  # First frames of a clip that are encoded.
+FACTORS = (0.5, 2.0)
+BYTES_LIMIT, WORK_LIMIT = 0.005, 0.05  # Shares by which a constant that matters changes a file or its work.
+NONE = ""  # The name of the run in which nothing is changed.
+# What is no choice: numbers that FORMAT.md or a type fixes, weights of work that were measured with a clock, the limit
+# of work itself, and sizes of buffers, which change no file.
+FIXED: Mapping[str, Sequence[str]] = {
+    "progress": (
+        *("READING", "POSES", "SURVEY", "MOTION", "ANALYSIS", "PREDICTION", "MAPS", "TURNS", "TRIAL", "BYTE"),
+        *("FILE_BYTE", "CORRECTION", "LEVEL", "LEVEL_MOTION", "START", "POSE", "REST", "PIECE", "BASIS", "COMPONENT"),
+        *("EIGENVECTOR", "FINDING", "LEARNT", "LEARNING", "LEAST_WORK", "WORK", "SMALL_TRIALS", "BRANCHES", "SIZES"),
+    ),
+    "job": ("SPOOL_BYTES", "CHUNK_BYTES", "LEVEL_BYTES"),
+    "joins": ("END_FRAMES", "WIDTHS", "SLOPED", "TURN"),
+    "layers": ("MOST_LAYERS", "MOST_LEVELS"),
+    "prediction": ("CUBES", "LATTICE"),
+    "rigid": ("MOST_TURN",),
+    "rings": ("LEAST_RING", "LARGEST_RING"),
+    "quantise": (
+        *("LARGEST_MODE", "SMALLEST_BOUND", "LARGEST_EXTENT", "SAFE_REST_CAP", "LATTICE_REST_CAP", "BIT_PARTS"),
+        *("MOST_LAG", "MESH"),
+    ),
+    "places": ("MIXER",),
+    "segment": ("ROWS_AT_ONCE", "LEAST_THREADED", "WORK_BYTES", "SEGMENT_WORK"),
+    "segmentation": ("SEGMENT_BYTES",),
+    "settings": ("BEAM",),
+    "shape": ("WHOLE_DETAIL", "MOST_DETAIL"),
+    "streams": ("FIRST", "LAST"),
+    "survey": ("MAX_DEPTH", "_READ_VALUES", "_WORK_VERTICES"),
+    "time_bases": ("LEAST_STEP", "MOST_STEP"),
+    "trials": ("PRELUDES_KEPT",),
+    "writing": ("IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
+    "polygons": ("PLACES_IN_ROWS",),
+    "attachment": ("QUERY",),
+    "point_runs": ("PAIRS_AT_ONCE",),
+    "price": ("AT_ONCE",),
+}
+
+NOTE = f"""
+Constants of {" and ".join(FOLDERS)} that were found by trial: numbers, or rows of numbers, at the top of a module,
+but those that the format fixes, sizes of buffers and measured weights of work. Bytes and work: largest change of any
+clip, in per cent, where the constant is halved and doubled. Moves: a file by more than {100 * BYTES_LIMIT:g} % or its
+work by more than {100 * WORK_LIMIT:g} %. Fails: no file could be made so. Work is counted, not timed. The clips are
+small; rules for large plants, several clips, loops and weights have no part in them.
+"""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, or a row of numbers, that has a name at the top of a module."""
+
+    module: str
+    name: str
+    value: Any
+
+    @property
+    def full_name(self) -> str:
+        return f"{self.module.removeprefix('athcodec.')}.{self.name}"
+
+    def scaled(self, factor: float) -> Any:
+        """Return the value times a factor; a whole number stays one, and at least 1."""
+        if isinstance(self.value, tuple):
+            return tuple(_scaled(one, factor) for one in self.value)
+        return _scaled(self.value, factor)
+
+
+def _scaled(value: float, factor: float) -> float:
+    if isinstance(value, int):
+        return max(1, round(value * factor)) if value > 0 else value
+    return value * factor
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("clips", nargs="*", metavar="CLIP", default=[], help="files, or names of clips")
+    parser.add_argument("--modules", nargs="+", metavar="NAME", help="constants of these modules alone")
+    parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
+    add_number(parser, "--frames", FRAMES, "first frames of each clip")
+    add_number(parser, "--seconds", 1500.0, "processor time after which no other figure is measured", "S")
+    add_rel_error(parser)
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    warnings.simplefilter("ignore")
+    known = [one for one in constants() if args.modules is None or one.module.rpartition(".")[2] in args.modules]
+    groups: dict[str, list[Constant]] = {}
+    for one in known:
+        groups.setdefault(one.module.removeprefix("athcodec."), []).append(one)
+    with _Files(args) as files:
+        for name, members in groups.items():
+            for factor in FACTORS:
+                for clip in files.clips:
+                    files.moves(name, members, factor, clip)
+        for name, members in groups.items():
+            for factor in FACTORS if len(members) > 1 else ():
+                moved = [clip for clip in files.clips if files.moves(name, members, factor, clip)]
+                for one, clip in product(members, moved):
+                    files.moves(one.full_name, [one], factor, clip)
+    rows = [row for name, members in groups.items() for row in _rows(files, name, members)]
+    left = sum(row["moves"] in ("yes", "fails") for row in rows)
+    modules = [_row(files, name, name) | {"constants": len(members)} for name, members in groups.items()]
+    counts = {"constants": len(rows), "move a file or its work": left, "do not": len(rows) - left}
+    tables = [table("Constants", rows, NOTE), table("Modules", modules), table("Counts", [counts])]
+    return {"tables": tables, "broken": []}
+
+
+@cache
+def constants() -> tuple[Constant, ...]:
+    """Return all constants, by module."""
+    found = []
+    for folder in FOLDERS:
+        package = import_module(folder)
+        root = Path(inspect.getfile(package)).parent
+        for file in sorted(root.rglob("*.py")):
+            words = file.relative_to(root).with_suffix("").parts
+            if words[-1] == "__init__":
+                continue
+            module = import_module(".".join((folder, *words)))
+            fixed = FIXED.get(words[-1], ())
+            for name in _top_names(module):
+                value = getattr(module, name)
+                if name not in fixed and _is_number(value):
+                    found.append(Constant(module.__name__, name, value))
+    return tuple(found)
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return bool(value) and all(map(_is_number, value))
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+@cache
+def _tree(module: ModuleType) -> ast.Module:
+    return ast.parse(inspect.getsource(module))
+
+
+def _top_names(module: ModuleType) -> list[str]:
+    """Return the upper-case names that a module assigns at its top."""
+    targets = [target for node in _tree(module).body if isinstance(node, ast.Assign) for target in node.targets]
+    names = [part for target in targets for part in (target.elts if isinstance(target, ast.Tuple) else [target])]
+    return [name.id for name in names if isinstance(name, ast.Name) and name.id.strip("_").isupper()]
+
+
+@contextmanager
+def changed(some: Iterable[Constant], factor: float) -> Iterator[None]:
+    """Have constants times a factor in their modules, in those that import them by name, and in defaults of
+    functions."""
+    before: list[tuple[Any, str, Any]] = []
+    try:
+        for one in some:
+            value = one.scaled(factor)
+            for module, name in _places(one):
+                before.append((module, name, getattr(module, name)))
+                setattr(module, name, value)
+            for function, index in _defaults(one):
+                usual = function.__defaults__
+                before.append((function, "__defaults__", usual))
+                function.__defaults__ = (*usual[:index], value, *usual[index + 1 :])
+        yield
+    finally:
+        for owner, name, value in reversed(before):
+            setattr(owner, name, value)
+
+
+@cache
+def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
+    found = [(sys.modules[constant.module], constant.name)]
+    for name, module in list(sys.modules.items()):
+        if name.startswith("athcodec.") and getattr(module, "__file__", None):
+            for node in ast.walk(_tree(module)):
+                if isinstance(node, ast.ImportFrom) and node.module == constant.module:
+                    found += [(module, one.asname or one.name) for one in node.names if one.name == constant.name]
+    return tuple(found)
+
+
+@cache
+def _defaults(constant: Constant) -> tuple[tuple[Any, int], ...]:
+    """Return functions of the constant's module that have it as a default, and its place among these."""
+    module = sys.modules[constant.module]
+    return tuple(
+        (getattr(module, node.name), index)
+        for node in _tree(module).body
+        if isinstance(node, ast.FunctionDef)
+        for index, default in enumerate(node.args.defaults)
+        if isinstance(default, ast.Name) and default.id == constant.name
+    )
+
+
+class _Files:
+    """Files of all clips with constants changed, measured once."""
+
+    def __init__(self, args: argparse.Namespace):
+        self._args, self._store = args, Store(args.results, environment(args.argv), KEYS)
+        self.clips: dict[str, athcodec.MotionClip] = {}
+
+    def __enter__(self) -> _Files:
+        for case in cases(self._args.clips or CLIPS, "quick"):
+            if case.path is not None:
+                with athcodec.read(case.path) as clip:
+                    self.clips[case.name] = _beginning(clip, self._args.frames)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.clips.clear() if any(error) else None
+
+    def moves(self, name: str, some: Sequence[Constant], factor: float, clip: str) -> bool:
+        """Measure a clip's file with some constants changed, and return whether it or its work is another."""
+        if self.find(NONE, 1.0, clip) is None:
+            self._measure(NONE, (), 1.0, clip)
+        if self.find(name, factor, clip) is None and time.process_time() < self._args.seconds:
+            self._measure(name, some, factor, clip)
+        change = self.change(name, factor, clip)
+        return change is not None and _is_above(change)
+
+    def find(self, name: str, factor: float, clip: str) -> dict[str, Any] | None:
+        return self._store.find("files", self._key(name, factor, clip))
+
+    def change(self, name: str, factor: float, clip: str) -> tuple[float, float] | None:
+        """Return the shares by which bytes and work change, infinite where no file was made; None: not measured."""
+        usual, other = self.find(NONE, 1.0, clip), self.find(name, factor, clip)
+        if usual is None or other is None:
+            return None
+        if other["bytes"] is None:
+            return float("inf"), float("inf")
+        return other["bytes"] / usual["bytes"] - 1, other["work"] / usual["work"] - 1
+
+    def _key(self, name: str, factor: float, clip: str) -> dict[str, Any]:
+        bound = self._args.rel_error
+        return {"clip": clip, "frames": self._args.frames, "bound": bound, "constants": name, "factor": factor}
+
+    def _measure(self, name: str, some: Sequence[Constant], factor: float, clip: str) -> None:
+        total, start = _Total(), time.process_time()
+        size: int | None = None
+        with changed(some, factor), patch.object(progress.Work, "add", total.adding(progress.Work.add)):
+            try:
+                size = len(athcodec.encode(self.clips[clip], rel_error=self._args.rel_error))
+            except Exception as error:  # Whatever a senseless number leads to is a result.
+                print(f"{name} x {factor:g}, {clip}: {error}", file=sys.stderr)
+        figures = {"bytes": size, "work": total.work, "seconds": round(time.process_time() - start, 2)}
+        self._store.add("files", self._key(name, factor, clip) | figures)
+        print(name, factor, clip, self.change(name, factor, clip), file=sys.stderr, flush=True)
+
+
+class _Total:
+    """The sum of all counted work."""
+
+    def __init__(self) -> None:
+        self.work = 0
+
+    def adding(self, add):
+        """Return the method of Work that counts, which counts here too."""
+
+        def noted(work: progress.Work, more: float) -> None:
+            self.work += int(more)
+            add(work, more)
+
+        return noted
+
+
+def _beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
+    """Return the first frames of a clip, in memory."""
+    return athcodec.MotionClip(
+        clip.block(0, min(frames, clip.frame_count)),
+        clip.time[:frames],
+        clip.vertex_branch,
+        clip.branch_parent,
+        clip.source_rest,
+        clip.edges,
+        clip.faces,
+        metadata=clip.metadata,
+        stem_index=clip.stem_index,
+    )
+
+
+def _is_above(change: tuple[float, float]) -> bool:
+    return abs(change[0]) > BYTES_LIMIT or abs(change[1]) > WORK_LIMIT
+
+
+def _rows(files: _Files, group: str, members: Sequence[Constant]) -> list[dict[str, Any]]:
+    """Return a row for each constant of a module. What the module as a whole does not move, none of them moves."""
+    rows = []
+    for one in members:
+        row = _row(files, one.full_name if len(members) > 1 else group, one.full_name)
+        if row["moves"] == "not measured" and _row(files, group, group)["moves"] == "no":
+            row["moves"] = "no"
+        rows.append(row | {"value": str(one.value)})
+    return rows
+
+
+def _row(files: _Files, name: str, title: str) -> dict[str, Any]:
+    row: dict[str, Any] = {"constant": title}
+    all_changes = []
+    for factor, word in zip(FACTORS, ("halved", "doubled")):
+        changes = [change for clip in files.clips if (change := files.change(name, factor, clip)) is not None]
+        for index, kind in enumerate(("bytes", "work")):
+            largest = max((change[index] for change in changes), key=abs, default=None)
+            row[f"{word}: {kind} %"] = None if largest in (None, float("inf")) else 100 * largest
+        all_changes += changes
+    if any(change[0] == float("inf") for change in all_changes):
+        row["moves"] = "fails"
+    elif not all_changes:
+        row["moves"] = "not measured"
+    else:
+        row["moves"] = "yes" if any(map(_is_above, all_changes)) else "no"
+    return row
