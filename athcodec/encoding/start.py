@@ -39,7 +39,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,
-        rotation_step_factors=first_rotations(source, samples, settings.levels),
+        rotation_step_factors=first_rotations(source, samples, rigid, settings.levels),
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )

@@ -25,10 +25,14 @@ LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
 MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre that is then no turn.
 
 
-def first_rotations(source: Source, samples: Sequence[SegmentSample], levels: int) -> tuple[int, ...]:
+def first_rotations(
+    source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray, levels: int
+) -> tuple[int, ...]:
     """Return the factor of each level that a search starts with: none turn, or the roots do where most of what stands
-    on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations."""
-    turns = Feature.ROTATIONS not in source.without and _turn_as_wholes(source, samples)
+    on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. rigid:
+    (B,) of branches that turn in any case if it is not 0."""
+    turns = Feature.ROTATIONS not in source.without and not rigid[source.hierarchy.branch_parent < 0].all()
+    turns = turns and _turn_as_wholes(source, samples)
     count = min(2, levels) if turns else 0
     return (ROTATION_FACTORS[-1],) * count + (0,) * (levels - count)
 
