@@ -107,7 +107,7 @@ def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_sta
 
 
 def planted(count: int = 9, each: int = 6, frames: int = 10) -> np.ndarray:
-    """The rest pose and frames, (1 + frames, count * each, 3), of upright stems that bend from feet that stand still."""
+    """The rest pose and frames, (1 + frames, count * each, 3), of stems that bend from feet that stand still."""
     random = np.random.default_rng(4)
     foot = np.stack(np.divmod(np.arange(count), 3), axis=-1) + 0.1 * random.standard_normal((count, 2))
     time, height = np.linspace(0, 1, frames + 1), np.arange(each) / each

@@ -59,8 +59,8 @@ def without_common_motion(frames: np.ndarray) -> np.ndarray | None:
 
 
 def _fit(rest: np.ndarray, poses: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rotations (F, 3, 3) that take the poses, (F, N, 3), back to the rest pose best, with weights (N,), from
-    the right, and the centres there, (3,), and in the poses, (F, 3)."""
+    """Return the rotations, (F, 3, 3), that take the poses, (F, N, 3), back to the rest pose best from the right, with
+    weights (N,), and the centres there, (3,), and in the poses, (F, 3)."""
     weight = weight / weight.sum()
     from_centre, to_centre = weight @ rest, np.einsum("n,fni->fi", weight, poses)
     moments = np.einsum("n,fni,nj->fij", weight, poses - to_centre[:, None], rest - from_centre)
