@@ -132,7 +132,7 @@ class Search:
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
         work.add(START * source.clip.vertex_count)
-        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)
+        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)._in_mid_turn()
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -298,14 +298,27 @@ class Search:
                     continue
             yield candidate
 
+    def _in_mid_turn(self) -> Search:
+        """Return the search about a pose in the middle of the turns of what turns as a whole, if that is cheaper: a
+        rotation by a full turn has no numbers, and jumps before."""
+        if not any(self.trials.start.rotation_step_factors) or not self._may_have_mean_pose:
+            return self
+        self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
+        other = self.about_mean_pose()
+        return other if other.first_cost() < self.first_cost() else self
+
+    @property
+    def _may_have_mean_pose(self) -> bool:
+        source = self.trials.source
+        if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
+            return False
+        return not source.keeps_shape.any()  # The mean of what turns is smaller than what turns.
+
     def about_best_reference(self) -> Search:
         """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: the
         mean pose if it is far ahead at first settings, else it is tried with what was chosen about the rest pose, and
         goes on from there. In small clips both are searched up to their steps."""
-        source = self.trials.source
-        if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
-            return self
-        if source.keeps_shape.any():  # The mean of what turns is smaller than what turns.
+        if not self._may_have_mean_pose:
             return self
         work, tried = self.trials.work, (self.of_sample or self).trials
         maps = 0.0 if tried.is_layered else 2 * work_of_steps(tried)

@@ -12,6 +12,7 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
 from athcodec.encoding.choices.rigid import first_rigid, loose_branches
+from athcodec.encoding.choices.rotations import first_rotations
 from athcodec.encoding.layers import layered_poses_size
 from athcodec.encoding.segment import Source, plain_settings, poses_size
 from athcodec.encoding.segment_samples import SegmentSample, usual_change
@@ -38,6 +39,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,
+        rotation_step_factors=first_rotations(source, samples, rigid, settings.levels),
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )

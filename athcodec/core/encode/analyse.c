@@ -3,7 +3,7 @@
 #include "encode/encode.h"
 #include "model/lanes.h"
 
-enum { FIRST_ROTATION_STEPS = 30, ROTATION_STEPS = 5 };
+enum { ROTATION_STEPS = 5 };
 enum { WAVES = 8 }; /* waves that a row is projected on at once */
 
 static const double STANDING = 0.1; /* largest RMS motion of a foot that stands, over that of its plant */
@@ -347,7 +347,8 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
         if (rigid && lane == 0) nearest_rotations(few, R, turned);
         for (int32_t k = 0; k < 9; k++) H[k] = sums[k][t] + prior * R[k];
         for (int32_t k = 0; rigid && k < 9; k++) R[k] = turned[k][lane];
-        if (!rigid) ath_turn_to(H, t == 0 ? FIRST_ROTATION_STEPS : ROTATION_STEPS, R);
+        if (!rigid && t == 0) ath_nearest_rotation(H, R); /* it may be far from the rest pose */
+        if (!rigid && t > 0) ath_turn_to(H, ROTATION_STEPS, R);
         ath_rotation_vector(R, q, own);
         for (int32_t k = 0; k < 3; k++) omega[k * T + t] = own[k];
     }

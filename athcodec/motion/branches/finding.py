@@ -17,6 +17,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.branches.attachment import arranged
+from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
 from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
@@ -58,8 +59,17 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     """Yield what find_branches finds and, if only a trial shows which makes the smallest file, alternatives: for
     motion, or runs that leave many points alone, patches of other sizes, patches without parents and one single branch;
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
-    that stands still has none."""
+    that stands still has none. What turns or travels as a whole is tried on a branch that carries all of it, too."""
     seen = Seen(clip, by_price=True)
+    for found in _candidates(seen, by_points):
+        on_feet = carried(found, seen.frames) if seen.is_carried else None
+        if on_feet is not None:
+            yield on_feet
+        yield found
+
+
+def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
+    clip = seen.clip
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
     by_points = by_points and not still

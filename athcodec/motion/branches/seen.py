@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from athcodec.motion.branches.common_motion import without_common_motion
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
@@ -35,7 +36,21 @@ class Seen:
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64."""
+        """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64, without what they have in common
+        as a whole."""
+        return self._frames if self._standing is None else self._standing
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether all turns or travels as a whole."""
+        return self._standing is not None
+
+    @cached_property
+    def _standing(self) -> np.ndarray | None:
+        return without_common_motion(self._frames)
+
+    @cached_property
+    def _frames(self) -> np.ndarray:
         clip = self.clip
         some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
         return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
