@@ -53,7 +53,7 @@ JUDGING = {
 }
 # Choices that stand between both parts of the order.
 STEPS = ("best_pieces_in_any_basis", "best_steps", "learned_about_other_pose")
-BY_HAND = (  # The order before one was learned.
+BY_HAND = (  # The order that was made by hand.
     ("best_freedom", "still_if_smaller", "best_forms", "best_rotations", "best_bases", "best_forms_again"),
     ("settled", "calm_parts", "best_slack", "waves_if_smaller", "best_rotations", "best_bases"),
 )
@@ -68,7 +68,7 @@ FILES_NOTE = f"""
 Bytes of positions alone in one layer. Seconds: of the processor. Best: bytes of effort "best"; default / best: at most
 {USUAL:g} on 95 % of all clips, {MOST:g} on every one. Untried: what the encoder's order left out for want of work.
 """
-HALVES_NOTE = "Means of ratios of bytes. By hand: the order before one was learned, with the same choices."
+HALVES_NOTE = "Means of ratios of bytes. By hand: the order that was made by hand."
 
 Order = tuple[tuple[str, ...], tuple[str, ...]]
 
