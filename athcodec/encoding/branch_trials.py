@@ -9,7 +9,9 @@ from itertools import chain
 import numpy as np
 
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.job import EncodingJob, EncodingOptions
+from athcodec.encoding.coded_clip import CodedClip
+from athcodec.encoding.file_options import EncodingOptions
+from athcodec.encoding.job import EncodingJob
 from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
@@ -106,16 +108,19 @@ class Trial:
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_of(clip)
         self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
-        source = Source(
+        coded = CodedClip(
+            PlacedClip.of(clip),
             clip,
             hierarchy,
-            survey(clip, hierarchy),
-            DEFAULT_SEGMENT,
+            clip.rest,
+            clip.rest_dtype,
+            clip.rest_given,
             exact_rest=lossless or host_rest,
             host_rest=host_rest,
         )
+        source = Source(coded, survey(clip, hierarchy), DEFAULT_SEGMENT)
         options = EncodingOptions(attributes="none", lossless=lossless)
-        job = EncodingJob(source, PlacedClip.of(clip), options, predicts_as_usual=True)
+        job = EncodingJob(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(job)
         with self._work.trying("branches", TRIAL_SHARE):

@@ -19,7 +19,8 @@ from typing import Any, BinaryIO, cast
 from athcodec.decoding import container as ct
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import Trial, best_branches
-from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Decided, Draft, EncodingJob, EncodingOptions, placed_clip
+from athcodec.encoding.file_options import EncodingOptions
+from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Decided, Draft, EncodingJob, placed_clip
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.polygons import pack_places
@@ -240,7 +241,7 @@ def _begin(
         work.expected = BRANCH_SHARE * allowed_work(vertices, frames, "default")
         with work.trying("branches"):
             placed, branches = _best_places(placed, option, options, work)
-    job = EncodingJob.begin(placed, _grown(placed, options), branches, options, report)
+    job = EncodingJob.begin(placed, branches, options, report)
     if branches is not None:
         job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
     attempts = itertools.count(1)
@@ -256,11 +257,12 @@ def _begin(
 
 def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
     """Warn the caller of `encode` of a bound that was kept and is coarse."""
-    if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
+    if objection := option.objection(bound, job.source.seen.diagonal, job.clip.motion.metadata.get("unit")):
         warnings.warn(objection, CoarseWarning, stacklevel=4)
 
 
 def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
+    """Return the clip that branches are sought for."""
     return placed.clip if options.keeps_rest else with_grown_pose(placed.clip)
 
 

@@ -13,15 +13,14 @@ import hashlib
 import math
 import tempfile
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 
 from athcodec._native import MEASURES, SHEET
 from athcodec.decoding import container as ct
@@ -31,7 +30,9 @@ from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, code_predicted_segment, one_map_each
+from athcodec.encoding.coded_clip import CodedClip, hierarchy_and_pose, host_rest, stored_polygons
 from athcodec.encoding.features import Feature
+from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
@@ -63,34 +64,24 @@ from athcodec.encoding.search import Search
 from athcodec.encoding.segment import CodedPrelude, Source, thread_count
 from athcodec.encoding.segment_samples import typical_segments
 from athcodec.encoding.settings import Choice
-from athcodec.encoding.shape import RestPrecision
 from athcodec.encoding.start import still_choice
 from athcodec.encoding.still import SplitSource
 from athcodec.encoding.summary import Seam, Summary
 from athcodec.encoding.survey import Ath, Survey, survey
+from athcodec.encoding.weights import ErrorWeights
 from athcodec.errors import BoundError, ClipError, SourceWarning
 from athcodec.files.threads import ThreadPool, default_jobs
-from athcodec.motion.branches.grown_pose import with_grown_branches
-from athcodec.motion.branches.result import Found, with_branches
+from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import ERROR_WEIGHTS, MotionClip
-from athcodec.motion.hierarchy import Hierarchy, derived_edges, hierarchy_of
+from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.joining import split
 from athcodec.motion.neighbours import lost_neighbours
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.presence import parts_hidden_far_away
 from athcodec.motion.thresholds import THRESHOLDS, Thresholds
-from athcodec.motion.units import METRES_PER_UNIT, LengthLike, stated_scene
-from athcodec.options import (
-    DEFAULT_LADDER,
-    EFFORTS,
-    LADDERS,
-    MAX_SEGMENT,
-    MIN_SEGMENT,
-    SMOOTHNESS,
-    ladder_of,
-    set_numbers,
-)
+from athcodec.motion.units import METRES_PER_UNIT, stated_scene
+from athcodec.options import DEFAULT_LADDER, LADDERS
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
@@ -101,60 +92,6 @@ PLACE_SHARE = 1 / 16  # Largest distance, in bounds, of a vertex from another th
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
-
-
-@dataclass(frozen=True)
-class EncodingOptions:
-    """The options of `encode` that are not the bound, checked. Raises ValueError."""
-
-    segment_frames: int | None = None  # Longest segment, as split_segments takes it.
-    tam: Thresholds | None = None
-    exact_rest: bool = False
-    host_rest: bool = False
-    rest_precision: RestPrecision = RestPrecision()
-    lossless: bool = False
-    weights: str | np.ndarray | None = None
-    attributes: str = "all"
-    effort: str = "default"
-    smoothness: str = "default"
-    jobs: int | None = None
-    ladder: tuple[float, ...] = ()  # Largest errors over the diagonal, descending; (): a single layer.
-    predicted_frames: int = MAX_SEGMENT  # Longest segment of predicted motion.
-    without: frozenset[Feature] = frozenset()  # Features that the file does without.
-
-    @classmethod
-    def of(
-        cls,
-        *,
-        segment_frames: int | None = None,
-        ladder: str | Sequence[float] = DEFAULT_LADDER,
-        rest_error: LengthLike | None = None,
-        **options,
-    ) -> EncodingOptions:
-        """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them."""
-        if segment_frames is not None:
-            options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
-        return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)
-
-    @property
-    def keeps_rest(self) -> bool:
-        """Whether the clip's rest pose comes back bit for bit, and so is what motion is coded about."""
-        return self.exact_rest or self.host_rest
-
-    def __post_init__(self) -> None:
-        set_numbers(self, wholes=("segment_frames", "jobs", "predicted_frames"))
-        if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
-            raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")
-        if self.exact_rest and self.host_rest:
-            raise ValueError("host_rest: got exact_rest too; expected one of them")
-        if self.attributes not in ("all", "none"):
-            raise ValueError(f"attributes: got {self.attributes!r}; expected 'all' or 'none'")
-        if self.jobs is not None and self.jobs < 1:
-            raise ValueError(f"jobs: got {self.jobs}; expected at least 1")
-        if self.effort not in EFFORTS:
-            raise ValueError(f"effort: got {self.effort!r}; expected one of {', '.join(EFFORTS)}")
-        if self.smoothness not in SMOOTHNESS:
-            raise ValueError(f"smoothness: got {self.smoothness!r}; expected one of {', '.join(SMOOTHNESS)}")
 
 
 @dataclass(frozen=True)
@@ -200,56 +137,18 @@ def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
             raise ClipError(f"clip: got {value} {name}; expected at most {limit}")
 
 
-def _completed(clip: MotionClip, branches: Found | None, options: EncodingOptions) -> MotionClip:
-    """Return the clip on branches that were found for it, with the rest pose as a host has it."""
-    if branches is not None:
-        clip = with_branches(clip, branches)
-    if options.host_rest:
-        clip = clip.replace(rest=_host_rest(clip))
-    return clip
-
-
-def _host_rest(clip: MotionClip) -> np.ndarray:
-    return clip.rest.astype(np.float32) + np.float32(0)  # -0.0 is 0.0
-
-
 def placed_clip(
     clip: MotionClip, options: EncodingOptions, bound: float = 0.0, places: Places | None = None
 ) -> PlacedClip:
     """Return the clip with a vertex for each place. bound: the largest error at least; places: as they were found
     before. Raises ClipError."""
-    clip, weights = (clip, None) if options.weights is None else _weighted(clip, options.weights)
+    weights = None if options.weights is None else ErrorWeights.of(clip, options.weights)
     if places is None:
-        labels = [] if weights is None else [weights]
-        least = bound if weights is None else bound * float(weights.min() / weights.max())
+        labels = [] if weights is None else [weights.values]
+        least = bound if weights is None else bound * float(weights.values.min() / weights.values.max())
         most_error = 0.0 if options.lossless or options.keeps_rest else PLACE_SHARE * least
         places = find_places(clip, labels, options.lossless or options.exact_rest, most_error)
     return PlacedClip.of(clip, places, weights)
-
-
-def _weighted(clip: MotionClip, weights: str | np.ndarray) -> tuple[MotionClip, np.ndarray]:
-    """Return the clip, which then names its weights, and these as (N,) float64. Raises ClipError."""
-    name = weights if isinstance(weights, str) else ERROR_WEIGHTS
-    attributes = clip.attributes if isinstance(weights, str) else clip.attributes | {name: _numbers(weights)}
-    if name not in attributes:
-        raise ClipError(f"weights: got {name!r}, expected one of {', '.join(attributes) or 'no attributes'}")
-    array = attributes[name]
-    if array.size != clip.vertex_count or array.dtype.kind not in "biuf":
-        raise ClipError(
-            f"weights: got {array.dtype} of shape {array.shape} in {name!r}, expected a number for each of "
-            f"{clip.vertex_count} vertices"
-        )
-    values = array.reshape(-1).astype(np.float64)
-    bad = np.flatnonzero(~((values > 0) & np.isfinite(values)))
-    if bad.size:
-        raise ClipError(f"weights: vertex {bad[0]} has {values[bad[0]]:g} in {name!r}, expected a number above 0")
-    return clip.replace(attributes=attributes, metadata=clip.metadata | {ERROR_WEIGHTS: name}), values
-
-
-def _numbers(weights: npt.ArrayLike) -> np.ndarray:
-    """Return weights as an array that a file can hold, which has no type for long doubles."""
-    array = np.asarray(weights)
-    return array.astype(np.float64) if array.dtype.kind == "f" and array.itemsize > 8 else array
 
 
 def time_chunk(*times: np.ndarray) -> bytes:
@@ -303,23 +202,20 @@ class EncodingJob:
     """One clip on its way into a file: what does not depend on the bound."""
 
     source: Source
-    placed: PlacedClip
     options: EncodingOptions
     report: Progress = silent
-    branches: Found | None = None
     spent: float = 0.0  # Work of finding branches.
     predicts_as_usual: bool = False  # Whether no other way to predict motion is tried.
     untried: tuple[str, ...] = ()  # What that left out.
 
     @classmethod
     def begin(
-        cls, placed: PlacedClip, grown: MotionClip, branches: Found | None, options: EncodingOptions, report: Progress
+        cls, placed: PlacedClip, branches: Found | None, options: EncodingOptions, report: Progress
     ) -> EncodingJob:
-        """Return the job for a clip, all of whose frames are read. grown: the clip itself, or with a rest pose that
-        shows more of it, which motion is coded about; branches: those found for a clip without."""
-        clip, of_grown = placed.clip, _completed(grown, branches, options)
-        hierarchy = hierarchy_of(of_grown)
+        """Return the job for a clip, all of whose frames are read. branches: those found for a clip without."""
+        hierarchy, pose = hierarchy_and_pose(placed, branches, options)
         _check_limits(placed.source, hierarchy)
+        coded, clip = CodedClip.of(placed, branches, hierarchy, pose, options), placed.clip
         pool = ThreadPool(options.jobs or default_jobs())
         thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
         for far in (parts_hidden_far_away(part) for part in split(clip).values()):
@@ -338,9 +234,10 @@ class EncodingJob:
                 SourceWarning,
                 stacklevel=2,
             )
-        of_grown = of_grown if options.keeps_rest else with_grown_branches(of_grown, hierarchy)
-        seen = survey(of_grown, hierarchy, progress=lambda f: report("survey", f), pool=pool, **thresholds)
-        return cls(cls._source(placed, branches, seen, options, pool), placed, options, report, branches)
+        seen = survey(
+            coded.motion, hierarchy, progress=lambda f: report("survey", f), pool=pool, rest=pose, **thresholds
+        )
+        return cls(Source.of(coded, seen, options, pool), options, report)
 
     @classmethod
     def resume(cls, clip: MotionClip, draft: Draft, report: Progress = silent, jobs: int | None = None) -> EncodingJob:
@@ -351,43 +248,11 @@ class EncodingJob:
             raise ClipError(f"clip: got {got} frames and vertices, expected {expected} as in the draft")
         options = dataclasses.replace(draft.options, jobs=jobs)
         placed = placed_clip(clip, options, places=draft.places)
-        source = cls._source(placed, draft.branches, seen, options, ThreadPool(jobs or default_jobs()))
-        return cls(source, placed, options, report, draft.branches)
-
-    @staticmethod
-    def _source(
-        placed: PlacedClip, branches: Found | None, seen: Survey, options: EncodingOptions, pool: ThreadPool
-    ) -> Source:
-        clip = _completed(placed.clip, branches, options)
-        order, reference = seen.hierarchy.vertex_source, None
-        first, sizes = placed.places.first[order], placed.places.sizes[order]
-        if not np.array_equal(seen.rest, clip.rest[order]):
-            if not clip.rest_given:
-                pose = np.empty_like(seen.rest)
-                pose[order] = seen.rest
-                clip = clip.replace(rest=pose.astype(clip.rest_dtype), rest_given=False)
-            else:
-                reference = seen.rest
-        source = Source(
-            clip,
-            seen.hierarchy,
-            seen,
-            options.segment_frames,
-            options.keeps_rest or (options.lossless and clip.rest_given),
-            None if placed.weights is None else placed.weights[first],
-            pool,
-            options.host_rest,
-            polygons=_polygons(clip, options),
-            shares=sizes if placed.places.are_shared else None,
-            place_error=placed.places.error,
-            host_mesh=_host_rest(placed.source) if options.host_rest else None,
-            rest_precision=options.rest_precision,
-            without=options.without,
-        )
-        return source if reference is None else source.about(reference - source.origin)
+        coded = CodedClip.of(placed, draft.branches, seen.hierarchy, seen.rest, options)
+        return cls(Source.of(coded, seen, options, ThreadPool(jobs or default_jobs())), options, report)
 
     @property
-    def clip(self) -> MotionClip:
+    def clip(self) -> CodedClip:
         return self.source.clip
 
     @property
@@ -662,8 +527,8 @@ class EncodingJob:
             decided.choice,
             self.seen,
             decided.segment_count,
-            self.placed.places,
-            self.branches,
+            self.clip.placed.places,
+            self.clip.branches,
             options,
             decided.fingerprint,
             decided.ath.thresholds,
@@ -708,8 +573,8 @@ class EncodingJob:
         """Write the whole file into `out`, which is to become `path`."""
         result = self.fill(writing.ChunkStore(spool), decided, coded)
         chunks = result.store.write(out, result.header, result.errors)
-        if any(clip_range.loop for clip_range in self.clip.clip_ranges):
-            mesh = _host_rest(self.placed.source) if self.options.host_rest else None
+        if any(clip_range.loop for clip_range in self.clip.motion.clip_ranges):
+            mesh = host_rest(self.clip.placed.source) if self.options.host_rest else None
             with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(decided, self._seam_errors(decoder)))
             out.seek(0)
@@ -727,19 +592,19 @@ class EncodingJob:
             store.add(kind, content, level)
         errors, joins, stages = self._add_motion(store, decided, coded)
         self._add_static(store)
-        if self.clip.clip_ranges:
-            store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.clip_ranges)))
+        if self.clip.motion.clip_ranges:
+            store.add(ct.CLIPS, self._clips(decided, [np.zeros(len(errors))] * len(self.clip.motion.clip_ranges)))
         header = ct.Header(
-            self.placed.source.vertex_count,
+            self.clip.placed.source.vertex_count,
             self.clip.vertex_count,
-            self.clip.branch_count,
+            self.clip.hierarchy.branch_count,
             self.clip.frame_count,
             decided.segment_count,
             len(errors),
             len(errors),
             0.0 if self.options.lossless else self.source.largest_bound(decided.choice.settings.bound),
             self.clip.dtype == np.float64,
-            len(self.clip.clip_range_frames),
+            len(self.clip.motion.clip_range_frames),
             len(layers.each),
             decided.choice.predicted is not None,
             stages=tuple(stages),
@@ -750,13 +615,15 @@ class EncodingJob:
 
     def _clips(self, decided: Decided, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
-        return writing.pack_clips(self.clip.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic)
+        return writing.pack_clips(
+            self.clip.motion.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic
+        )
 
     def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
         """Return for each loop how far off its step from the last frame to the first is, per level."""
         return [
             self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-            for clip, (start, stop) in zip(decoder.file.clips, self.clip.clip_range_frames)
+            for clip, (start, stop) in zip(decoder.file.clips, self.clip.motion.clip_range_frames)
         ]
 
     @staticmethod
@@ -769,14 +636,14 @@ class EncodingJob:
 
     def _step(self, frame: int, following: int) -> np.ndarray:
         """Return how far the vertices move from one frame of the source to another, (N, 3) float64."""
-        source = self.placed.source
+        source = self.clip.placed.source
         before, after = (source.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
         return after - before
 
     def seams(self, decoder: Decoder) -> tuple[Seam, ...]:
         """Return the seams of the loops of the file just written."""
         seams = []
-        for clip, (start, stop) in zip(decoder.file.clips, self.clip.clip_range_frames):
+        for clip, (start, stop) in zip(decoder.file.clips, self.clip.motion.clip_range_frames):
             if clip.loop:
                 beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
                 step, *steps = (
@@ -790,40 +657,52 @@ class EncodingJob:
         store.add(ct.REST, writing.pack_rest(decided.layers.rest))
         if decided.layers.source_rest:
             store.add(ct.SOURCE_REST, decided.layers.source_rest)
-        store.add(ct.TIME, time_chunk(*(self.clip.time[start:stop] for start, stop in self.clip.clip_range_frames)))
-        source, places = self.placed.source, self.placed.places
+        store.add(
+            ct.TIME,
+            time_chunk(*(self.clip.motion.time[start:stop] for start, stop in self.clip.motion.clip_range_frames)),
+        )
+        source, places = self.clip.placed.source, self.clip.placed.places
         if places.are_shared:
             store.add(ct.PLACES, polygons.pack_places(places))
-        kept = source.metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
-        metadata = {key: value for key, value in source.metadata.items() if key in kept}
+        metadata = self._stored(source.metadata, lambda weights: {ERROR_WEIGHTS: weights.name})
+        kept = metadata.keys() - {THRESHOLDS} if self._keeps_static else STATIC_METADATA
+        metadata = {key: value for key, value in metadata.items() if key in kept}
         metadata |= stated_scene(metadata)
         if self.options.tam is not None:
             metadata[THRESHOLDS] = self.options.tam.in_metadata
         if metadata:
             store.add(ct.METADATA, writing.pack_metadata(metadata))
-        faces = _polygons(source, self.options)
+        faces = stored_polygons(source, self.options)
         if faces is not None:
             store.add(ct.FACES, polygons.pack(faces, places))
         if self._keeps_static and source.edges is not None:
             store.add(ct.EDGES, self._edges(source.edges))
 
     def _edges(self, edges: np.ndarray) -> bytes:
-        places = self.placed.places
+        places = self.clip.placed.places
         derived = places.first[derived_edges(self.source.hierarchy)]
         if derived.shape == edges.shape and (derived == edges).all():
             return writing.pack_derived_edges(type_code(edges.dtype))
         return polygons.pack(Polygons.of_rows(edges), places)
 
     def _add_static(self, store: writing.ChunkStore) -> None:
-        source = self.placed.source
-        if self._keeps_static and len(source.attributes) > ct.Limits.attributes:
-            raise ClipError(f"attributes: got {len(source.attributes)}; expected at most {ct.Limits.attributes}")
-        in_faces = POLYGON_ARRAYS if self.source.polygons is not None and source.faces is None else ()
+        source = self.clip.placed.source
+        attributes = self._stored(source.attributes, lambda weights: {weights.name: weights.array})
+        if self._keeps_static and len(attributes) > ct.Limits.attributes:
+            raise ClipError(f"attributes: got {len(attributes)}; expected at most {ct.Limits.attributes}")
+        in_faces = POLYGON_ARRAYS if self.clip.polygons is not None and source.faces is None else ()
         if self._keeps_static:
-            for name, array in source.attributes.items():
+            for name, array in attributes.items():
                 if name in in_faces:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
+
+    def _stored(
+        self, of_source: dict[str, Any], of_weights: Callable[[ErrorWeights], dict[str, Any]]
+    ) -> dict[str, Any]:
+        """Return attributes or metadata of the source with those of weights, if there are some."""
+        weights = self.clip.placed.weights
+        return of_source if weights is None else of_source | of_weights(weights)
 
     def coded(self, decided: Decided, segments: Sequence[int]) -> Iterator[CodedSegment]:
         """Yield coded segments, as many at a time as there is memory for."""
@@ -940,13 +819,6 @@ def _finished(begun: tuple[int, CodedMotion]) -> CodedSegment:
     return coded
 
 
-def _polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | None:
-    """Return what is stored as FACES."""
-    if options.attributes == "none":
-        return None
-    return Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
-
-
 def _summary(
     path: Path | None, job: EncodingJob, decided: Decided, result: _Result, chunks: list[ct.Chunk], decoder: Decoder
 ) -> Summary:
@@ -969,7 +841,7 @@ def _summary(
         "periodic": settings.periodic,
         "learned_pieces": 0 if settings.learned_pieces is None else int(settings.learned_pieces.sum()),
     }
-    diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.placed.source.vertex_count * 12
+    diagonal, raw = job.seen.diagonal, job.clip.frame_count * job.clip.placed.source.vertex_count * 12
     return Summary(
         path,
         result.header.file_length,
@@ -981,7 +853,7 @@ def _summary(
         sizes,
         choices,
         job.seams(decoder),
-        None if job.branches is None else str(job.branches),
-        job.clip.not_read,
+        None if job.clip.branches is None else str(job.clip.branches),
+        job.clip.placed.source.not_read,
         decided.choice.untried,
     )

@@ -436,6 +436,7 @@ def survey(
     *,
     eta: int = 0,
     pool: ThreadPool = SERIAL,
+    rest: np.ndarray | None = None,
 ) -> Survey:
     """The statistics of a clip's frames from which `Survey.ath` makes the ATH for thresholds chosen afterwards.
 
@@ -457,6 +458,8 @@ def survey(
         Frames; the largest eta that `Survey.ath` will be asked for.
     pool : ThreadPool
         The result does not depend on the number of threads.
+    rest : (N, 3) float64 array, optional
+        The base pose in file order, where it is not the clip's rest pose.
 
     Returns
     -------
@@ -476,7 +479,7 @@ def survey(
         raise ValueError(f"max_depth: got {max_depth}, expected a number >= 0")
     if hierarchy is None:
         hierarchy = hierarchy_of(clip)
-    rest = np.asarray(clip.rest, float)[hierarchy.vertex_source]
+    rest = np.asarray(clip.rest, float)[hierarchy.vertex_source] if rest is None else rest
     branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
     pieces = _tested_pieces(hierarchy, rest, branches)
     xi = limits.distances[1] if limits.lam else None
