@@ -14,12 +14,12 @@ from plants import chain_plant, clip_of, plant
 import athcodec
 from athcodec import MotionClip
 from athcodec.decoding.container import MAGIC, Limits
-from athcodec.encoding import job
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.coded_clip import CodedClip
 from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.motion import SegmentMotion
 from athcodec.encoding.places import PlacedClip
+from athcodec.encoding.preparation import surveyed
 from athcodec.encoding.progress import silent
 from athcodec.encoding.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
@@ -58,7 +58,7 @@ def test_a_target_size_that_no_bound_reaches_is_refused_with_the_least_size(smal
 @pytest.mark.parametrize("fits_from", [2e-7, 1e-3, 0.09])
 def test_a_target_size_is_looked_for_with_a_counted_number_of_files(too_large, fits_from, small):
     """Where files shrink to just above the target and then jump below it, the next bound was a few per cent away."""
-    source, tried = job.EncodingJob.begin(PlacedClip.of(small), None, EncodingOptions(), silent).source, []
+    source, tried = surveyed(PlacedClip.of(small), None, EncodingOptions(), silent), []
 
     def file_size(bound):
         tried.append(bound)

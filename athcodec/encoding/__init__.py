@@ -6,8 +6,8 @@ choice (choices/) is made by trials (trials.py). A segment's motion is analysed 
 encoder.py has the entry points. Decoding imports nothing from here.
 """
 
+from athcodec.encoding.decided import CodedSegment, Draft
 from athcodec.encoding.encoder import code_segments, draft, encode_clip, write
-from athcodec.encoding.job import CodedSegment, Draft
 from athcodec.encoding.summary import Seam, Summary
 
 __all__ = ["CodedSegment", "Draft", "Seam", "Summary", "code_segments", "draft", "encode_clip", "write"]
