@@ -216,7 +216,11 @@ def _decided(
     with warnings.catch_warnings():
         if usual is not None:
             warnings.simplefilter("ignore", SourceWarning)  # The usual effort has warned.
-        decisions, bound = _begin(known, option, options, report)
+        source, work = prepared(known, option, options, report)
+    decisions = FileDecisions(source, options, report)
+    if work is not None:
+        decisions = dataclasses.replace(decisions, spent=work.done, untried=tuple(set(work.untried) & {"branches"}))
+    bound = _bound(decisions, option, report)
     with decisions.refusing(bound):
         decided = decisions.decide(bound)
     if usual is not None and FileAssembly(usual[2], options).size() <= FileAssembly(decided, options).size():
@@ -230,14 +234,8 @@ def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
     return options.effort == "best" and option.target_size is None
 
 
-def _begin(
-    placed: PlacedClip, option: BoundOption, options: EncodingOptions, report: Progress
-) -> tuple[FileDecisions, float]:
-    """Return what decides about the file of a clip, and its bound in scene units."""
-    source, work = prepared(placed, option, options, report)
-    decisions = FileDecisions(source, options, report)
-    if work is not None:
-        decisions = dataclasses.replace(decisions, spent=work.done, untried=tuple(set(work.untried) & {"branches"}))
+def _bound(decisions: FileDecisions, option: BoundOption, report: Progress) -> float:
+    """Return the bound of a file in scene units."""
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:
@@ -245,7 +243,7 @@ def _begin(
         report("size", attempt / (attempt + 4))
         return size
 
-    return decisions, option.in_scene_units(source, file_size)
+    return option.in_scene_units(decisions.source, file_size)
 
 
 def _object(decided: Decided, option: BoundOption, bound: float) -> None:

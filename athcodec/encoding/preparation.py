@@ -66,7 +66,7 @@ def prepared(
 def surveyed(placed: PlacedClip, branches: Found | None, options: EncodingOptions, report: Progress) -> Source:
     """Return the source of a clip, all of whose frames are read. branches: those found for a clip without."""
     hierarchy, pose = hierarchy_and_pose(placed, branches, options)
-    _check_limits(placed.source, hierarchy)
+    _check_limits(placed.source.vertex_count, placed.source.frame_count, hierarchy)
     clip, pool = CodedClip.of(placed, branches, hierarchy, pose, options), ThreadPool(options.jobs or default_jobs())
     thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
     _warn_of_odd_points(placed.clip)
@@ -106,13 +106,13 @@ def _warn_of_odd_points(clip: MotionClip) -> None:
         )
 
 
-def _check_limits(clip: MotionClip, hierarchy: Hierarchy) -> None:
+def _check_limits(vertices: int, frames: int, hierarchy: Hierarchy) -> None:
     """Raise ClipError for counts that decoders refuse."""
     limits = ct.Limits()
     for name, value, limit in (
-        ("vertices", clip.vertex_count, limits.vertices),
-        ("branches", clip.branch_count, limits.branches),
-        ("frames", clip.frame_count, limits.frames),
+        ("vertices", vertices, limits.vertices),
+        ("branches", hierarchy.branch_count, limits.branches),
+        ("frames", frames, limits.frames),
         ("branches on branches", int(hierarchy.branch_depth.max()) + 1, limits.hierarchy_depth),
     ):
         if value > limit:

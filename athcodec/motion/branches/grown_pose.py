@@ -38,7 +38,7 @@ def grown_pose(clip: MotionClip) -> np.ndarray | None:
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
-    frames = _some_frames(clip)
+    frames = _some_frames(clip.frame_count)
     poses = (pose.T.copy() for pose in itertools.chain([clip.rest], _poses(clip, frames)))
     sizes = np.sqrt([sum(np.square(x[links[:, 0]] - x[links[:, 1]]) for x in pose) for pose in poses])
     largest = sizes[1:].max(axis=0)
@@ -58,7 +58,7 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     of the frame where they are largest. Such a branch hangs on its parent as it does in that frame."""
     if clip.frame_count == 1:
         return pose
-    frames, source, first = _some_frames(clip), hierarchy.vertex_source, hierarchy.first_vertex
+    frames, source, first = _some_frames(clip.frame_count), hierarchy.vertex_source, hierarchy.first_vertex
     sizes = np.array([_branch_sizes(frame[source], first) for frame in _poses(clip, frames)])
     rest = pose[source].astype(np.float64)
     small = np.flatnonzero(_branch_sizes(rest, first) < SMALL * sizes.max(axis=0))
@@ -76,9 +76,9 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     return grown
 
 
-def _some_frames(clip: MotionClip) -> np.ndarray:
+def _some_frames(frame_count: int) -> np.ndarray:
     """Return the numbers of frames spread over the clip, the first and the last among them."""
-    return np.unique(np.linspace(0, clip.frame_count - 1, FRAMES).astype(int))
+    return np.unique(np.linspace(0, frame_count - 1, FRAMES).astype(int))
 
 
 def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
