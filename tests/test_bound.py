@@ -21,7 +21,7 @@ from plants import STEADY, clip_of, plant
 
 import athcodec
 from athcodec import cli
-from athcodec.encoding import job, streams
+from athcodec.encoding import decisions, streams
 from athcodec.encoding import quantise as qz
 from athcodec.errors import BoundError, ClipError, CoarseWarning
 from athcodec.metrics import ErrorMeter
@@ -198,14 +198,14 @@ def test_every_bound_ends_in_a_file_within_it_or_in_one_that_can_be_kept(seeds, 
 
 def test_a_bound_that_coding_turns_out_not_to_keep_is_refused_with_one_found_by_coding(scratch, monkeypatch):
     clip, bound, _ = clip_at_its_last_bits(0)
-    coded, least = job.EncodingJob.decide, 3.7 * bound
+    coded, least = decisions.FileDecisions.decide, 3.7 * bound
 
     def refusing(self, tried):
         if tried < least:
             raise BoundError("max error: cannot be kept")
         return coded(self, tried)
 
-    monkeypatch.setattr(job.EncodingJob, "decide", refusing)
+    monkeypatch.setattr(decisions.FileDecisions, "decide", refusing)
     assert least <= encoded_or_refused(clip, bound, {}, scratch / "named.ath", Work(monkeypatch)) <= 1.1 * least
 
 

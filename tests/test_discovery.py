@@ -16,7 +16,7 @@ from athcodec import MotionClip
 from athcodec.cli import main
 from athcodec.encoding.bounds import BoundOption
 from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.job import EncodingJob
+from athcodec.encoding.decisions import FileDecisions
 from athcodec.encoding.progress import Work, allowed_work
 from athcodec.errors import ClipError
 from athcodec.motion.branches import finding, saving, seen
@@ -351,14 +351,14 @@ def test_a_method_without_the_data_that_it_needs_is_refused(dressed):
 def trial_bounds(clip: MotionClip, path: Path, monkeypatch, **options) -> list[float]:
     """The bounds that candidates for branches are tried at, in scene units."""
     bounds: list[float] = []
-    tried = EncodingJob.tried
+    tried = FileDecisions.tried
 
-    def noted(job: EncodingJob, bound: float, *more) -> object:
+    def noted(decisions: FileDecisions, bound: float, *more) -> object:
         bounds.append(bound)
-        return tried(job, bound, *more)
+        return tried(decisions, bound, *more)
 
     with monkeypatch.context() as patch:
-        patch.setattr(EncodingJob, "tried", noted)
+        patch.setattr(FileDecisions, "tried", noted)
         athcodec.encode(clip, path, effort="fast", **options)
     return bounds
 

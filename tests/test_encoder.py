@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import tracemalloc
 
 import h5py
@@ -13,10 +14,12 @@ from plants import chain_plant, clip_of, plant
 import athcodec
 from athcodec import MotionClip
 from athcodec.decoding.container import MAGIC, Limits
-from athcodec.encoding import job
 from athcodec.encoding.bounds import BoundOption
+from athcodec.encoding.coded_clip import CodedClip
+from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.motion import SegmentMotion
 from athcodec.encoding.places import PlacedClip
+from athcodec.encoding.preparation import surveyed
 from athcodec.encoding.progress import silent
 from athcodec.encoding.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
@@ -55,7 +58,7 @@ def test_a_target_size_that_no_bound_reaches_is_refused_with_the_least_size(smal
 @pytest.mark.parametrize("fits_from", [2e-7, 1e-3, 0.09])
 def test_a_target_size_is_looked_for_with_a_counted_number_of_files(too_large, fits_from, small):
     """Where files shrink to just above the target and then jump below it, the next bound was a few per cent away."""
-    source, tried = job.EncodingJob.begin(PlacedClip.of(small), small, None, job.EncodingOptions(), silent).source, []
+    source, tried = surveyed(PlacedClip.of(small), None, EncodingOptions(), silent), []
 
     def file_size(bound):
         tried.append(bound)
@@ -416,3 +419,26 @@ def test_a_branch_may_have_more_vertices_than_the_largest_lag(tmp_path):
     summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-2, effort="fast")
     with athcodec.open(tmp_path / "a.ath") as decoder:
         assert np.linalg.norm(decoder.positions() - moved, axis=2).max() <= summary.max_error_bound
+
+
+def test_a_clip_becomes_one_record_on_its_way_into_a_file_and_is_never_replaced(monkeypatch, tmp_path):
+    """A rest pose that shows little of the plant, weights, and a host's rest pose each once made another clip."""
+    made, of = [], CodedClip.of
+
+    def noted(*words) -> CodedClip:
+        made.append(of(*words))
+        return made[-1]
+
+    def replaced(clip: MotionClip, **changes) -> MotionClip:
+        raise AssertionError(f"the clip was replaced: {', '.join(changes)}")
+
+    clip, growth = plant(3, branches=5, frames=20), np.linspace(0.01, 1, 20)[:, None, None]
+    clip = MotionClip(clip.rest * growth + clip.positions * 0.1, clip.time, clip.vertex_branch, clip.branch_parent)
+    monkeypatch.setattr(CodedClip, "of", noted)
+    monkeypatch.setattr(MotionClip, "replace", replaced)
+    for count, options in enumerate(({"weights": np.linspace(1, 2, clip.vertex_count)}, {"host_rest": True}), start=1):
+        athcodec.encode(clip, tmp_path / "a.ath", effort="fast", **options)
+        assert len(made) == count
+        for name in ("rest", "hierarchy", "motion", "reference", "weights"):
+            with pytest.raises(dataclasses.FrozenInstanceError):
+                setattr(made[-1], name, None)

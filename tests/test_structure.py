@@ -29,6 +29,22 @@ def test_decoding_imports_nothing_of_encoding(module):
     assert printed(sys.executable, "-c", program).strip() == "[]"
 
 
+def test_the_picture_of_the_floors_shows_the_contract_that_imports_are_checked_by():
+    """Each line of the contract is a line of CONTRIBUTING.md, in the same order, with the same modules side by side."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+    layers = next(contract["layers"] for contract in contracts if contract["name"] == "floors")
+    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    picture = re.search(r"^```text\n(   cli .*?)^```", text, re.M | re.S).group(1)
+    shown = [
+        re.split(r"\s{4,}", line.strip())[0]
+        for line in picture.splitlines()
+        if line.startswith("   ") and line[3] != " "
+    ]
+    assert [re.findall(r"\w+", line.replace("core/", "")) for line in shown] == [
+        re.findall(r"\w+", layer) for layer in layers
+    ]
+
+
 CORE = ROOT / "athcodec" / "core"
 FLOORS = ("include", "bits", "container", "model", "streams", "file", "play", "gpu", "encode")
 """Folders of the C core. Each may include, and call, only itself and those before it."""

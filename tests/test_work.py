@@ -9,7 +9,7 @@ from plants import plant
 import athcodec
 from athcodec import MotionClip
 from athcodec.encoding import progress
-from athcodec.encoding.job import EncodingJob
+from athcodec.encoding.decisions import FileDecisions
 from bench import odd
 
 
@@ -33,13 +33,13 @@ KINDS = {
 def works(monkeypatch) -> list[progress.Work]:
     """The work of every decision about a file."""
     works: list[progress.Work] = []
-    decide = EncodingJob._decide
+    decide = FileDecisions._decide
 
-    def noted(job: EncodingJob, bound: float, work: progress.Work) -> object:
+    def noted(decisions: FileDecisions, bound: float, work: progress.Work) -> object:
         works.append(work)
-        return decide(job, bound, work)
+        return decide(decisions, bound, work)
 
-    monkeypatch.setattr(EncodingJob, "_decide", noted)
+    monkeypatch.setattr(FileDecisions, "_decide", noted)
     return works
 
 

@@ -9,7 +9,9 @@ from itertools import chain
 import numpy as np
 
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.job import EncodingJob, EncodingOptions
+from athcodec.encoding.coded_clip import CodedClip
+from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.places import PlacedClip
 from athcodec.encoding.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.segment import Source
@@ -106,30 +108,33 @@ class Trial:
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_of(clip)
         self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
-        source = Source(
+        coded = CodedClip(
+            PlacedClip.of(clip),
             clip,
             hierarchy,
-            survey(clip, hierarchy),
-            DEFAULT_SEGMENT,
+            clip.rest,
+            clip.rest_dtype,
+            clip.rest_given,
             exact_rest=lossless or host_rest,
             host_rest=host_rest,
         )
+        source = Source(coded, survey(clip, hierarchy), DEFAULT_SEGMENT)
         options = EncodingOptions(attributes="none", lossless=lossless)
-        job = EncodingJob(source, PlacedClip.of(clip), options, predicts_as_usual=True)
+        decisions = FileDecisions(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
-            self._option = self._bound_of_target(job)
+            self._option = self._bound_of_target(decisions)
         with self._work.trying("branches", TRIAL_SHARE):
-            bound = self._option.in_scene_units(source, job.file_size)
-            return job.tried(bound, self._work, self._frames_ratio)
+            bound = self._option.in_scene_units(source, decisions.file_size)
+            return decisions.tried(bound, self._work, self._frames_ratio)
 
-    def _bound_of_target(self, job: EncodingJob) -> BoundOption:
+    def _bound_of_target(self, decisions: FileDecisions) -> BoundOption:
         """Return the bound at which the branches tried first meet the target size; all are tried at it."""
         work = Work()
 
         def size(bound: float) -> float:
-            return job.tried(bound, work, self._frames_ratio)[0]
+            return decisions.tried(bound, work, self._frames_ratio)[0]
 
         try:
-            return BoundOption(max_error=self._option.in_scene_units(job.source, size, FILLED))
+            return BoundOption(max_error=self._option.in_scene_units(decisions.source, size, FILLED))
         except BoundError:
             return BoundOption()

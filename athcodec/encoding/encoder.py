@@ -1,7 +1,8 @@
 """The entry points of encoding: a motion clip becomes one .ath file, in one call or in three.
 
 `encode_clip` does all of it. `draft`, `code_segments` and `write` are its three steps, for several processes that work
-on one clip. The work itself is job.py's.
+on one clip. A clip is made ready (preparation.py), decided about (decisions.py), coded (segment_coding.py) and put
+together (assembly.py).
 """
 
 from __future__ import annotations
@@ -17,29 +18,28 @@ from os import PathLike
 from typing import Any, BinaryIO, cast
 
 from athcodec.decoding import container as ct
+from athcodec.encoding.assembly import SPOOL_BYTES, FileAssembly
 from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import Trial, best_branches
-from athcodec.encoding.job import SPOOL_BYTES, CodedSegment, Decided, Draft, EncodingJob, EncodingOptions, placed_clip
+from athcodec.encoding.decided import CodedSegment, Decided, Draft
+from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.layers import layer_ratios
 from athcodec.encoding.places import PlacedClip
-from athcodec.encoding.polygons import pack_places
-from athcodec.encoding.progress import BRANCH_SHARE, Progress, WeightedProgress, Work, allowed_work, stage_weights
+from athcodec.encoding.preparation import placed_clip, prepared, resumed
+from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.segment_coding import SegmentCoder
 from athcodec.encoding.segment_samples import SAMPLES
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.summary import Summary
 from athcodec.errors import CoarseWarning, SourceWarning
 from athcodec.files.atomic import check_target, keeping, new_file
-from athcodec.motion.branches.grown_pose import with_grown_pose
-from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.motion.joining import metadata_of
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, stated_scene
 from athcodec.options import DEFAULT_REL_ERROR
 
-JOINED_SHARE = 0.95  # Largest share of the bytes at which parts that touch at a point are joined there.
 USUAL = "usual effort"  # The stage of progress in which effort "best" decides as "default" does.
-FEWER_PLACES = 0.9  # Largest share of the places that are left then, if joining is to be tried.
 
 
 def encode_clip(
@@ -60,13 +60,15 @@ def encode_clip(
         whole = tempfile.SpooledTemporaryFile(SPOOL_BYTES) if path is None else new_file(path)
         with whole as opened, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             out = cast(BinaryIO, opened)
-            job, bound, decided = _decided(clip, option, checked, _weighted_progress(clip, progress, option, checked))
-            with job.refusing(bound):
-                summary = job.write(path, out, spool, decided, job.coded(decided, range(decided.segment_count)))
+            report = _weighted_progress(clip, progress, option, checked)
+            decisions, bound, decided = _decided(clip, option, checked, report)
+            with decisions.refusing(bound):
+                coded = SegmentCoder(decided, checked, report).coded(range(decided.segment_count))
+                summary = FileAssembly(decided, checked, report).write(path, out, spool, coded)
             if path is None:
                 out.seek(0)
                 shutil.copyfileobj(out, cast(BinaryIO, target))
-        _object(job, option, bound)
+        _object(decided, option, bound)
         return summary
 
 
@@ -119,9 +121,9 @@ def draft(
     option, checked = _checked(clip, max_error, rel_error, target_size, **options)
     with clip.watched():
         report = _weighted_progress(clip, progress, option, checked, draft=True)
-        job, bound, decided = _decided(clip, option, checked, report)
-        made = job.draft(decided)
-    _object(job, option, bound)
+        decisions, bound, decided = _decided(clip, option, checked, report)
+        made = decisions.draft(decided)
+    _object(decided, option, bound)
     return made
 
 
@@ -149,9 +151,9 @@ def code_segments(
     ClipError
         Where the clip is another than that of the draft, as far as its hierarchy and rest pose show.
     """
-    job = EncodingJob.resume(clip, draft, jobs=jobs)
-    with clip.watched(), job.refusing(draft.choice.settings.bound):
-        yield from job.coded(job.decided(draft), list(segments))
+    decisions = FileDecisions(*resumed(clip, draft, jobs))
+    with clip.watched(), decisions.refusing(draft.choice.settings.bound):
+        yield from SegmentCoder(decisions.decided(draft), decisions.options).coded(list(segments))
 
 
 def write(
@@ -190,33 +192,41 @@ def write(
     """
     with keeping(clip.inputs):
         check_target(path, ".ath")
-    job = EncodingJob.resume(clip, draft, WeightedProgress(progress, {"motion": 1.0}))
+    decisions = FileDecisions(*resumed(clip, draft))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
-        return job.write(path, out, spool, job.decided(draft), coded)
+        report = WeightedProgress(progress, {"motion": 1.0})
+        return FileAssembly(decisions.decided(draft), decisions.options, report).write(path, out, spool, coded)
 
 
 def _decided(
     clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress, known: PlacedClip | None = None
-) -> tuple[EncodingJob, float, Decided]:
-    """Return the job, its bound in scene units, and what is decided about the file. Trials estimate, so effort "best"
-    decides as "default" does, too, and keeps what makes the smaller file. known: the clip's places, which do not depend
-    on the effort; None: they are found here."""
-    placed, usual = _placed(clip, option, options) if known is None else known, None
+) -> tuple[FileDecisions, float, Decided]:
+    """Return what decides about a file, its bound in scene units, and what is decided. Trials estimate, so effort
+    "best" decides as "default" does, too, and keeps what makes the smaller file. known: the clip's places, which do not
+    depend on the effort; None: they are found here."""
+    if known is None:
+        clip.check()
+        known = placed_clip(clip, options, option.least(clip))
+    usual = None
     if _is_compared(option, options):
         as_usual = dataclasses.replace(options, effort="default")
         weights = _stage_weights(clip, option, as_usual, motion=False)
         part = WeightedProgress(lambda stage, fraction: report(f"{USUAL}: {stage}", fraction), weights)
-        usual = _decided(clip, option, as_usual, part, placed)
+        usual = _decided(clip, option, as_usual, part, known)
     with warnings.catch_warnings():
         if usual is not None:
-            warnings.simplefilter("ignore", SourceWarning)  # The usual job has warned.
-        job, bound = _begin(placed, option, options, report)
-    with job.refusing(bound):
-        decided = job.decide(bound)
-    if usual is not None and usual[0].size(usual[2]) <= job.size(decided):
+            warnings.simplefilter("ignore", SourceWarning)  # The usual effort has warned.
+        source, work = prepared(known, option, options, report)
+    decisions = FileDecisions(source, options, report)
+    if work is not None:
+        decisions = dataclasses.replace(decisions, spent=work.done, untried=tuple(set(work.untried) & {"branches"}))
+    bound = _bound(decisions, option, report)
+    with decisions.refusing(bound):
+        decided = decisions.decide(bound)
+    if usual is not None and FileAssembly(usual[2], options).size() <= FileAssembly(decided, options).size():
         usual[2].choice = dataclasses.replace(usual[2].choice, untried=decided.choice.untried)
-        return dataclasses.replace(usual[0], report=report), bound, usual[2]
-    return job, bound, decided
+        return usual[0], bound, usual[2]
+    return decisions, bound, decided
 
 
 def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
@@ -224,74 +234,23 @@ def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
     return options.effort == "best" and option.target_size is None
 
 
-def _placed(clip: MotionClip, option: BoundOption, options: EncodingOptions) -> PlacedClip:
-    clip.check()
-    return placed_clip(clip, options, option.least(clip))
-
-
-def _begin(
-    placed: PlacedClip, option: BoundOption, options: EncodingOptions, report: Progress
-) -> tuple[EncodingJob, float]:
-    """The job, whose clip has branches by then, and its bound in scene units."""
-    clip, branches = placed.source, None
-    if not clip.has_branches:
-        vertices, frames = placed.clip.vertex_count, clip.frame_count
-        work = Work(BRANCH_SHARE * allowed_work(vertices, frames, options.effort), report, "branches")
-        work.expected = BRANCH_SHARE * allowed_work(vertices, frames, "default")
-        with work.trying("branches"):
-            placed, branches = _best_places(placed, option, options, work)
-    job = EncodingJob.begin(placed, _grown(placed, options), branches, options, report)
-    if branches is not None:
-        job.spent, job.untried = work.done, tuple(set(work.untried) & {"branches"})
+def _bound(decisions: FileDecisions, option: BoundOption, report: Progress) -> float:
+    """Return the bound of a file in scene units."""
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:
-        size, attempt = job.file_size(bound), next(attempts)
+        size, attempt = decisions.file_size(bound), next(attempts)
         report("size", attempt / (attempt + 4))
         return size
 
-    bound = option.in_scene_units(job.source, file_size)
-    return job, bound
+    return option.in_scene_units(decisions.source, file_size)
 
 
-def _object(job: EncodingJob, option: BoundOption, bound: float) -> None:
+def _object(decided: Decided, option: BoundOption, bound: float) -> None:
     """Warn the caller of `encode` of a bound that was kept and is coarse."""
-    if objection := option.objection(bound, job.source.seen.diagonal, job.clip.metadata.get("unit")):
+    source = decided.source
+    if objection := option.objection(bound, source.seen.diagonal, source.clip.motion.metadata.get("unit")):
         warnings.warn(objection, CoarseWarning, stacklevel=4)
-
-
-def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
-    return placed.clip if options.keeps_rest else with_grown_pose(placed.clip)
-
-
-def _best_places(
-    placed: PlacedClip, option: BoundOption, options: EncodingOptions, work: Work
-) -> tuple[PlacedClip, Found]:
-    """Return the clip with the places that make the smallest file, as far as there is work for trials, and the branches
-    of its places. Parts that touch at a point are joined there or apart; like objects may be joined alike."""
-    apart = placed.apart()
-    first = placed if apart is None else apart
-    regular = first.regular()
-    is_joined_tried = apart is not None and placed.places.count <= FEWER_PLACES * apart.places.count
-    is_compared = is_joined_tried or regular is not None
-    branches, size = best_branches(_grown(first, options), option, work, options.host_rest, is_compared)
-    best, least = (first, branches), size + _table_bytes(first)
-    if regular is not None:
-        moved, trial = (
-            first.moved_to(branches, regular),
-            Trial(_grown(regular, options), option, options.host_rest, work),
-        )
-        size = trial.size(moved)[0] + _table_bytes(regular)
-        best, least = ((regular, moved), size) if size < least else (best, least)
-    if is_joined_tried and work.fits(work.done):
-        others, size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
-        if size + _table_bytes(placed) < JOINED_SHARE * least:
-            return placed, others
-    return best
-
-
-def _table_bytes(placed: PlacedClip) -> int:
-    return len(pack_places(placed.places)) if placed.places.are_shared else 0
 
 
 def _weighted_progress(

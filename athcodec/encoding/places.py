@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from athcodec._native import address, lib
+from athcodec.encoding.weights import ErrorWeights
 from athcodec.motion.branches.finding import named_labels
+from athcodec.motion.branches.grown_pose import grown_pose
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.seen import copies_of, parts_by_sides, parts_of
 from athcodec.motion.clip import MotionClip, Skin, stem_index_of
@@ -35,20 +38,26 @@ class PlacedClip:
     clip : MotionClip
         With a vertex for each place, but without other attributes than branches are found by. It is `source` itself
         if no vertices share a place.
-    weights : (N,) float64 array or None
+    weights : ErrorWeights or None
         Factors on the bound of all vertices.
     """
 
     source: MotionClip
     places: Places
     clip: MotionClip
-    weights: np.ndarray | None = None
+    weights: ErrorWeights | None = None
 
     @classmethod
-    def of(cls, source: MotionClip, places: Places | None = None, weights: np.ndarray | None = None) -> PlacedClip:
+    def of(cls, source: MotionClip, places: Places | None = None, weights: ErrorWeights | None = None) -> PlacedClip:
         """Return the clip with these places; None: each vertex has its own."""
         places = Places.apart(source.vertex_count) if places is None else places
         return cls(source, places, clip_of_places(source, places) if places.are_shared else source, weights)
+
+    @cached_property
+    def grown_pose(self) -> np.ndarray:
+        """The pose of `clip` that shows most of it, (P, 3): its rest pose, or the frame in which it is most grown."""
+        pose = grown_pose(self.clip)
+        return self.clip.source_rest if pose is None else pose
 
     def apart(self, zeros_differ: bool = False) -> PlacedClip | None:
         """Return the clip with parts of its mesh apart that touch at single places; None: none do."""

@@ -15,8 +15,6 @@ from athcodec.encoding.motion import Plan
 from athcodec.encoding.segment import Source, branch_records
 from athcodec.encoding.settings import OF_BRANCHES, Settings
 from athcodec.encoding.survey import Ath
-from athcodec.motion.clip import MotionClip
-from athcodec.motion.frames import Frames
 from athcodec.motion.hierarchy import Hierarchy
 
 LARGE = 5_000  # Vertices up to which a plant is not sampled.
@@ -30,37 +28,26 @@ SUBTREES = 8  # Least number of subtrees in a sample.
 class PlantSample:
     """Some branches of a plant and all their ancestors, as a source of their own with the plant's segments.
 
-    branches, vertices: those of the plant that are in the sample, ascending in file order.
+    branches, vertices: those of the plant that are in the sample, ascending in file order. Trials of motion go without
+    faces.
     """
 
-    def __init__(self, source: Source, ath: Ath, branches: np.ndarray):
+    def __init__(self, source: Source, ath: Ath, branches: np.ndarray, with_faces: bool = False):
         whole = source.hierarchy
         kept = np.zeros(whole.branch_count, bool)
         kept[branches] = True
         self.branches, self.vertices = branches, np.flatnonzero(np.repeat(kept, whole.stem_count))
         self._number = np.cumsum(kept) - 1
-        self.source = self._source(source)
+        self.source = self._source(source, with_faces)
         self.ath = self._ath(ath)
 
-    def _source(self, source: Source) -> Source:
-        clip, places = source.clip, source.hierarchy.vertex_source[self.vertices]
-        chosen = np.sort(places)
-        some = MotionClip(
-            Frames(lambda start, stop: clip.block(start, stop)[:, chosen], clip.frame_count, len(chosen), clip.dtype),
-            clip.time,
-            rest=clip.source_rest[chosen],
-            metadata=clip.metadata,
-            clip_ranges=clip.clip_ranges,
-        )
-        some.rest_given = clip.rest_given
+    def _source(self, source: Source, with_faces: bool) -> Source:
+        places = source.hierarchy.vertex_source[self.vertices]
+        hierarchy = self._hierarchy(source.hierarchy, np.searchsorted(np.sort(places), places))
         sample = replace(
             source,
-            clip=some,
-            hierarchy=self._hierarchy(source.hierarchy, np.searchsorted(chosen, places)),
+            clip=source.clip.among(self.vertices, hierarchy, with_faces),
             shapes=None,
-            polygons=None,  # Trials go without faces.
-            weights=None if source.weights is None else source.weights[self.vertices],
-            shares=None if source.shares is None else source.shares[self.vertices],
             reference=None if source.reference is None else source.reference[self.vertices],
             whole=(source, self.vertices),
         )
@@ -139,7 +126,7 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
 
 
-def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
+def sample_plant(source: Source, ath: Ath, effort: str, with_faces: bool = False) -> PlantSample | None:
     """Return a sample of a large plant with a branch of every level; None: the plant is small, or effort is "best". The
     sample grows with the clip, so that the search keeps its share of the work."""
     frames = -(-source.coded_frames // len(source.segments))
@@ -147,7 +134,7 @@ def sample_plant(source: Source, ath: Ath, effort: str) -> PlantSample | None:
     if wanted is None:
         return None
     branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
-    sample = PlantSample(source, ath, branches)
+    sample = PlantSample(source, ath, branches, with_faces)
     return sample if len(sample.vertices) < source.clip.vertex_count // 2 else None
 
 

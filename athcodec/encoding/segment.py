@@ -19,7 +19,9 @@ from athcodec._native import BRANCH, LOOSE, RIGID, SHEET, STILL, WHOLE, Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
+from athcodec.encoding.coded_clip import CodedClip
 from athcodec.encoding.features import Feature
+from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.motion import (
     NODE_ROOT,
     STEM_ROOT,
@@ -40,7 +42,6 @@ from athcodec.encoding.time_bases import Entries, InWaves, TimeComponents
 from athcodec.errors import BoundError
 from athcodec.files.threads import SERIAL, ThreadPool, default_jobs
 from athcodec.motion.algebra import largest_distance, length, multiply
-from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
 
@@ -68,22 +69,14 @@ def thread_count(jobs: int | None, source: Source) -> int:
 class Source:
     """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion."""
 
-    clip: MotionClip
-    hierarchy: Hierarchy
+    clip: CodedClip
     seen: Survey
     segment_frames: int | None
-    exact_rest: bool  # Whether the rest pose comes back bit for bit.
-    weights: np.ndarray | None = None  # (N,) float64 factors on the bound.
     pool: ThreadPool = SERIAL
-    host_rest: bool = False
     rest_precision: RestPrecision = RestPrecision()
     reference: np.ndarray | None = None  # (N, 3) float64 less the origin; None: the rest pose.
     held: np.ndarray | None = None  # (frames,) bool: frames that the pose before them stands for; None: repeats alone.
     held_error: float = 0.0  # Largest distance of any vertex in a held frame from the pose that stands for it.
-    place_error: float = 0.0  # Largest distance of any vertex from the one that stands for its place.
-    polygons: Polygons | None = None  # Polygons that the file stores as FACES, by places.
-    shares: np.ndarray | None = None  # (N,) int32: how many vertices of the source are at each place; None: one.
-    host_mesh: np.ndarray | None = None  # Rest pose of the host with all vertices; None: that of the clip.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
     shapes: tuple[np.ndarray, np.ndarray] | None = None  # Details and keeps_shape of an inexact reference, if known.
     whole: tuple[Source, np.ndarray] | None = None  # The source that this is a sample of, and its vertices there.
@@ -112,9 +105,12 @@ class Source:
         self.keeps_shape, self.rest_error = self.details > 0, math.inf
         if not self.reference_is_exact:
             precision, diagonal = self.rest_precision, self.seen.diagonal
-            self.shapes = self.shapes or precision.details(self.clip, self.hierarchy, diagonal)
+            self.shapes = self.shapes or precision.details(
+                self.clip.motion.polygons, self.clip.rest, self.hierarchy, diagonal
+            )
             self.details, self.keeps_shape = self.shapes
-            error, is_stored = precision.error(self.clip, diagonal), self.reference is None or self.clip.rest_given
+            error = precision.error(self.clip.motion.metadata, diagonal)
+            is_stored = self.reference is None or self.clip.rest_given
             if math.isfinite(error) and is_stored and not self.exact_rest:
                 self.rest_error = qz.error_limit(error, diagonal)
         self.clip_range_segments = [
@@ -124,10 +120,48 @@ class Source:
                     stop - start, self.clip.vertex_count, self.segment_frames, ct.Limits.memory_bytes
                 )
             ]
-            for start, stop in self.clip.clip_range_frames
+            for start, stop in self.clip.motion.clip_range_frames
         ]
         self.segments = [segment for segments in self.clip_range_segments for segment in segments]
         self._held, self._only = WeakValueDictionary(), []
+
+    @classmethod
+    def of(cls, clip: CodedClip, seen: Survey, options: EncodingOptions, pool: ThreadPool) -> Source:
+        """Return the source of a clip about the pose that its record names."""
+        source = cls(
+            clip, seen, options.segment_frames, pool, rest_precision=options.rest_precision, without=options.without
+        )
+        return source if clip.reference is None else source.about(clip.reference - source.origin)
+
+    @property
+    def hierarchy(self) -> Hierarchy:
+        """Branches and vertices in file order."""
+        return self.clip.hierarchy
+
+    @property
+    def exact_rest(self) -> bool:
+        """Whether the rest pose comes back bit for bit."""
+        return self.clip.exact_rest
+
+    @property
+    def host_rest(self) -> bool:
+        """Whether a host has the rest pose."""
+        return self.clip.host_rest
+
+    @property
+    def weights(self) -> np.ndarray | None:
+        """Factors on the bound, (N,) float64."""
+        return self.clip.weights
+
+    @property
+    def polygons(self) -> Polygons | None:
+        """Polygons that the file stores as FACES."""
+        return self.clip.polygons
+
+    @property
+    def still(self) -> bool:
+        """Whether all frames are the rest pose."""
+        return self.clip.stands_still
 
     @property
     def has_seams(self) -> bool:
@@ -158,7 +192,7 @@ class Source:
             return self
         held, starts, worst = self.seen.repeats, {start for start, _ in self.segments}, 0.0
         shown = np.zeros(0)
-        for start, block in self.clip.blocks():
+        for start, block in self.clip.motion.blocks():
             for frame, pose in enumerate(block, start):
                 if frame not in starts and nearly[frame]:
                     distance = largest_distance(pose, shown)
@@ -171,7 +205,6 @@ class Source:
 
     def _changed(self, **fields) -> Source:
         source = replace(self, **fields)
-        source.still = self.still  # Frames would have to be read for it again.
         if source.segments == self.segments and source.held is self.held:
             source._held, source._only = self._held, self._only
         return source
@@ -195,7 +228,7 @@ class Source:
         """Return the segment before one in its clip; before the first of a loop of several, the last."""
         for i, (start, segments) in enumerate(zip(self.clip_range_starts, self.clip_range_segments)):
             if start == segment:
-                loop = len(segments) > 1 and bool(self.clip.clip_ranges) and self.clip.clip_ranges[i].loop
+                loop = len(segments) > 1 and bool(self.clip.motion.clip_ranges) and self.clip.motion.clip_ranges[i].loop
                 return start + len(segments) - 1 if loop else None
         return segment - 1
 
@@ -214,11 +247,6 @@ class Source:
     def mesh_for(self, settings: Settings) -> Mesh | None:
         """Return the faces that the rest pose of some settings goes by."""
         return self.mesh if settings.connected_rest else None
-
-    @cached_property
-    def still(self) -> bool:
-        """Whether all frames are the rest pose."""
-        return stands_still(self.clip)
 
     @property
     def box(self) -> np.ndarray:
@@ -252,7 +280,7 @@ class Source:
     @property
     def replaced_error(self) -> float:
         """Largest distance of any vertex in any frame from what is coded in its place."""
-        return self.held_error + self.place_error
+        return self.held_error + self.clip.placed.places.error
 
     def smallest_bound(self, bound: float) -> float:
         """Return the smallest bound of any vertex."""
@@ -276,7 +304,7 @@ class Source:
 
     def is_whole_loop(self, segment: int) -> bool:
         """Return whether the segment is all of a clip that is a loop."""
-        of_clips = zip(self.clip.clip_ranges, self.clip_range_segments)
+        of_clips = zip(self.clip.motion.clip_ranges, self.clip_range_segments)
         return any(clip_range.loop and segments == [self.segments[segment]] for clip_range, segments in of_clips)
 
     @property
@@ -309,7 +337,7 @@ class Source:
 
     def block(self, segment: int) -> np.ndarray:
         """Return the coded frames of a segment as the clip has them, (T, N, 3)."""
-        block, repeats = self.clip.block(*self.segments[segment]), self.repeats[slice(*self.segments[segment])]
+        block, repeats = self.clip.motion.block(*self.segments[segment]), self.repeats[slice(*self.segments[segment])]
         return block[~repeats] if repeats.any() else block
 
     def exact(self, block: np.ndarray) -> np.ndarray:
@@ -393,7 +421,7 @@ class CodedPrelude:
     def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False, bases: bool = True):
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
-        self.shares, self._of = source.shares, (source, ath, settings)
+        self.shares, self._of = source.clip.shares, (source, ath, settings)
         branches = branch_records(hierarchy, ath, settings)
         self.plan = Plan(branches, hierarchy.vertex_count, source.pool, predicted=predicted, layer=settings.layer)
         self.plan.still_branches = source.still_branches
@@ -423,7 +451,7 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
         head.is_host, head.step, head.stream = (
             True,
             1.0,
-            writing.mesh_checksum(source.clip.source_rest if source.host_mesh is None else source.host_mesh),
+            writing.mesh_checksum(source.clip.source_rest if source.clip.host_mesh is None else source.clip.host_mesh),
         )
         return head, source.rest
     if source.reference_is_exact:

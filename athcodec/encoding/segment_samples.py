@@ -99,5 +99,7 @@ def _middle(positions: np.ndarray) -> np.ndarray:
 def _moved(source: Source, segment: int) -> float:
     """Return the RMS displacement of the vertices from the first frame of a segment to its middle."""
     start, stop = source.segments[segment]
-    first, middle = (source.clip.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2))
+    first, middle = (
+        source.clip.motion.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2)
+    )
     return math.sqrt(((middle - first) ** 2).sum() / source.clip.vertex_count)

@@ -7,13 +7,14 @@ point anywhere. So every branch may have a largest step of its own (FORMAT.md, D
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from athcodec.encoding.quantise import half_octaves
 from athcodec.errors import BoundError
-from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import sides
 from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
@@ -47,20 +48,24 @@ class RestPrecision:
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
         return precision
 
-    def error(self, clip: MotionClip, diagonal: float) -> float:
-        """Return the largest error that is asked for, in scene units; infinite: none is."""
+    def error(self, metadata: Mapping[str, Any], diagonal: float) -> float:
+        """Return the largest error that is asked for, in the scene units of some metadata; infinite: none is."""
         if self.length is not None:
-            return self.length.in_scene_units(scene_unit(clip.metadata))
+            return self.length.in_scene_units(scene_unit(metadata))
         return math.inf if self.fraction is None else self.fraction * diagonal
 
-    def details(self, clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> tuple[np.ndarray, np.ndarray]:
+    def details(
+        self, faces: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the detail of every branch, (B,) int32, and whether its faces are to keep their shape, (B,) bool, in
-        file order. An error that is asked for is that of all branches, so that they need no detail."""
+        file order. An error that is asked for is that of all branches, so that they need no detail. faces: as
+        `MotionClip.polygons`, of vertices of a rest pose, (N, 3), in the same order."""
         none = np.zeros(hierarchy.branch_count, np.int32)
         if self.of_bound:
             return none, none > 0
-        details = detail_of(shape_steps(clip, hierarchy, diagonal))
-        return none if math.isfinite(self.error(clip, diagonal)) else details, details > 0
+        details = detail_of(shape_steps(faces, rest, hierarchy, diagonal))
+        is_asked = self.length is not None or self.fraction is not None
+        return none if is_asked else details, details > 0
 
 
 def detail_of(steps: np.ndarray) -> np.ndarray:
@@ -84,15 +89,16 @@ def rest_steps(branches: np.ndarray, step: float) -> np.ndarray:
     return np.where(branches["detail"] > 0, np.minimum(_most(branches["detail"]), step), step)
 
 
-def shape_steps(clip: MotionClip, hierarchy: Hierarchy, diagonal: float) -> np.ndarray:
+def shape_steps(
+    polygons: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float
+) -> np.ndarray:
     """Return the largest step at which the faces of each branch keep their shape, (B,) in file order."""
     steps = np.full(hierarchy.branch_count, np.inf)
-    polygons = clip.polygons
     if polygons is None or not len(polygons[0]):
         return steps
     counts, corners = polygons
     faces = np.repeat(np.arange(len(counts)), counts)
-    points = np.asarray(clip.rest, np.float64)
+    points = np.asarray(rest, np.float64)
     start, stop = sides(counts, corners).T
     edges = points[stop] - points[start]
     lengths = np.linalg.norm(edges, axis=1)

@@ -18,7 +18,6 @@ from athcodec.encoding.shape import detail_of, finer_than
 from athcodec.encoding.start import still_choice
 from athcodec.encoding.survey import Ath, Survey
 from athcodec.motion.branches.still import LEAST_STILL
-from athcodec.motion.clip import MotionClip
 from athcodec.motion.thresholds import Thresholds
 
 STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
@@ -164,19 +163,15 @@ class SplitSource:
 
 def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
     """Return some branches of a source, with all that these are on, as a source of their own."""
-    sample = PlantSample(source, ath, branches)
-    chosen = np.sort(source.hierarchy.vertex_source[sample.vertices])
-    faces = None if source.polygons is None else source.polygons.among(chosen)
+    sample = PlantSample(source, ath, branches, with_faces=True)
     part = replace(
         sample.source,
         seen=_seen(source.seen, sample),
-        polygons=faces if faces is not None and faces.face_count else None,
         shapes=(source.details[branches], source.keeps_shape[branches]),
         reference=None if source.reference is None else sample.source.reference + source.origin - sample.source.origin,
         whole=None,
     )
     part.segments, part.clip_range_segments = source.segments, source.clip_range_segments
-    part.still = False
     return part
 
 
@@ -196,11 +191,5 @@ def _seen(seen: Survey, sample: PlantSample) -> Survey:
 
 def _standing(source: Source) -> Source:
     """Return a source that stands still, in one frame."""
-    clip, seen = source.clip, source.seen
-    frame = MotionClip(
-        clip.source_rest[None].astype(clip.dtype), clip.time[:1], rest=clip.source_rest, metadata=clip.metadata
-    )
-    frame.rest_given = clip.rest_given
-    standing = replace(source, clip=frame, seen=replace(seen, frame_count=1, steps=np.array([np.inf])), held=None)
-    standing.still = True
-    return standing
+    seen = replace(source.seen, frame_count=1, steps=np.array([np.inf]))
+    return replace(source, clip=source.clip.standing(), seen=seen, held=None)

@@ -436,6 +436,7 @@ def survey(
     *,
     eta: int = 0,
     pool: ThreadPool = SERIAL,
+    rest: np.ndarray | None = None,
 ) -> Survey:
     """The statistics of a clip's frames from which `Survey.ath` makes the ATH for thresholds chosen afterwards.
 
@@ -457,6 +458,8 @@ def survey(
         Frames; the largest eta that `Survey.ath` will be asked for.
     pool : ThreadPool
         The result does not depend on the number of threads.
+    rest : (N, 3) float64 array, optional
+        The base pose in file order, where it is not the clip's rest pose.
 
     Returns
     -------
@@ -476,7 +479,7 @@ def survey(
         raise ValueError(f"max_depth: got {max_depth}, expected a number >= 0")
     if hierarchy is None:
         hierarchy = hierarchy_of(clip)
-    rest = np.asarray(clip.rest, float)[hierarchy.vertex_source]
+    rest = np.asarray(clip.rest, float)[hierarchy.vertex_source] if rest is None else rest
     branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
     pieces = _tested_pieces(hierarchy, rest, branches)
     xi = limits.distances[1] if limits.lam else None
@@ -659,7 +662,14 @@ def _file_order_frames(
 def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
     """Yield frames in working portions as they are, (k,N,3)."""
     at_once = max(1, _WORK_VERTICES // vertex_count)
-    for block in _blocks(positions, vertex_count):
+    blocks: Iterator[np.ndarray]
+    if hasattr(positions, "blocks"):
+        blocks = (block for _, block in positions.blocks(max(1, _READ_VALUES // (3 * vertex_count))))
+    elif np.ndim(positions) == 3 and np.shape(positions)[1:] == (vertex_count, 3):
+        blocks = iter([np.asarray(positions)])
+    else:
+        raise ValueError(f"positions: got shape {np.shape(positions)}, expected (T, {vertex_count}, 3)")
+    for block in blocks:
         for start in range(0, len(block), at_once):
             yield block[start : start + at_once]
 
@@ -688,12 +698,3 @@ def _same_bits(one: np.ndarray, other: np.ndarray) -> bool:
 def _in_file_order(portion: np.ndarray, hierarchy: Hierarchy) -> np.ndarray:
     """Return a portion in the source's dtype, (3,k,N), vertices in file order."""
     return np.take(np.moveaxis(portion, 2, 0), hierarchy.vertex_source, axis=2)
-
-
-def _blocks(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
-    if hasattr(positions, "blocks"):
-        yield from (block for _, block in positions.blocks(max(1, _READ_VALUES // (3 * vertex_count))))
-        return
-    if np.ndim(positions) != 3 or np.shape(positions)[1:] != (vertex_count, 3):
-        raise ValueError(f"positions: got shape {np.shape(positions)}, expected (T, {vertex_count}, 3)")
-    yield np.asarray(positions)

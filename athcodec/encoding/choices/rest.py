@@ -60,12 +60,10 @@ def judge(source: Source, ath: Ath, size: Callable[..., float]) -> Callable[...,
     """Return a function that judges settings by `size` of a source, an ath and settings: on a sample of a large plant,
     unless the rest pose is all of the file."""
     large = source.clip.vertex_count > JUDGED_BY_SAMPLE and not source.still
-    sample = sample_plant(source, ath, "default") if large else None
+    sample = sample_plant(source, ath, "default", with_faces=True) if large else None
     if sample is None:
         return lambda *words: size(source, ath, *words)
-    chosen, faces = np.sort(source.hierarchy.vertex_source[sample.vertices]), source.polygons
-    some = replace(sample.source, polygons=faces and faces.among(chosen))
-    return lambda settings, *words: size(some, sample.ath, sample.like(settings), *words)
+    return lambda settings, *words: size(sample.source, sample.ath, sample.like(settings), *words)
 
 
 def connected_if_smaller(source: Source, ath: Ath, settings: Settings) -> Settings:

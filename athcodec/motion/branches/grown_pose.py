@@ -24,55 +24,61 @@ SMALL = 0.5  # Size of a part, over its largest in any frame, below which anothe
 
 
 def with_grown_pose(clip: MotionClip) -> MotionClip:
-    """Return the clip with the frame in which it is most grown as its rest pose, if more of its own is small than of
-    another frame: links between vertices that are much shorter than their largest length."""
+    """Return the clip with the frame in which it is most grown as its rest pose, if that shows more of it."""
+    pose = grown_pose(clip)
+    return clip if pose is None else clip.replace(rest=pose, rest_given=False)
+
+
+def grown_pose(clip: MotionClip) -> np.ndarray | None:
+    """Return the frame in which a clip is most grown, (N, 3) in its dtype, if more of the rest pose is small than of
+    another frame: links between vertices that are much shorter than their largest length; None: the rest pose does."""
     if clip.frame_count == 1 or clip.vertex_count == 1:
-        return clip
+        return None
     links = links_of(clip)
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
-    frames = _some_frames(clip)
+    frames = _some_frames(clip.frame_count)
     poses = (pose.T.copy() for pose in itertools.chain([clip.rest], _poses(clip, frames)))
     sizes = np.sqrt([sum(np.square(x[links[:, 0]] - x[links[:, 1]]) for x in pose) for pose in poses])
     largest = sizes[1:].max(axis=0)
     small = (sizes < SMALL_LINK * largest).mean(axis=1)
     if small[0] <= small[1:].min() + UNGROWN:
-        return clip
+        return None
     moving = largest > 0
     grown = (sizes[1:, moving] / largest[moving]).mean(axis=1)
     if grown.max() < GROWN:  # Points that wander are never all far apart.
-        return clip
+        return None
     best = int(frames[int(np.argmax(grown))])
-    return clip.replace(rest=clip.block(best, best + 1)[0], rest_given=False)
+    return clip.block(best, best + 1)[0]
 
 
-def with_grown_branches(clip: MotionClip, hierarchy: Hierarchy) -> MotionClip:
-    """Return the clip with a rest pose in which each branch has the shape of the frame where it is largest, if it is
-    much smaller in the rest pose. Such a branch hangs on its parent as it does in that frame."""
+def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy) -> np.ndarray:
+    """Return a pose of a clip, (N, 3), in which branches that are much smaller there than in some frame have the shape
+    of the frame where they are largest. Such a branch hangs on its parent as it does in that frame."""
     if clip.frame_count == 1:
-        return clip
-    frames, source, first = _some_frames(clip), hierarchy.vertex_source, hierarchy.first_vertex
-    sizes = np.array([_branch_sizes(pose[source], first) for pose in _poses(clip, frames)])
-    rest = clip.rest[source]
+        return pose
+    frames, source, first = _some_frames(clip.frame_count), hierarchy.vertex_source, hierarchy.first_vertex
+    sizes = np.array([_branch_sizes(frame[source], first) for frame in _poses(clip, frames)])
+    rest = pose[source].astype(np.float64)
     small = np.flatnonzero(_branch_sizes(rest, first) < SMALL * sizes.max(axis=0))
     if not len(small):
-        return clip
+        return pose
     largest = frames[sizes.argmax(axis=0)]
     shown = np.unique(largest[small])
-    shapes = {frame: pose[source] for frame, pose in zip(shown.tolist(), _poses(clip, shown))}
+    shapes = {number: frame[source] for number, frame in zip(shown.tolist(), _poses(clip, shown))}
     for branch in small.tolist():  # Parents come first.
         shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
         own = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
         rest[own] = shape[own] + (rest[attach] - shape[attach] if attach >= 0 else 0.0)
-    pose = np.empty_like(rest)
-    pose[source] = rest
-    return clip.replace(rest=pose.astype(clip.rest_dtype), rest_given=False)
+    grown = np.empty_like(pose)
+    grown[source] = rest
+    return grown
 
 
-def _some_frames(clip: MotionClip) -> np.ndarray:
+def _some_frames(frame_count: int) -> np.ndarray:
     """Return the numbers of frames spread over the clip, the first and the last among them."""
-    return np.unique(np.linspace(0, clip.frame_count - 1, FRAMES).astype(int))
+    return np.unique(np.linspace(0, frame_count - 1, FRAMES).astype(int))
 
 
 def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:

@@ -1,0 +1,367 @@
+"""What is decided about a file: search or prediction, layers, and the length of segments.
+
+Settings are searched for by search.py. Segments are coded (segment_coding.py) and whole files are put together
+(assembly.py) only where their bytes decide. What a file promises is checked on what a decoder will output.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from athcodec.decoding import container as ct
+from athcodec.encoding import quantise as qz
+from athcodec.encoding.assembly import FileAssembly
+from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, one_map_each
+from athcodec.encoding.coded_clip import CodedClip
+from athcodec.encoding.decided import Decided, Draft
+from athcodec.encoding.features import Feature
+from athcodec.encoding.file_options import EncodingOptions
+from athcodec.encoding.layers import MOST_LAYERS, MOST_LEVELS, Layer, Layers, layer_ratios, layers_of, step_factors
+from athcodec.encoding.progress import (
+    FILE_BYTE,
+    LEVEL_MOTION,
+    MOTION,
+    POSES,
+    READING,
+    SURVEY,
+    Progress,
+    Work,
+    allowed_work,
+    silent,
+)
+from athcodec.encoding.sample import is_small
+from athcodec.encoding.search import Search
+from athcodec.encoding.segment import CodedPrelude, Source
+from athcodec.encoding.segment_coding import SegmentCoder
+from athcodec.encoding.segment_samples import typical_segments
+from athcodec.encoding.settings import Choice
+from athcodec.encoding.start import still_choice
+from athcodec.encoding.still import SplitSource
+from athcodec.encoding.survey import Ath, Survey
+from athcodec.errors import BoundError, ClipError
+from athcodec.motion.thresholds import Thresholds
+from athcodec.options import DEFAULT_LADDER, LADDERS
+
+CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
+PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
+REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
+FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
+HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
+SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
+
+
+@dataclass(frozen=True)
+class FileDecisions:
+    """Decides about a file, by what is known of its clip."""
+
+    source: Source
+    options: EncodingOptions
+    report: Progress = silent
+    spent: float = 0.0  # Work of finding branches.
+    predicts_as_usual: bool = False  # Whether no other way to predict motion is tried.
+    untried: tuple[str, ...] = ()  # What that left out.
+
+    @property
+    def clip(self) -> CodedClip:
+        return self.source.clip
+
+    @property
+    def seen(self) -> Survey:
+        return self.source.seen
+
+    @property
+    def segment_count(self) -> int:
+        return len(self.source.segments)
+
+    def thresholds(self, bound: float) -> Thresholds:
+        return self.options.tam or Thresholds(bound, 0, bound, 0)
+
+    def _check(self, bound: float) -> None:
+        smallest = self.source.smallest_bound(bound)
+        qz.check_bound(smallest, self.seen.low, self.seen.high, self.clip.dtype, self.source.extent)
+
+    @contextmanager
+    def refusing(self, bound: float) -> Iterator[None]:
+        """Let a BoundError of coding at a bound name the smallest bound that can be kept."""
+        try:
+            yield
+        except BoundError:
+            self._check(bound)
+            least = self._smallest_kept(bound)
+            if least == math.inf:
+                raise
+            raise BoundError(
+                f"max error: got {bound:.3g}; expected at least {least:.3g}, the smallest that this clip can keep"
+            ) from None
+
+    def _smallest_kept(self, low: float) -> float:
+        """Return the smallest bound above `low` that a file was found to keep."""
+        high = math.inf
+        for _ in range(REFUSAL_ROUNDS):
+            bound = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
+            if bound >= high:
+                break
+            low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
+        return high
+
+    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
+        its motion is predicted; infinite if the bound cannot be kept."""
+        return self._holding(bound)._tried(bound, work, frames_ratio)
+
+    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        try:
+            self._check(bound)
+            if self.source.still:
+                return self.decide(bound).shared_bytes, False
+            ath = self.seen.ath(self.thresholds(bound))
+            search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+            unsearched = search.first_cost()
+            prediction = self._best_prediction(bound, unsearched, work)
+            if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
+                return search.expected(frames_ratio), False
+            predicted = frames_ratio * prediction.bytes, True
+            if prediction.bytes < SEARCH_SAVES * unsearched:
+                return predicted
+            return min((search.tried(frames_ratio), False), predicted)
+        except BoundError:
+            return math.inf, False
+
+    def decide(self, bound: float) -> Decided:
+        """Search for settings."""
+        self._check(bound)
+        holding = self._holding(bound)
+        split = holding._split(bound, self.thresholds(bound))
+        moving = holding if split is None else dataclasses.replace(holding, source=split.moving_source)
+        work = moving._allowed_work(bound)
+        decided = moving._decide(bound, work)
+        if split is not None:
+            choice = split.choice(decided.choice, decided.ath.thresholds, bound)
+            options = dataclasses.replace(holding.options, segment_frames=decided.source.segment_frames)
+            if len(decided.layers.each) == 1:
+                options = dataclasses.replace(options, ladder=())
+            decided = dataclasses.replace(holding, options=options)._of_choice(choice, decided.ath.thresholds)
+        untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
+        decided.choice = dataclasses.replace(decided.choice, untried=untried)
+        return decided
+
+    def _split(self, bound: float, thresholds: Thresholds) -> SplitSource | None:
+        """Return what moves and what stands still, each as a source; None: one of them is missing. What stands still
+        takes no part in the search for settings."""
+        return SplitSource.of(self.source, self.seen.ath(thresholds), bound)
+
+    def _of_choice(self, choice: Choice, thresholds: Thresholds) -> Decided:
+        """Return what follows from a choice for all branches."""
+        bound = choice.settings.bound
+        split = self._split(bound, thresholds)
+        source = self.source if split is None else split.marked
+        if choice.predicted is None and source.segment_frames != self.options.segment_frames:
+            source = source.in_segments(self.options.segment_frames)
+        decisions = dataclasses.replace(self, source=source)
+        if choice.predicted is not None:
+            return decisions._predicted(choice)
+        ath = self.seen.ath(thresholds)
+        return decisions._layered(ath, choice, CodedPrelude(source.about(choice.reference), ath, choice.settings))
+
+    def _holding(self, bound: float) -> FileDecisions:
+        """Return the decisions about a clip without frames that others show within a small part of the bound."""
+        tolerance = 0.0 if self.options.lossless else HELD_SHARE * self.source.smallest_bound(bound)
+        return dataclasses.replace(self, source=self.source.holding(tolerance))
+
+    def _decide(self, bound: float, work: Work) -> Decided:
+        ath = self.seen.ath(self.thresholds(bound))
+        ratios = self._layer_ratios(ath, bound)
+        ratio = ratios[0]
+        if self.source.still:
+            choice = still_choice(self.source, ath, bound, ratio)
+            return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
+        share = PREDICTED_SHARE if ratio > 1 else 1.0
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
+        if self._has_usual_ladder and search.levels_need_own_bases():
+            return self._with_one_layer()._decide(bound, work)
+        with work.trying("segments"):
+            best = self._searched(search, share, work)
+        shorter = search.shorter_segments() if self.options.segment_frames is None else []
+        least, coding = self._size(best) if shorter else 0, self._coding_work(bound, self.clip.frame_count)
+        for left, (length, price) in zip(range(len(shorter), 0, -1), shorter):
+            with work.trying("segments", 1 / left), suppress(BoundError):
+                if least >= SEARCH_SAVES * price and work.fits(coding):
+                    work.add(coding)
+                    decisions = self._in_segments(length)
+                    other = decisions._decide(bound, work)
+                    size = decisions._size(other)
+                    best, least = (other, size) if size < least else (best, least)
+        return best
+
+    def _searched(self, search: Search, share: float, work: Work) -> Decided:
+        """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
+        bound, unsearched = search.trials.start.bound, share * search.first_cost()
+        if math.isfinite(unsearched):
+            work.allowed -= FILE_BYTE * unsearched
+            search.keep_work_of_maps()
+        start = search.trials.start
+        is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
+        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
+        if prediction is not None and prediction.bytes < unsearched:
+            with work.trying("transformed motion"):
+                if prediction.bytes < SEARCH_SAVES * unsearched or not work.fits(search.trials.work_of_trial):
+                    return self._predicted(prediction.choice)
+        try:
+            choices, prelude = search.decide()
+            if prediction is not None and prediction.bytes < share * search.cost:
+                return self._predicted(prediction.choice)
+            best = self._best_of(search, choices, prelude)
+            if self._is_short(best) and work.fits(work.done):
+                best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
+            if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
+                return best
+        except BoundError:
+            if prediction is None:
+                raise
+        return self._predicted(prediction.choice)
+
+    def _with_one_layer(self) -> FileDecisions:
+        """Return the decisions about a clip whose levels move by series of their own, which prediction hardly suits."""
+        return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()), predicts_as_usual=True)
+
+    def _in_segments(self, frames: int) -> FileDecisions:
+        """Return the decisions about the clip in segments of at most so many frames."""
+        options = dataclasses.replace(self.options, segment_frames=frames)
+        return dataclasses.replace(self, source=self.source.in_segments(frames), options=options)
+
+    def _allowed_work(self, bound: float) -> Work:
+        """Return the work that the decisions about a file may take: what its survey and coding leave of all."""
+        vertices, frames = self.clip.vertex_count, self.clip.frame_count
+        known = (READING + SURVEY) * vertices * frames + POSES * vertices + self._coding_work(bound, frames)
+        return Work(allowed_work(vertices, frames, self.options.effort) - known - self.spent, self.report)
+
+    def _coding_work(self, bound: float, frames: int) -> float:
+        """Return the work of coding the motion of so many frames."""
+        layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
+        levels = int(self.source.hierarchy.branch_depth.max())
+        return (MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * self.clip.vertex_count * frames
+
+    def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> Decided:
+        """Return the best of what a search has found: the first of it, and others for which there is work left."""
+        trials = search.trials
+        frames = sum(trials.source.frames_of(segment) for segment, _ in typical_segments(trials.source))
+        each, coded = self._coding_work(trials.start.bound, frames), choices[:1]
+        for choice in choices[1:]:
+            if trials.work.fits(each):
+                trials.work.add(each)
+                coded.append(choice)
+        layered = [self._layered(trials.ath, choice, prelude) for choice in coded]
+        return layered[0] if len(layered) == 1 else min(layered, key=self._estimated_bytes)
+
+    def _is_short(self, decided: Decided) -> bool:
+        """Return whether a file is loaded and played whole, so that its coarse levels are hardly ever shown."""
+        options = self.options
+        if len(decided.layers.each) > 1 or decided.ath.height == 0 or options.tam is not None:
+            return False
+        small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
+        return small and self._estimated_bytes(decided) <= FEW_BYTES
+
+    def _without_levels(self, bound: float, work: Work) -> Decided:
+        """Return the best file with one node for the whole plant, whatever its error."""
+        ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+        return self._best_of(search, *search.decide())
+
+    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
+        """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
+        if self.options.tam or Feature.PREDICTED in self.options.without:
+            return None
+        return best_prediction(
+            self._long_segments, bound, most_bytes, work, self.options.smoothness, self.predicts_as_usual
+        )
+
+    @property
+    def _long_segments(self) -> Source:
+        return self.source.in_segments(self.options.predicted_frames)
+
+    def _predicted(self, choice: Choice) -> Decided:
+        source = self._long_segments
+        ath = one_map_each(source.seen)
+        prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
+        only = Layer(prelude.plan, choice.settings, None)
+        layers = Layers(prelude.rest_chunk, prelude.source_rest, prelude.plan, [only])
+        return Decided(ath, choice, prelude, layers, source)
+
+    def _estimated_bytes(self, decided: Decided) -> float:
+        """Return the bytes of the motion of a file whose segments are like typical ones."""
+        total = float(decided.shared_bytes)
+        for segment, frames in typical_segments(decided.source):
+            if segment not in decided.tried:
+                decided.tried[segment] = SegmentCoder(decided, self.options).one(segment)
+            coded = decided.tried[segment]
+            lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
+            front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
+            total += (front + sum(map(len, lossy))) * frames / decided.source.frames_of(segment)
+        return total
+
+    def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
+        """Return the ratios of as many of the last layers as there is room for behind the levels of the hierarchy. A
+        still clip has one layer: a rest pose in layers takes up to two thirds more."""
+        if self.source.still:
+            return [1]
+        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, self._step_factors(bound))
+        return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
+
+    @property
+    def _has_usual_ladder(self) -> bool:
+        return self.options.ladder == LADDERS[DEFAULT_LADDER]
+
+    def _step_factors(self, bound: float) -> tuple[float, float]:
+        return step_factors(self.source, self.options.ladder, bound)
+
+    def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> Decided:
+        source = self.source.about(choice.reference)
+        bound = choice.settings.bound
+        ratios, factors = self._layer_ratios(ath, bound), self._step_factors(bound)
+        layers = layers_of(source, prelude, choice, ratios, factors, hold_errors=not self._has_usual_ladder)
+        return Decided(ath, choice, prelude, layers, source)
+
+    def draft(self, decided: Decided) -> Draft:
+        options = self.options
+        if decided.choice.predicted is None:
+            options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
+        if len(decided.layers.each) == 1:
+            options = dataclasses.replace(options, ladder=())
+        return Draft(
+            decided.choice,
+            self.seen,
+            decided.segment_count,
+            self.clip.placed.places,
+            self.clip.branches,
+            options,
+            decided.fingerprint,
+            decided.ath.thresholds,
+        )
+
+    def decided(self, draft: Draft) -> Decided:
+        """Return what the maker of the draft decided. Raises ClipError if it is not the same here."""
+        return self._holding(draft.choice.settings.bound)._decided(draft)
+
+    def _decided(self, draft: Draft) -> Decided:
+        decided = self._of_choice(draft.choice, draft.thresholds)
+        if decided.fingerprint != draft.fingerprint:
+            raise ClipError(
+                "clip: got another rest pose or hierarchy than that of the draft, expected the same clip, "
+                "on machines that calculate alike"
+            )
+        return decided
+
+    def file_size(self, bound: float) -> float:
+        """Return the bytes of the file at a bound; infinite if it cannot be kept."""
+        try:
+            return self._size(dataclasses.replace(self, report=silent).decide(bound))
+        except BoundError:
+            return math.inf
+
+    def _size(self, decided: Decided) -> int:
+        """Return the bytes of a file. Raises BoundError."""
+        return FileAssembly(decided, self.options).size()
