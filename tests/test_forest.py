@@ -197,6 +197,26 @@ def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(o
     assert np.array_equal(*still) and np.abs(blown[0] - blown[1]).max() > 0.01
 
 
+def test_an_instance_of_no_amplitude_stands_still(opened, grove):
+    page = opened(grove, 40)
+
+    def picture(amplitude: float, seconds: float) -> bytes:
+        page.evaluate(
+            "async ([amplitude, seconds]) => { const { camera, forest, ath, renderer, scene } = athcodecForest;"
+            " const { center, radius: r } = ath.sphere;"
+            " forest.setInstances([{ x: 0, y: 0, z: 0, amplitude }]);"
+            " camera.position.set(center.x, center.y, center.z + 2 * r);"
+            " camera.lookAt(center.x, center.y, center.z); camera.updateMatrixWorld();"
+            " for (let i = 0; i < 30; i++) { forest.update(camera, 240, seconds); renderer.render(scene, camera);"
+            " await new Promise(requestAnimationFrame); } }",
+            [amplitude, seconds],
+        )
+        return page.locator("canvas").first.screenshot()
+
+    still, moved = ([picture(amplitude, seconds) for seconds in (0.1, 0.7)] for amplitude in (0.0, 1.0))
+    assert still[0] == still[1] and moved[0] != moved[1] and still[0] != moved[0]
+
+
 def test_nothing_of_the_motion_is_uploaded_again(opened, grove):
     page = opened(grove, 100)
     uploaded = "athcodecForest.forest.bytesOfMotion"
