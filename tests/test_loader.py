@@ -587,7 +587,8 @@ INSTANCES = """async () => {
   const { LineBasicMaterial, OrthographicCamera, Scene, WebGLRenderer } = await import("three");
   const { ath } = viewer, canvas = document.createElement("canvas"), renderer = new WebGLRenderer({ canvas });
   const { center, radius: r } = ath.sphere, scene = new Scene();
-  const camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r), material = () => new LineBasicMaterial({ color: 0xffffff });
+  const camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r);
+  const material = () => new LineBasicMaterial({ color: 0xffffff });
   camera.position.set(center.x, center.y, center.z + 2 * r);
   camera.updateMatrixWorld();
   const forest = new ATHForest(ath, { geometry: ath.lines, material });
