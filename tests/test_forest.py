@@ -5,6 +5,7 @@ In Chromium, Debian's, without a graphics card; marker `browser`.
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -195,6 +196,36 @@ def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(o
     still = [shown(page, seconds, level, 0.0)[..., :3] for seconds in (0.1, 0.7)]
     blown = [shown(page, seconds, level, 1.0)[..., :3] for seconds in (0.1, 0.7)]
     assert np.array_equal(*still) and np.abs(blown[0] - blown[1]).max() > 0.01
+
+
+def test_an_instance_of_no_amplitude_stands_still(opened, grove):
+    from PIL import Image
+
+    page = opened(grove, 40)
+
+    def picture(amplitude: float, seconds: float) -> np.ndarray:
+        page.evaluate(
+            "async ([amplitude, seconds]) => { const { camera, forest, ath, renderer, scene } = athcodecForest;"
+            " const { center, radius: r } = ath.sphere;"
+            " forest.setInstances([{ x: 0, y: 0, z: 0, amplitude }]);"
+            " camera.position.set(center.x, center.y, center.z + 2 * r);"
+            " camera.lookAt(center.x, center.y, center.z); camera.updateMatrixWorld();"
+            " const isWhole = () => forest.levels.length === ath.motion.levelCount"
+            " && forest.levels.every(({ clips }) => clips.size);"
+            " for (let i = 0, whole = 0; i < 900 && whole < 10; i++, whole += isWhole()) {"
+            " forest.update(camera, 240, seconds); renderer.render(scene, camera);"
+            " await new Promise(requestAnimationFrame); } }",
+            [amplitude, seconds],
+        )
+        image = Image.open(io.BytesIO(page.locator("canvas").first.screenshot()))
+        return np.array(image.convert("RGB"), int)
+
+    def differing(amplitude: float) -> int:
+        first, second = (picture(amplitude, seconds) for seconds in (0.1, 0.7))
+        return int((np.abs(first - second).max(axis=2) > 8).sum())
+
+    picture(0.0, 0.1)  # Levels and shapes come.
+    assert differing(0.0) < 0.25 * differing(1.0)
 
 
 def test_nothing_of_the_motion_is_uploaded_again(opened, grove):

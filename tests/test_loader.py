@@ -580,3 +580,49 @@ def test_limbs_are_drawn_in_the_colour_that_is_given(element):
     assert green[0] == 0 and green[1] > 200
     assert red[0] == green[1] and red[1] == 0
     assert none == [0, 0]
+
+
+INSTANCES = """async () => {
+  const { ATHForest } = await import("athcodec-three");
+  const { LineBasicMaterial, OrthographicCamera, Scene, WebGLRenderer } = await import("three");
+  const { ath } = viewer, canvas = document.createElement("canvas"), renderer = new WebGLRenderer({ canvas });
+  const { center, radius: r } = ath.sphere, scene = new Scene();
+  const camera = new OrthographicCamera(-r, r, r, -r, 0, 4 * r);
+  const material = () => new LineBasicMaterial({ color: 0xffffff });
+  camera.position.set(center.x, center.y, center.z + 2 * r);
+  camera.updateMatrixWorld();
+  const forest = new ATHForest(ath, { geometry: ath.lines, material });
+  renderer.setSize(200, 200);
+  scene.add(forest);
+  await forest.bake(1);
+  const seen = (look, seconds) => {
+    const gl = renderer.getContext(), data = new Uint8Array(4 * 200 * 200);
+    forest.setInstances([{ x: 0, y: 0, z: 0, size: 1, angle: 0, seconds: 0, ...look }]);
+    forest.update(camera, 200, seconds);
+    renderer.render(scene, camera);
+    gl.readPixels(0, 0, 200, 200, gl.RGBA, gl.UNSIGNED_BYTE, data);
+    return Array.from(data).filter((_, i) => i % 4 < 3);
+  };
+  const aside = (away, amplitude) => {
+    forest.setInstances([{ x: away, y: 0, z: 0, size: 1, angle: 0, seconds: 0, amplitude }]);
+    forest.update(camera, 200, 0);
+    return forest.culled;
+  };
+  const found = { still: [0.2, 1.1].map((seconds) => seen({ amplitude: 0 }, seconds)),
+    moved: [0.2, 1.1].map((seconds) => seen({}, seconds)), red: seen({ tint: 0xff0000 }, 0.2),
+    culled: [[0, 1], [100 * r, 1], [5 * r, 1], [5 * r, 8]].map(([away, amplitude]) => aside(away, amplitude)) };
+  forest.dispose();
+  renderer.dispose();
+  return found;
+}"""
+
+
+@pytest.mark.browser
+def test_instances_have_an_amplitude_and_a_tint_and_are_culled_by_how_far_they_reach(element):
+    found = element.evaluate(INSTANCES)
+    still, moved, red = (np.array(found[name]) for name in ("still", "moved", "red"))
+    assert still.any() and np.array_equal(*still)
+    assert not np.array_equal(*moved)
+    assert not red.reshape(-1, 3)[:, 1:].any()
+    assert np.array_equal(red.reshape(-1, 3)[:, 0] > 40, moved[0].reshape(-1, 3)[:, 0] > 40)
+    assert found["culled"] == [0, 1, 1, 0]

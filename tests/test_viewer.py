@@ -653,7 +653,8 @@ FOREST = """async ([from, to]) => {
     const repeated = (array) => Float32Array.from({ length: 4 * count }, (_, i) => array[i % 4]);
     const each = ({ array }) => new three.BufferAttribute(repeated(array), 4);
     for (const name of ["position", "athPart", "athPartBefore"]) if (all[name]) attributes[name] = all[name];
-    for (const name of ["athPlace", "athTurn", "athFading"]) if (all[name]) attributes[name] = each(all[name]);
+    for (const name of ["athPlace", "athTurn", "athLook", "athFading"])
+      if (all[name]) attributes[name] = each(all[name]);
     material.onBeforeCompile(shader, stage.renderer);
     const defines = { ATH_FOREST: 1, ...(all.athFading ? { ATH_FADING: 1 } : {}) };
     return readback(attributes, shader.uniforms, { defines });

@@ -4,6 +4,7 @@
 struct Instance {
     place: vec4<f32>, // x, y, z, size
     turn: vec4<f32>,  // cosine and sine of its angle, the plant that it shows, tint
+    look: vec4<f32>,  // Amplitude: how many times as far from the rest pose everything is.
 }
 
 struct View {
@@ -43,7 +44,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let place = instances[id.x].place;
     let radius = view.reach * place.w;
-    if (!is_seen(place.xyz, radius)) {
+    if (!is_seen(place.xyz, radius * max(1.0, 2.0 * abs(instances[id.x].look.x - 0.5)))) {
         return;
     }
     let hidden = view.pixel * max(distance(view.eye, place.xyz) - 0.5 * radius, 1e-6) / place.w;

@@ -39,6 +39,8 @@ export class ATHForest extends Group {
   #motions = new Map(); // By clip that only instances play: the motion that fetches it.
   #places = new Float32Array(0);
   #turns = new Float32Array(0); // cosine, sine, seconds ahead, clip
+  #looks = new Float32Array(0); // amplitude, tint
+  #moved = 0;           // How far from its place an instance of size 1 and amplitude 1 is seen in any baked frame.
   #states = [];         // For every instance in view: {clip, level, from, since}; from: -1, or what it fades in from
   #material;
   #depthMaterial;
@@ -66,7 +68,7 @@ export class ATHForest extends Group {
     return this.#baked.get(this.#ath.motion.clip.index) ?? [];
   }
 
-  /** instances: {x, y, z, size, angle, seconds, clip} in the units and axes of the file. */
+  /** instances: {x, y, z, size, angle, seconds, clip, amplitude, tint} in the units and axes of the file. */
   setInstances(instances) {
     const { motion } = this.#ath;
     for (const { clip } of instances) if (clip !== undefined && !this.#motions.has(clip))
@@ -75,6 +77,8 @@ export class ATHForest extends Group {
     this.#places = Float32Array.from(instances.flatMap(({ x, y, z, size }) => [x, y, z, size]));
     this.#turns = Float32Array.from(instances.flatMap(({ angle, seconds, clip }) =>
       [Math.cos(angle), Math.sin(angle), seconds, numberOf(clip)]));
+    this.#looks = Float32Array.from(instances.flatMap(({ amplitude = 1, tint = 0xffffff }) =>
+      [amplitude, ...[16, 8, 0].map((shift) => ((tint >> shift) & 255) / 255)]));
     this.#states = [];
     for (const bin of this.#allBins()) this.#makeRoom(bin);
   }
@@ -109,6 +113,7 @@ export class ATHForest extends Group {
     uniforms.athData.value = dataTexture(baked.data);
     uniforms.athForest.value.set(baked.texels, metadata.up_axis === "z" ? 1 : 0);
     uniforms.athStride.value = exactCount > 0 ? (known.texels - 3 * nodeCount) / exactCount : 1;
+    this.#moved = Math.max(this.#moved, furthest(baked, known, uniforms.athStride.value));
     await this.#draw(level, clip, known, { uniforms, rows: baked.rows, perRow: roundOf(clip) / baked.rows || 1 });
     this.#baked.set(clip.index, [...this.#baked.get(clip.index) ?? [], level]);
     this.dispatchEvent({ type: "level", level });
@@ -175,7 +180,7 @@ export class ATHForest extends Group {
     const old = bin.drawn.geometry, geometry = new InstancedBufferGeometry();
     geometry.setIndex(old.index);
     for (const [name, attribute] of Object.entries(old.attributes)) geometry.setAttribute(name, attribute);
-    for (const [key, name] of [["place", "athPlace"], ["turn", "athTurn"], ...(bin.from ? [["share", "athFading"]] : [])]) {
+    for (const [key, name] of [["place", "athPlace"], ["turn", "athTurn"], ["look", "athLook"], ...(bin.from ? [["share", "athFading"]] : [])]) {
       bin[key] = new InstancedBufferAttribute(new Float32Array(Math.max(4, this.#places.length)), 4);
       geometry.setAttribute(name, bin[key].setUsage(DynamicDrawUsage));
     }
@@ -186,7 +191,7 @@ export class ATHForest extends Group {
 
   /** Chooses what to draw: once per frame. height: of the screen, in pixels. */
   update(camera, height, seconds) {
-    const bins = this.#allBins(), sphere = new Sphere(), view = new Frustum(), place = sphere.center, reach = this.#reach();
+    const bins = this.#allBins(), sphere = new Sphere(), view = new Frustum(), place = sphere.center, still = this.#reach();
     this.updateWorldMatrix(true, false);
     const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(new Matrix4().copy(this.matrixWorld).invert());
     view.setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
@@ -198,7 +203,7 @@ export class ATHForest extends Group {
     for (const bin of bins) bin.filled = 0;
     this.#shown = this.#bins.get(this.#ath.motion.clip.index) ?? this.#shown;
     for (let i = 0; i < this.#places.length && bins.length > 0; i += 4) {
-      const size = this.#places[i + 3];
+      const size = this.#places[i + 3], reach = this.#reach(this.#looks[i]);
       place.fromArray(this.#places, i);
       sphere.radius = reach * size;
       if (!view.intersectsSphere(sphere)) {
@@ -206,7 +211,7 @@ export class ATHForest extends Group {
         this.#states[i / 4] = null;
         continue;
       }
-      const distance = Math.max(eye.distanceTo(place) - 0.5 * reach * size, 1e-6);
+      const distance = Math.max(eye.distanceTo(place) - 0.5 * still * size, 1e-6);
       const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
       if (own.length > 0) this.#putInstance(i, own, this.levelOfDetail ? tolerance : 0, seconds);
     }
@@ -250,8 +255,9 @@ export class ATHForest extends Group {
 
   // Into the next place of a bin; share: that of the level before.
   #put(i, bin, seconds, share = 0) {
-    const { place, turn } = bin, at = 4 * bin.filled++;
+    const { place, turn, look } = bin, at = 4 * bin.filled++;
     for (let k = 0; k < 4; k++) place.array[at + k] = this.#places[i + k];
+    for (let k = 0; k < 4; k++) look.array[at + k] = this.#looks[i + k];
     turn.array[at] = this.#turns[i];
     turn.array[at + 1] = this.#turns[i + 1];
     this.#putRow(turn.array, at + 2, bin, seconds + this.#turns[i + 2]);
@@ -267,10 +273,11 @@ export class ATHForest extends Group {
     out[at + 1] = (Math.floor(out[at]) + 1) % rows;
   }
 
-  // How far from its place an instance of size 1 can be seen: the rest pose's sphere, whatever the turn, and room to move.
-  #reach() {
-    const { center, radius } = this.#ath.sphere;
-    return center.length() + 1.2 * radius;
+  // How far from its place an instance of size 1 can be seen, whatever its turn. Vertices are on the lines from the rest pose through
+  // where they are at amplitude 1, as many times as far along.
+  #reach(amplitude = 1) {
+    const { center, radius } = this.#ath.sphere, rest = center.length() + radius, beyond = Math.max(Math.abs(amplitude - 0.5) - 0.5, 0);
+    return Math.max(rest, this.#moved) + beyond * (rest + this.#moved);
   }
 
   // The coarsest that is good enough; the finest where none is.
@@ -286,7 +293,7 @@ export class ATHForest extends Group {
     drawn.visible = filled > 0;
     this.counts[bin.level] += filled;
     this.vertices += filled * bin.size;
-    for (const attribute of [bin.place, bin.turn, bin.share].filter(Boolean)) {
+    for (const attribute of [bin.place, bin.turn, bin.look, bin.share].filter(Boolean)) {
       attribute.clearUpdateRanges();
       attribute.addUpdateRange(0, 4 * filled);
       attribute.needsUpdate = filled > 0;
@@ -303,4 +310,23 @@ export class ATHForest extends Group {
     this.#bins.clear();
     this.#ath = null;
   }
+}
+
+// The largest distance of anything from 0 in baked frames: nodes by the boxes of what they move, exact vertices by themselves.
+function furthest({ data, rows, texels }, { parts: { nodeCount, exactCount }, boxes }, stride) {
+  let most = 0;
+  for (let row = 0; row < rows; row++) {
+    const start = 4 * row * texels;
+    for (const [at, x, y, z, a, b, c] of boxes) {
+      let sum = 0;
+      for (let m = start + at, k = 0; k < 3; k++, m += 4) {
+        const middle = data[m] * x + data[m + 1] * y + data[m + 2] * z + data[m + 3];
+        sum += (Math.abs(middle) + Math.abs(data[m]) * a + Math.abs(data[m + 1]) * b + Math.abs(data[m + 2]) * c) ** 2;
+      }
+      most = Math.max(most, sum);
+    }
+    for (let i = 0, at = start + 12 * nodeCount; i < exactCount; i++, at += 4 * stride)
+      most = Math.max(most, data[at] ** 2 + data[at + 1] ** 2 + data[at + 2] ** 2);
+  }
+  return Math.sqrt(most);
 }

@@ -17,6 +17,7 @@ import { clustered, upright } from "./geometry.js";
 import { framesAt, Mixture } from "./gpu_blend.js";
 
 const MOST_SHAPES = 32;
+const INSTANCE = 12;      // Numbers of an instance, as choose.wgsl has them.
 const SLOTS = 4;          // frames that a plant keeps: two that are shown, and two that were before
 const CELL = 1.5;         // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;        // from one shape to the next
@@ -109,9 +110,9 @@ export class ATHForest extends Group {
     return this.levels.reduce((sum, { passes }) => sum + passes.bytes, 0);
   }
 
-  /** instances: {x, y, z, size, angle, seconds, clip, tint} in the units and axes of the file; tint: a colour such as 0xffeecc. */
+  /** instances: {x, y, z, size, angle, seconds, clip, tint, amplitude} in the units and axes of the file; tint: a colour such as 0xffeecc. */
   setInstances(instances) {
-    const { motion, channel } = this.#ath, { limits } = this.#device, numbers = new Float32Array(8 * Math.max(1, instances.length));
+    const { motion, channel } = this.#ath, { limits } = this.#device, numbers = new Float32Array(INSTANCE * Math.max(1, instances.length));
     this.#forget();
     const clipOf = (name) => this.#clip(name) ?? motion.clip, clips = new Set(instances.map(({ clip }) => clipOf(clip)));
     const most = Math.floor(limits.maxStorageBufferBindingSize / (12 * SLOTS * channel.info.placeCount) / Math.max(1, clips.size));
@@ -121,8 +122,8 @@ export class ATHForest extends Group {
       if (!plants.has(key)) plants.set(key, { index: plants.size, clip, phase: phase / phases });
       return plants.get(key).index;
     };
-    instances.forEach(({ x, y, z, size = 1, angle = 0, seconds, clip, tint = WHITE }, i) => {
-      numbers.set([x, y, z, size, Math.cos(angle), Math.sin(angle), plantOf(clipOf(clip), seconds), tint], 8 * i);
+    instances.forEach(({ x, y, z, size = 1, angle = 0, seconds, clip, tint = WHITE, amplitude = 1 }, i) => {
+      numbers.set([x, y, z, size, Math.cos(angle), Math.sin(angle), plantOf(clipOf(clip), seconds), tint, amplitude], INSTANCE * i);
       this.#box.expandByPoint(new Vector3(x, y, z));
       this.#size = Math.max(this.#size, size);
     });
@@ -304,29 +305,31 @@ export class ATHForest extends Group {
     const { metadata, channel: { info }, origin: less } = this.#ath;
     const upright = metadata.up_axis === "z", heading = this.#heading, origin = vec3(...info.origin.map((value, k) => value - less[k])), count = uint(passes.words[2]);
     const vertices = storage(shared, "float", shared.count).toReadOnly();
-    const instances = storage(this.#instances, "vec4", 2 * Math.max(1, this.#count)).toReadOnly();
+    const instances = storage(this.#instances, "vec4", INSTANCE / 4 * Math.max(1, this.#count)).toReadOnly();
     const lists = storage(this.#lists, "uint", this.#lists.count).toReadOnly();
     const spun = (v, c, s) => (upright ? vec3(c.mul(v.x).sub(s.mul(v.y)), s.mul(v.x).add(c.mul(v.y)), v.z)
       : vec3(c.mul(v.x).add(s.mul(v.z)), v.y, c.mul(v.z).sub(s.mul(v.x))));
     const number = () => lists.element(uint(list * Math.max(1, this.#count)).add(instanceIndex));
     const hasOffset = geometry.hasAttribute("athOffset"), hasNormals = passes.hasCorners && !geometry.userData.vertices;
     material.positionNode = Fn((_, builder) => {
-      const which = number().toVar(), place = instances.element(which.mul(2)).toVar(), turn = instances.element(which.mul(2).add(1)).toVar();
+      const which = number().toVar(), part = (k) => instances.element(which.mul(INSTANCE / 4).add(k)).toVar();
+      const place = part(0), turn = part(1), amplitude = part(2).x;
       const at = uint(turn.z).mul(count).add(attribute("athVertex", "uint")).mul(FLOATS).toVar();
       const three = (from) => vec3(...[0, 1, 2].map((k) => vertices.element(at.add(from + k))));
       const placed = (moved) => {
-        const x = moved.add(origin).toVar(), bent = x.sub(positionGeometry).toVar();
+        const bent = moved.add(origin).sub(positionGeometry).mul(amplitude).toVar();
         const c = heading.x.mul(turn.x).add(heading.y.mul(turn.y)), s = heading.y.mul(turn.x).sub(heading.x.mul(turn.y)); // beside its own
-        const headed = positionGeometry.add(spun(bent, c, s)), shown = select(heading.z.greaterThan(0.5), headed, x).toVar();
+        const headed = positionGeometry.add(spun(bent, c, s)), shown = select(heading.z.greaterThan(0.5), headed, positionGeometry.add(bent)).toVar();
         const whole = hasOffset ? shown.add(attribute("athOffset", "vec3")) : shown;
         return spun(whole, turn.x, turn.y).mul(place.w).add(place.xyz);
       };
-      if (geometry.hasAttribute("normal")) normalLocal.assign(spun(hasNormals ? three(3) : normalGeometry, turn.x, turn.y));
+      const turned = () => (hasNormals ? normalGeometry.add(three(3).sub(normalGeometry).mul(amplitude)) : normalGeometry);
+      if (geometry.hasAttribute("normal")) normalLocal.assign(spun(turned(), turn.x, turn.y));
       if (builder.needsPreviousData?.()) positionPrevious.assign(placed(three(6)));
       return placed(three(0));
     })();
     const tint = Fn(() => {
-      const packed = uint(instances.element(number().mul(2).add(1)).w), byte = (shift) => float(packed.shiftRight(uint(shift)).bitAnd(uint(255))).div(255);
+      const packed = uint(instances.element(number().mul(INSTANCE / 4).add(1)).w), byte = (shift) => float(packed.shiftRight(uint(shift)).bitAnd(uint(255))).div(255);
       return vec3(byte(16), byte(8), byte(0));
     })();
     material.colorNode = TSL.varying(tint).mul(material.colorNode ?? (geometry.hasAttribute("color") ? attribute("color", "vec3") : TSL.materialColor));

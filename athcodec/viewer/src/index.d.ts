@@ -276,6 +276,10 @@ export interface ATHInstance {
   seconds: number;
   /** Number or name of the clip that it plays, over and over; default: the one that `ath.motion` plays. */
   clip?: string | number;
+  /** How many times as far as in the file everything is from the rest pose; 1 by default, 0: it stands still. Above 1 lengths grow. */
+  amplitude?: number;
+  /** A colour, such as 0xffeecc, that its material's is multiplied by. */
+  tint?: number;
 }
 
 /** Instances of one file, each drawn at the level that its distance asks for. One whose clip is not here yet plays the

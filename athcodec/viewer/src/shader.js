@@ -13,6 +13,8 @@ uniform float athStride; // texels per exact vertex
 uniform vec2 athForest; // texels per frame, 1: the up axis is z
 attribute vec4 athPlace; // x, y, z, size
 attribute vec4 athTurn; // cosine, sine, frame, the frame that its fraction leads to
+attribute vec4 athLook; // amplitude of the motion, tint
+varying vec3 athTint;
 #endif
 #ifdef ATH_FADING
 attribute float athPartBefore;
@@ -65,7 +67,8 @@ vec3 athMoved(vec3 rest, float part) {
   athIsBefore = false;
 #endif
 #ifdef ATH_FOREST
-  p = athSpin(p) * athPlace.w + athPlace.xyz;
+  p = athSpin(rest + athLook.x * (p - rest)) * athPlace.w + athPlace.xyz;
+  athTint = athLook.yzw;
 #endif
   return p;
 }
@@ -90,7 +93,7 @@ vec3 athTurned(vec3 normal, float part) {
   athIsBefore = false;
 #endif
 #ifdef ATH_FOREST
-  n = athSpin(n);
+  n = athSpin(normal + athLook.x * (n - normal));
 #endif
   return n;
 }
@@ -108,6 +111,11 @@ vec3 objectNormal = athTurned(normal, athPart);
 #ifdef USE_TANGENT
 vec3 objectTangent = vec3(tangent.xyz);
 #endif
+`;
+
+const TINT = /* glsl */`
+#include <color_fragment>
+diffuseColor.rgb *= athTint;
 `;
 
 const bound = new WeakMap(); // material: the uniforms that it reads
@@ -132,6 +140,8 @@ export function injectMotion(material, uniforms, forest = false) {
       .replace("#include <common>", `#include <common>\n${PARS}`)
       .replace("#include <begin_vertex>", POSITION)
       .replace("#include <beginnormal_vertex>", NORMAL);
+    if (forest && shader.fragmentShader?.includes("#include <color_fragment>")) // Depths have no colour.
+      shader.fragmentShader = `varying vec3 athTint;\n${shader.fragmentShader.replace("#include <color_fragment>", TINT)}`;
   };
   material.customProgramCacheKey = () => key;
   material.clone = () => {

@@ -28,6 +28,8 @@ export interface ForestInstance {
   clip?: string | number;
   /** A colour, such as 0xffeecc, that its material's is multiplied by. */
   tint?: number;
+  /** How many times as far as in the file everything is from the rest pose; 1 by default, 0: it stands still. Above 1 lengths grow. */
+  amplitude?: number;
 }
 
 export class ATHForest extends Group {
