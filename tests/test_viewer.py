@@ -636,7 +636,7 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
 
 
 FOREST = """async ([from, to]) => {
-  const three = await import("three"), { ATHForest, ATHLoader } = await import("athcodec-three");
+  const { three, loading: { ATHForest, ATHLoader } } = athcodecViewer.modules;
   const { stage, plants } = athcodecViewer, { ath } = plants[0], clock = { now: performance.now() };
   performance.now = () => clock.now;
   const loader = new ATHLoader(), forest = new ATHForest(ath);
@@ -882,7 +882,7 @@ def test_a_glb_with_a_motion_is_shown_with_its_materials_by_view_and_by_an_expor
             assert np.abs(shown - wanted).max() < 1e-5 * np.abs(wanted).max()
             drawn = "athcodecViewer.plants[0].space"
             assert page.evaluate(f"{drawn}.isMesh && {drawn}.material.isMeshStandardMaterial")
-            page.click("#colour [data-value=distance]")
+            page.click("#colour [data-value=error]")
             assert page.evaluate(f"{drawn}.material.isMeshLambertMaterial")
             page.click("#compare [data-value=levels]")
             page.wait_for_function("() => athcodecViewer.plants.length === 2 && athcodecViewer.counters.pictures > 3")
@@ -928,8 +928,7 @@ def test_a_page_without_the_mesh_says_so(opened, hosted):
 
 
 LOAD_ABOUT = """async (numbers) => {
-  const { BufferAttribute, BufferGeometry } = await import("three");
-  const { ATHLoader } = await import("athcodec-three");
+  const { three: { BufferAttribute, BufferGeometry }, loading: { ATHLoader } } = athcodecViewer.modules;
   const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(Float32Array.from(numbers), 3));
   const loader = new ATHLoader(), url = new URLSearchParams(location.search).get("file");
   const refused = [];

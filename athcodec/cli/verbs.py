@@ -425,13 +425,7 @@ def _needs(row: dict[str, Any]) -> str:
 def view(args: argparse.Namespace) -> int:
     from athcodec.viewer import view
 
-    if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
-        if Path(args.export).suffix and not (args.export.endswith("/") or os.path.isdir(args.export)):
-            raise ClipError(f"--export: got {args.export}, expected PAGE.html, or a folder, such as {args.export}/")
-        return _export_gallery(args)
-    file, *more = args.files
-    if more:
-        raise ClipError(f"view: got {len(args.files)} files, expected one; --export DIR makes a gallery of several")
+    file = args.file
     floor = dict(args.floor or [])
     with naming(file):
         if args.export:
@@ -442,23 +436,6 @@ def view(args: argparse.Namespace) -> int:
             return 0
         ready = partial(_say_where, args)
         view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
-    return 0
-
-
-def _export_gallery(args: argparse.Namespace) -> int:
-    from athcodec.viewer import gallery, picture
-
-    if args.clip or args.host_mesh or args.floor:
-        raise ClipError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
-    for file in args.files:
-        with naming(file):
-            gallery.facts_of(file)
-    stills = picture.can_draw()
-    if not stills:
-        say("warning", f"no still pictures: they need Chromium and {picture.INSTALL}")
-    size = gallery.export_gallery(args.files, args.export, stills)
-    facts = {"folder": args.export, "plants": len(args.files), "bytes": size}
-    answer(args, facts, f"{args.export}: {counted(len(args.files), 'plant')}, {size:,} bytes, for any web host")
     return 0
 
 

@@ -16,6 +16,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+import athcodec
+from athcodec.viewer.still import still_svg
+
 VIEWER = Path(__file__).resolve().parent
 WEB = VIEWER / "web"
 CACHE_VARIABLE = "ATHCODEC_VIEWER_CACHE"
@@ -51,6 +54,8 @@ def build(folder: Path) -> None:
     if node is None:
         raise BuildError("node: got none on PATH, expected Node.js 18 or newer")
     _run([node, str(VIEWER / "build.mjs"), str(folder)], env=os.environ | {"NODE_PATH": str(modules())})
+    with athcodec.open(athcodec.sample_path("leafed")) as decoder:
+        (folder / "still.svg").write_text(still_svg(decoder), "utf-8")
 
 
 def _run(command: list[str], **options) -> None:

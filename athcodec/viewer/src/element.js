@@ -50,7 +50,7 @@ class Stand extends Stage {
 
   show(plant, reach) {
     this.#reach = reach;
-    this.setPanes([{ scene: this.scene([plant.root]), before: (width, height) => plant.prepare(width, height) }]);
+    this.setPanes([{ scene: this.scene([plant.root]), foot: plant.foot, before: (width, height) => plant.prepare(width, height) }]);
     this.#box = plant.box;
     this.#fit();
   }

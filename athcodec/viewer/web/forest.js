@@ -1,4 +1,890 @@
-import{ATHLoader as Ae,radii as wt}from"athcodec-three";import{ATHForest as Le}from"athcodec-three/webgpu";import{ACESFilmicToneMapping as vt,DoubleSide as yt,MeshStandardNodeMaterial as bt,PerspectiveCamera as St,Scene as Mt,Vector3 as Et,WebGPURenderer as Tt}from"three/webgpu";import{OrbitControls as At}from"three/addons/controls/OrbitControls.js";function S(o,e){let t=Math.sin(12.9898*o+78.233*e)*43758.5453;return t-Math.floor(t)}import{BufferAttribute as ee,BufferGeometry as Ie,Color as oe,Vector3 as H}from"three";var Ne=new oe(6968380),_e=[5208628,7050304,8825162].map(o=>new oe(o)),te=2600;function ne(o,e){let{rest:t,sphere:n}=o,a=[...e].sort((c,l)=>c-l)[Math.floor(.7*e.length)],s=.026*n.radius,h=c=>e[c]<=a,d=c=>new H().fromArray(t,3*c);return c=>{let{source:l}=c.userData,u=c.index.array,i={offset:[],normal:[],color:[],vertices:[],index:[]},f=(p,m,w,M)=>(i.vertices.push(p),i.offset.push(m.x,m.y,m.z),i.normal.push(w.x,w.y,w.z),i.color.push(M.r,M.g,M.b),i.vertices.length-1),y=(p,m,w,M)=>{let L=(g,b)=>f(g,w.clone().multiplyScalar(b*e[g]),M,Ne),r=[L(p,-1),L(p,1),L(m,-1),L(m,1)];i.index.push(r[0],r[1],r[2],r[2],r[1],r[3])},I=Array.from({length:u.length/2},(p,m)=>[l[u[2*m]],l[u[2*m+1]]]);for(let[p,m]of I){let w=d(m).sub(d(p)).normalize(),M=new H(w.y,-w.x,w.z*.1).cross(w).normalize(),L=new H().crossVectors(w,M);y(p,m,M,L),h(m)||y(p,m,L,M)}let T=I.map(([,p])=>p).filter(h),N=Math.min(te,2*T.length),A=s*Math.sqrt(te/Math.max(N,60));for(let p=0;p<N;p++){let m=T[Math.floor(p*T.length/N)],w=2*Math.PI*S(p,1),M=S(p,2)-.35,L=new H(Math.cos(w),M,Math.sin(w)).normalize().multiplyScalar(A),r=new H(-Math.sin(w),.6*(S(p,3)-.5),Math.cos(w)).multiplyScalar(.42*A),g=d(m).sub(n.center).normalize().add(new H(0,.7,0)).normalize(),b=_e[p%3].clone().multiplyScalar(.8+.4*S(p,4)),E=L.clone().multiplyScalar(.5),_=f(m,new H,g,b);f(m,E.clone().add(r),g,b),f(m,E.clone().sub(r),g,b),f(m,L,g,b),i.index.push(_,_+1,_+2,_+2,_+1,_+3)}let O=new Ie;for(let[p,m]of[["athOffset",i.offset],["normal",i.normal],["color",i.color]])O.setAttribute(p,new ee(Float32Array.from(m),3));return O.setIndex(new ee(Uint32Array.from(i.index),1)),O.userData.vertices=Uint32Array.from(i.vertices),O}}import{Color as He,DirectionalLight as Ce,Fog as ke,HemisphereLight as Ue,Mesh as Re,MeshStandardNodeMaterial as $e,PlaneGeometry as De,TSL as ze,Vector3 as Fe}from"three/webgpu";var{Fn:ce,clamp:Ge,color:V,dot:Be,max:We,mix:$,mx_noise_float:Ve,normalWorldGeometry:ae,positionWorld:Ke,pow:se,smoothstep:re,vec3:k}=ze,C=new Fe(-.62,.72,.32).normalize(),je=7317210,le=15002600,qe=16773334,ie=2048,Ye=9,Xe=ce(()=>{let o=Ge(ae.y,0,1),e=We(Be(ae,k(C.x,C.y,C.z)),0);return $($(V(le),V(je),se(o,.55)),V(qe),se(e,6).mul(.4))}),Ze=o=>ce(()=>{let e=Ke.xz.div(o),t=h=>Ve(k(e.x.mul(h),e.y.mul(h),h)),n=re(-.5,.6,t(.35).add(t(1.9).mul(.5))),a=t(23).mul(.5).add(t(61).mul(.5)),s=$(k(.085,.12,.03),k(.16,.19,.055),n);return $(s,k(.13,.1,.05),re(.25,.75,t(.8)).mul(.5)).mul(a.mul(.5).add(1))})(),D=class{constructor(e,t){let n=260*t,a=Ye*t;this.sun=new Ce(16773592,3.2),this.ground=new Re(new De(4*n,4*n),new $e({roughness:1})),this.ground.material.colorNode=Ze(t),this.ground.rotation.x=-Math.PI/2,this.ground.receiveShadow=!0,Object.assign(this.sun.shadow.camera,{left:-a,right:a,top:a,bottom:-a,near:.1*a,far:5*a}),Object.assign(this.sun.shadow,{bias:-5e-4,normalBias:.004*t}),this.sun.shadow.mapSize.setScalar(ie),this.reach=a,e.backgroundNode=Xe(),e.fog=new ke(new He(le),10*t,.55*n),e.add(this.ground,this.sun,this.sun.target,new Ue(14478328,9211746,1.3))}set shadows(e){this.sun.castShadow=e}around(e){let t=2*this.reach/ie*16,n=a=>Math.round(a/t)*t;this.sun.target.position.set(n(e.x),0,n(e.z)),this.sun.position.copy(this.sun.target.position).addScaledVector(C,2.5*this.reach)}};import{DoubleSide as tt,MeshStandardNodeMaterial as ot,TSL as nt}from"three/webgpu";import{DoubleSide as Bt,MeshDepthMaterial as Wt,MeshStandardMaterial as Vt,RGBADepthPacking as Kt}from"three";var Je=["bark","stalks"],Qe=["leaves","blades","pinnae"];function he({surfaces:o}){let[e,t]=typeof o=="string"?o.split(", "):[];return Je.includes(e)&&Qe.includes(t)?[e,t]:null}var et=`
+var Bs=Object.defineProperty;var js=(n,t)=>{for(var e in t)Bs(n,e,{get:t[e],enumerable:!0})};import*as Fr from"./three.webgpu.js";var te={};js(te,{ATH:()=>at,ATHForest:()=>Ot,ATHLimbs:()=>At,ATHLoader:()=>K,ATHMotion:()=>et,MOTION_PARS:()=>vt,dataTexture:()=>nt,injectMotion:()=>L,limbDepth:()=>ke,limbGeometry:()=>Mt,limbMaterial:()=>Et,motionUniforms:()=>tt,radii:()=>X,setRadii:()=>ht,upright:()=>B});import{Box3 as di,Group as pi,LineBasicMaterial as mi,LineSegments as gi,Loader as wi,Mesh as yi,MeshStandardMaterial as bi,EventDispatcher as vi,DoubleSide as xi,LoaderUtils as _i,Object3D as Si,Vector3 as Oe}from"./three.webgpu.js";import{Box3 as Xt,DataTexture as ii,EventDispatcher as oi,FloatType as ri,MathUtils as Me,NearestFilter as ni,RGBAFormat as ai,Sphere as Ae,Vector3 as xt}from"./three.webgpu.js";import{BufferAttribute as G,BufferGeometry as ye,InstancedBufferAttribute as Ws,ShapeUtils as Vs,Vector2 as Gs,Vector3 as rt}from"./three.webgpu.js";function Gt(n,{array:t,columns:e=0,counts:s=null}){let i=new Float64Array(n.length),o=s?s.length:t.length/e,r=[0,0,0];for(let a=0,h=0;a<o;a++){let l=s?Number(s[a]):e;for(let c=1;c+1<l;c++)Hs(i,n,Number(t[h]),Number(t[h+c]),Number(t[h+c+1]));h+=l}for(let a=0;a<i.length;a++)r[a%3]+=3*n[a]/i.length;for(let a=0;a<i.length;a+=3){let h=i[a]||i[a+1]||i[a+2];for(let c=0;!h&&c<3;c++)i[a+c]=n[a+c]-r[c]||1e-9;let l=Math.hypot(i[a],i[a+1],i[a+2]);for(let c=0;c<3;c++)i[a+c]/=l}return Float32Array.from(i)}function Hs(n,t,e,s,i){e*=3,s*=3,i*=3;let o=t[s]-t[e],r=t[s+1]-t[e+1],a=t[s+2]-t[e+2],h=t[i]-t[e],l=t[i+1]-t[e+1],c=t[i+2]-t[e+2],u=r*c-a*l,f=a*h-o*c,d=o*l-r*h;for(let p of[e,s,i])n[p]+=u,n[p+1]+=f,n[p+2]+=d}function $t(n,t){let{face_vertex_counts:e,face_vertex_indices:s}=t;return n.faces?n.faces:e&&s?{array:Uint32Array.from(s.array,Number),counts:e.array}:null}function B(n,{up_axis:t}){return t==="z"&&(n.rotation.x=-Math.PI/2),t==="x"&&(n.rotation.z=Math.PI/2),n}function q(n,t,e,s){let i=n.getAttribute(t),o=n.isInstancedBufferGeometry?Ws:G;i?.array.length!==e.length?n.setAttribute(t,new o(e,s)):Object.assign(i,{array:e,needsUpdate:!0})}function be(n,t){let{rest:e,statics:{metadata:s}}=n,i=s.domains??{},o=[i.uv,i.normals,i.colors].includes("corner"),r=o?t.array:Uint32Array.from({length:e.length/3},(h,l)=>l),a=_e(e,r);return a.setIndex(new G(qs(e,t,o),1)),Object.assign(a.userData,{corners:o,faces:t}),$s(a,Gt(e,t)),a}function ve(n,t){let{rest:e}=n,s=_e(e,Uint32Array.from({length:e.length/3},(i,o)=>o));return s.setIndex(new G(t,1)),s}function xe(n,t){let{source:e,other:s,faces:i}=n.userData,o=s?[["rest",e,t],["restOther",s,t]]:[["position",e,t]];i&&o.push(["normal",e,Gt(t,i)]);for(let[r,a,h]of o){let l=n.getAttribute(r);Y(l.array,h,a,3),l.needsUpdate=!0}}var wt=class extends G{#t;#e=()=>null;follow(t,e){return this.#t=t,this.#e=e,this}getComponent(t,e){let s=this.#e();return s?s[3*this.#t[t]+e]:super.getComponent(t,e)}getX(t){return this.getComponent(t,0)}getY(t){return this.getComponent(t,1)}getZ(t){return this.getComponent(t,2)}};function _e(n,t){let e=new ye,s=new Float32Array(3*t.length);return Y(s,n,t,3),e.setAttribute("position",new G(s,3)),e.userData.source=t,e}function Y(n,t,e,s){for(let i=0;i<e.length;i++)for(let o=0;o<s;o++)n[s*i+o]=Number(t[s*e[i]+o]);return n}function $s(n,t){let{source:e}=n.userData;n.setAttribute("normal",new G(Y(new Float32Array(3*e.length),t,e,3),3))}function qt(n,t,e){let s=t.statics.metadata.domains??{};for(let[i,o,r]of[["uv","uv",[2]],["normals","normal",[3]],["colors","color",[3,4]]]){let a=e[i],h=a?.shape.at(-1);if(!a||a.shape.length!==2||!r.includes(h))continue;let{source:l,corners:c}=n.userData,u=s[i]==="corner",f=a.shape[0],d=u?l.length:t.rest.length/3;if(f!==d||u&&!c)continue;let p=a.array instanceof Uint8Array?1/255:1,m=u?Uint32Array.from({length:f},(_,v)=>v):l,b=Y(new Float32Array(h*l.length),a.array,m,h).map(_=>_*p);q(n,o,b,h),i==="normals"&&(n.userData.faces=null)}}function qs(n,{array:t,columns:e=0,counts:s=null},i){let o=[],r=s?s.length:t.length/e;for(let a=0,h=0;a<r;a++){let l=s?Number(s[a]):e;for(let[c,u,f]of Ys(n,t,h,l))o.push(...[c,u,f].map(d=>i?h+d:Number(t[h+d])));h+=l}return Uint32Array.from(o)}function Ys(n,t,e,s){if(s<3)return[];if(s===3)return[[0,1,2]];let i=Array.from({length:s},(o,r)=>new rt().fromArray(n,3*Number(t[e+r])));return s===4?i[0].distanceToSquared(i[2])<=i[1].distanceToSquared(i[3])?[[0,1,2],[0,2,3]]:[[0,1,3],[1,2,3]]:Ks(i)??Array.from({length:s-2},(o,r)=>[0,r+1,r+2])}function Ks(n){let t=new rt,e=new rt,s=new rt;if(n.forEach((o,r)=>t.add(new rt().crossVectors(o,n[(r+1)%n.length]))),t.lengthSq()===0)return null;t.normalize(),e.set(Math.abs(t.x)>.9?0:1,Math.abs(t.x)>.9?1:0,0).cross(t).normalize(),s.crossVectors(t,e);let i=Vs.triangulateShape(n.map(o=>new Gs(o.dot(e),o.dot(s))),[]);return i.length>0?i:null}function Q(n,t,e,s){let{source:i}=n.userData,o=n.index.array,r=!n.getAttribute("normal"),a=new Map,h=r?2:3,l=[],c=new Set,u=f=>{let d=3*i[f],p=b=>Math.floor(t[d+b]/e)&4095,m=((s[i[f]]+1&65535)*4096+p(0))*16777216+p(1)*4096+p(2);return a.has(m)||a.set(m,f),a.get(m)};for(let f=0;f<o.length;f+=h){let d=Array.from(o.subarray(f,f+h),u),[p,m,b]=d;if(p===m||!r&&(m===b||b===p))continue;let[_,v,g]=[...d].sort((S,E)=>S-E),y=r?_*2**26+v:`${_},${v},${g}`;c.has(y)||(c.add(y),l.push(...d))}return l.length===0&&l.push(...o.subarray(0,h)),Xs(n,Uint32Array.from(l))}function Xs(n,t){let e=Uint32Array.from(new Set(t)).sort(),s=new Map(Array.from(e,(o,r)=>[o,r])),i=new ye;for(let[o,{array:r,itemSize:a}]of Object.entries(n.attributes))i.setAttribute(o,new G(Y(new r.constructor(a*e.length),r,e,a),a));return i.setIndex(new G(t.map(o=>s.get(o)),1)),i.userData.source=e.map(o=>n.userData.source[o]),i}import{MeshDepthMaterial as Zs,MeshDistanceMaterial as Js,RGBADepthPacking as Qs,Vector2 as ti}from"./three.webgpu.js";var Se=`
+attribute float athPart;
+uniform highp sampler2D athData;
+uniform float athStride;
+#ifdef ATH_FOREST
+uniform vec2 athForest;
+attribute vec4 athPlace;
+attribute vec4 athTurn;
+#endif
+#ifdef ATH_FADING
+attribute float athPartBefore;
+attribute vec4 athFading;
+uniform highp sampler2D athDataBefore;
+uniform vec2 athBefore;
+bool athIsBefore=false;
+#endif
+vec4 athTexel(int at){
+ivec2 place=ivec2(at & 1023,at>>10);
+#ifdef ATH_FADING
+if (athIsBefore) return texelFetch(athDataBefore,place,0);
+#endif
+return texelFetch(athData,place,0);
+}
+#ifdef ATH_FOREST
+vec4 athAt(int at){
+vec2 frames=athTurn.zw;
+int size=int(athForest.x);
+#ifdef ATH_FADING
+if (athIsBefore){
+frames=athFading.xy;
+size=int(athBefore.x);
+}
+#endif
+return mix(athTexel(int(frames.x)*size+at),athTexel(int(frames.y)*size+at),fract(frames.x));
+}
+vec3 athSpin(vec3 p){
+return athForest.y>.5?vec3(athTurn.x*p.x - athTurn.y*p.y,athTurn.y*p.x+athTurn.x*p.y,p.z)
+:vec3(athTurn.x*p.x+athTurn.y*p.z,p.y,athTurn.x*p.z - athTurn.y*p.x);
+}
+#else
+vec4 athAt(int at){return athTexel(at);}
+#endif
+vec3 athShown(vec3 p,float part){
+int at=int(abs(part)) - 1;
+if (part<.0) return athAt(at).xyz;
+vec4 q=vec4(p,1.);
+return vec3(dot(athAt(at),q),dot(athAt(at+1),q),dot(athAt(at+2),q));
+}
+vec3 athMoved(vec3 rest,float part){
+vec3 p=athShown(rest,part);
+#ifdef ATH_FADING
+athIsBefore=true;
+p=mix(p,athShown(rest,athPartBefore),athFading.z);
+athIsBefore=false;
+#endif
+#ifdef ATH_FOREST
+p=athSpin(p)*athPlace.w+athPlace.xyz;
+#endif
+return p;
+}
+vec3 athFacing(vec3 n,float part,float stride){
+int at=int(abs(part)) - 1;
+if (part>.0){
+vec3 a=athAt(at).xyz,b=athAt(at+1).xyz,c=athAt(at+2).xyz;
+n=vec3(dot(cross(b,c),n),dot(cross(c,a),n),dot(cross(a,b),n));
+}else if (stride>1.5){
+vec4 q=normalize(athAt(at+1));
+n=n+2.*cross(q.xyz,cross(q.xyz,n)+q.w*n);
+}
+return n;
+}
+vec3 athTurned(vec3 normal,float part){
+vec3 n=athFacing(normal,part,athStride);
+#ifdef ATH_FADING
+athIsBefore=true;
+n=mix(n,athFacing(normal,athPartBefore,athBefore.y),athFading.z);
+athIsBefore=false;
+#endif
+#ifdef ATH_FOREST
+n=athSpin(n);
+#endif
+return n;
+}
+`,ei=`
+vec3 transformed=athMoved(position,athPart);
+#ifdef USE_ALPHAHASH
+vPosition=vec3(position);
+#endif
+`,si=`
+vec3 objectNormal=athTurned(normal,athPart);
+#ifdef USE_TANGENT
+vec3 objectTangent=vec3(tangent.xyz);
+#endif
+`,yt=new WeakMap;function L(n,t,e=!1){let s=yt.get(n);if(s===t)return n;if(yt.set(n,t),s)return n.dispose(),n;let i=[...e?["ATH_FOREST"]:[],...t.athBefore?["ATH_FADING"]:[]],{onBeforeCompile:o,customProgramCacheKey:r}=n,a=`ath ${i} ${n.customProgramCacheKey()}`;return n.onBeforeCompile=(h,l)=>{o.call(n,h,l),Object.assign(h.uniforms,yt.get(n)),h.vertexShader=`${i.map(c=>`#define ${c}
+`).join("")}${h.vertexShader}`.replace("#include <common>",`#include <common>
+${Se}`).replace("#include <begin_vertex>",ei).replace("#include <beginnormal_vertex>",si)},n.customProgramCacheKey=()=>a,n.clone=()=>{let h=Object.getPrototypeOf(n).clone.call(n);return L(Object.assign(h,{onBeforeCompile:o,customProgramCacheKey:r}),yt.get(n),e)},n.needsUpdate=!0,n}function bt(n,t=!1){return{customDepthMaterial:L(new Zs({depthPacking:Qs}),n,t),customDistanceMaterial:L(new Js,n,t)}}var vt=Se;function tt(){return{athData:{value:null},athStride:{value:1},athForest:{value:new ti}}}var Yt=1024;var Kt=new xt,hi=new xt;function nt(n){let t=new ii(n,Yt,n.length/4/Yt,ai,ri);return t.magFilter=t.minFilter=ni,t.needsUpdate=!0,t}function $({duration:n,frameCount:t}){return t>1?n*t/(t-1):0}var Ee={message:"ath: got a request after dispose(), expected none",codeName:"CLOSED"},j=({message:n,codeName:t})=>Object.assign(new Error(n??"MISSING: bytes are still to come"),{codeName:t??"MISSING"}),li=33;function _t(n){return n<1?n*n*(3-2*n):1}var ci=19,ui=21,et=class extends oi{clip;time=0;start=0;wrap;frame=0;level=-1;held=!1;automatic=!0;target=0;pixels=1;measure="p99";fade=.2;fading=!1;heat=!1;distances=null;mode="matrices";milliseconds=0;uniforms=tt();#t;#e;#i=new Set;#r=null;#o=null;#s=new Xt;#a=null;#c=new Map;#h=null;#n=null;#f=!1;#u=!1;#p=0;#l=null;#d=null;#m=new Map;#b=1;constructor(t,e,s){super(),this.#t=t,this.#e=e,this.clip=s,this.target=t.info.levelCount-1,this.wrap=this.usualWrap,t.views.set(e,this)}get info(){return this.#t.info}get clips(){return this.#t.clips}get usualWrap(){return this.clips.some(({loop:t})=>t)?"marked":"loop"}get loops(){return this.wrap==="loop"||this.wrap==="marked"&&this.clip.loop}get duration(){return this.loops?$(this.clip):this.clip.duration*(this.wrap==="pingpong"?2:1)}get switching(){return this.#l&&(this.#l.begun?"fading":"waiting")}get levelCount(){return this.info.levelCount}levelName(t){return this.info.levelNames[t]}get failure(){return this.#t.failure}get bytesFetched(){return this.#t.state.fetched}get bytesTotal(){return this.info.fileLength}get requests(){return this.#t.state.requests}motionBytes(t){let{firstSegment:e,segmentCount:s}=this.clip;return this.#t.chunks.filter(o=>o.level<=t&&([ci,ui].includes(o.kind)||o.segment>=e&&o.segment<e+s)).reduce((o,{length:r})=>o+r,0)}bitRate(t=Math.max(this.level,0)){return this.clip.duration>0?8*this.motionBytes(t)/this.clip.duration:0}error(t){return this.clip.errors[t]}seamError(t){return this.clip.seams[t]}ready(t){let{times:e,segments:s}=this.#t,{firstFrame:i,frameCount:o,firstSegment:r}=this.clip,a=[],h=i+o-1,l=c=>e[Math.min(s[c],h)]-e[i];return this.readyLevels.forEach((c,u)=>{if(c<t)return;let f=l(r+u),d=l(r+u+1);a.at(-1)?.end===f?a.at(-1).end=d:a.push({start:f,end:d})}),a}get readyLevels(){let{firstSegment:t,segmentCount:e}=this.clip;return this.#t.state.ready.subarray(t,t+e)}get readyLevel(){return Math.min(...this.readyLevels)}get complete(){return this.readyLevel===this.levelCount-1}setTime(t){let e=Math.max(0,t-this.time),s=this.#l;return this.time=t,s&&(s.seconds+=e,s.begun&&(s.passed+=e),this.#M()),this.#g(),this}play(t,{fade:e=0,at:s=0}={}){let i=this.clips.find(({index:o,name:r})=>t===o||t===r);if(!i)throw new RangeError(`clip: got ${t}, expected one of ${this.clips.map(({name:o})=>o).join(", ")}`);return this.#d=null,this.level>=0&&(this.#l={...this.#w(),at:s,fade:e,passed:0,begun:!1}),Object.assign(this,{clip:i,start:this.time-s}),this.#g(),this}wind(t,e=0){if(![t,e].every(Number.isFinite))throw new RangeError(`wind: got ${t} and ${e}, expected two finite numbers`);return this.#d=[t,e],this.#l=null,this.#g(),this}#w(){let t=this.#l;return t&&(!t.begun||2*t.passed<t.fade)?t:this.#x(this.time)}#M(){this.#l.begun&&this.#l.passed>=this.#l.fade&&(this.#l=null)}setLevel(t){return this.automatic=t==="auto",this.automatic||(this.target=Me.clamp(t,0,this.levelCount-1)),this.#g(),this}setMode(t){return this.mode=t,this}levelFor(t,e,s=null,i=this.pixels){let o=this.#v(t,e,s);for(let r=0;r<this.levelCount;r++)if(this.error(r)[this.measure]*o<=i)return r;return this.levelCount-1}pixelError(t,e,s,i=null){return this.error(t)[this.measure]*this.#v(e,s,i)}#v(t,e,s){let i=this.#t.sphere;Kt.copy(i.center);let o=1;if(s&&(Kt.applyMatrix4(s),o=s.getMaxScaleOnAxis()),t.isOrthographicCamera)return o*e*t.zoom/(t.top-t.bottom);let r=Math.max(Kt.distanceTo(hi.setFromMatrixPosition(t.matrixWorld))-i.radius*o,1e-9);return o*e/(2*Math.tan(Me.degToRad(t.fov)/2)/t.zoom*r)}update(t,e,s=null){return this.automatic&&(this.target=this.levelFor(t,e,s?.matrixWorld??null)),this}show(t,e=this.target){return this.#y(t,{level:e,heat:this.heat,positions:this.mode==="positions"})}async positions(t,e=this.target){return(await this.#y(t,{level:e,positions:!0,aside:!0})).data}#y(t,e){let s=this.#b++;return new Promise((i,o)=>{if(!this.#t.views.has(this.#e))throw j(Ee);this.#m.set(s,{resolve:i,reject:o,aside:e.aside}),this.#t.send({type:"picture",view:this.#e,id:s,exactly:!0,...this.#x(t),wind:this.#d,...e})})}#x(t){return{clip:this.clip.index,seconds:t-this.start,wrap:this.wrap}}#g(){let t=this.#l,e=this.switching==="waiting",{clip:s,seconds:i,wrap:o}=this.#x(e?this.start+t.at:this.time),r=t&&{clip:t.clip,seconds:t.seconds,wrap:t.wrap,begun:t.begun,share:t.fade>0?1-t.passed/t.fade:0},a=`${s} ${i} ${o} ${this.target} ${this.heat} ${JSON.stringify([r,this.#d])}`;if(this.#f){this.#u=a!==this.#n;return}if(a===this.#n&&!this.#u&&!this.fading)return;this.#n=a,this.#u=!1,this.#f=!0;let h=this.#h;this.#h=null,this.#t.send({type:"picture",view:this.#e,id:0,clip:s,seconds:i,wrap:o,old:r,wind:this.#d,level:this.target,heat:this.heat,positions:this.mode==="positions",buffer:h,now:performance.now(),fade:this.fade,coarsely:this.#t.easing},h?[h]:[])}refresh(){this.#n=null,this.#g()}picture(t){let e=this.#m.get(t.id),{shown:s,codeName:i}=t;this.#m.delete(t.id),e||(this.#f=!1),s<0?e?.reject(j(t)):e?.aside||this.#E(t),s>=0&&e?.resolve(t),!e&&t.message&&this.dispatchEvent({type:"error",message:t.message,codeName:i}),!e&&this.#u&&this.#g()}dispatchEvent(t){try{super.dispatchEvent(t)}catch(e){queueMicrotask(()=>{throw e})}}#E({shown:t,cut:e=t,frame:s,data:i,heat:o,ms:r,held:a,clip:h,exactly:l,fading:c,whole:u}){let f=t!==this.level,d=this.#t.known.get(e),p=d!==this.#r;if(Object.assign(this,{frame:s,held:a,fading:c,milliseconds:r,distances:o??null,level:t}),this.#r=d,t>0&&this.#t.endEasing(),clearTimeout(this.#p),c&&(this.#p=setTimeout(()=>this.refresh(),li)),this.#o=u?i:null,u||this.#O(e,i),this.#A(i),this.mode==="positions"&&this.#T(this.uploaded()),p)for(let m of this.#i)this.#D(m);f&&this.dispatchEvent({type:"level",level:t}),this.switching==="waiting"&&h===this.clip.index&&this.#_(this.#l),l&&(this.#l=null),this.dispatchEvent({type:"frame",frame:s,level:t})}#_(t){t.begun=!0,this.start=this.time-t.at,this.#M(),this.dispatchEvent({type:"clip",clip:this.clip})}#O(t,e){let s=this.#c.get(t);s&&s.image.data.length===e.length?(this.#h=s.image.data.buffer,s.image.data=e,s.needsUpdate=!0):(s?.dispose(),this.#c.set(t,nt(e)));let{texels:i,parts:{nodeCount:o,exactCount:r}}=this.#r;this.uniforms.athData.value=this.#c.get(t),this.uniforms.athStride.value=r>0?(i-3*o)/r:1}#T(t){for(let e of this.#i){let{source:s}=e.userData,{position:i,normal:o}=e.attributes;for(let r=0;r<s.length;r++)for(let a=0;a<3;a++)i.array[3*r+a]=t[3*s[r]+a];i.needsUpdate=!0,o&&e.computeVertexNormals()}}#A(t){let{min:e,max:s}=this.#s.makeEmpty(),{boxes:i}=this.#r,o=[...e],r=[...s],a=(l,c,u)=>{c<o[l]&&(o[l]=c),u>r[l]&&(r[l]=u)},h=(l,c,u)=>{for(let f=l;f<c;f+=u)for(let d=0;d<3;d++)a(d,t[f+d],t[f+d])};if(this.#o)h(0,t.length,3);else{let{parts:{nodeCount:l,exactCount:c}}=this.#r,u=4*this.uniforms.athStride.value;h(12*l,12*l+u*c,u);for(let[f,d,p,m,b,_,v]of i)for(let g=0;g<3;g++){let[y,S,E,R]=t.subarray(f+4*g,f+4*g+4),w=y*d+S*p+E*m+R,M=Math.abs(y)*b+Math.abs(S)*_+Math.abs(E)*v;a(g,w-M,w+M)}}e.fromArray(o),s.fromArray(r);for(let l of this.#i)this.#P(l)}#P(t){t.boundingBox=(t.boundingBox??new Xt).copy(this.#s),t.boundingSphere=this.#s.getBoundingSphere(t.boundingSphere??new Ae)}uploaded(){if(this.#o||!this.uniforms.athData.value)return this.#o;let{data:t}=this.uniforms.athData.value.image,{rest:e}=this.#t,{vertices:s}=this.#r,i=this.#o=new Float32Array(e.length);for(let o=0,r=0;o<s.length;o++){let a=s[o],h=e[r],l=e[r+1],c=e[r+2];for(let u=4*(Math.abs(a)-1),f=0;f<3;f++,r++,u+=a<0?1:4)i[r]=a<0?t[u]:t[u]*h+t[u+1]*l+t[u+2]*c+t[u+3]}return i}bind(t){return this.mode==="positions"?t:L(t,this.uniforms)}bindShadows(t){if(this.mode==="positions")return t;let{clone:e}=Object.getPrototypeOf(t);return Object.assign(t,this.#a??=bt(this.uniforms),{onBeforeRender:this.#R,clone:(...s)=>this.bindShadows(e.apply(t,s))})}#R=({isWebGPURenderer:t})=>{!t||this.mode==="positions"||(this.setMode("positions"),this.level>=0&&this.#T(this.uploaded()))};attach(t){let{source:e,other:s}=t.userData,i=t.getAttribute("position");return this.mode!=="positions"&&!s&&t.setAttribute("position",new wt(i.array,3).follow(e,()=>this.uploaded())),this.level<0&&this.#s.copy(this.#t.box),this.#i.add(t),this.#P(t),this.#D(t),t}setRest(){if(this.mode==="positions")return;for(let e of this.#i)xe(e,this.#t.rest);this.#o=null;let t=this.uniforms.athData.value;t&&this.#A(t.image.data)}detach(t){this.#i.delete(t)}#D(t){if(this.mode==="positions")return;let{source:e,other:s}=t.userData;this.#S(t,"athPart",e),s&&this.#S(t,"athPartOther",s)}#S(t,e,s){let i=t.getAttribute(e)?.array??new Float32Array(s.length),o=this.#r?.vertices;if(o)for(let r=0;r<s.length;r++)i[r]=o[s[r]];q(t,e,i,1)}async nodeNumbers(t=this.level){return this.#t.nodeNumbers(await this.#t.parts(t))}clone(){return this.#t.view(this.clip)}dispose(){clearTimeout(this.#p);for(let t of this.#c.values())t.dispose();for(let t of Object.values(this.#a??{}))t.dispose();this.#c.clear(),this.#t.dropView(this.#e),this.fail(j(Ee))}fail(t){for(let{reject:e}of this.#m.values())e(t);this.#m.clear()}};function Zt(n){let t=[1/0,1/0,1/0],e=[-1/0,-1/0,-1/0];for(let i=0;i<n.length;i+=3)for(let o=0;o<3;o++)n[i+o]<t[o]&&(t[o]=n[i+o]),n[i+o]>e[o]&&(e[o]=n[i+o]);let s=new Xt(new xt(...t),new xt(...e));return{box:s,sphere:s.getBoundingSphere(new Ae)}}function fi({presence:n,part_names:t},{part_vertex_counts:e,part_copies:s}){if(!n||!Array.isArray(t)||e?.array.length!==t.length)return[];let i=[];for(let o=0,r=0;o<t.length;r+=Number(e.array[o++])){let a=Number(e.array[o]),h=Number(s?.array[o]??1),l=n[t[o]];l&&i.push({first:r,stop:r+a,runs:l});for(let c=0,u=a/h;!l&&c<h;c++){let f=n[`${t[o]}:${c}`];f&&i.push({first:r+c*u,stop:r+(c+1)*u,runs:f})}}return i}var St=class{#t=new Map;#e=new WeakMap;#i="";show({motion:t,metadata:e,attributes:s},i,o){let r=t.clips.findLast(({firstFrame:c})=>c<=t.frame)??t.clip;o&&this.#t.clear(),this.#t.has(r)||this.#t.set(r,fi({...e,...e.clips?.[r.name]},s));let a=Math.floor(t.frame-r.firstFrame),h=this.#t.get(r).filter(({runs:c})=>!c.some(([u,f])=>u<=a&&a<f)),l=h.map(({first:c})=>c).join();if(!(l===this.#i&&!(o&&h.length))){this.#i=l;for(let c of i)this.#r(c,h)}}#r(t,e){let{index:s,userData:{source:i}}=t,o=t.hasAttribute("normal")?3:2;this.#e.has(t)||this.#e.set(t,s.array.slice());let r=this.#e.get(t),a=new Uint8Array(Math.max(0,...e.map(({stop:h})=>h)));for(let{first:h,stop:l}of e)a.fill(1,h,l);for(let h=0;h<r.length;h++){let l=r[h-h%o];s.array[h]=a[i[l]]?l:r[h]}s.needsUpdate=!0}};var Mi=16,Ei=0;function Ai(n){if(n===null||n instanceof Float32Array&&n.length%3===0)return n;let t=n?.isBufferGeometry?n.getAttribute("position"):null;if(!t)throw new TypeError("mesh: got something else, expected three numbers per vertex or a BufferGeometry");return Float32Array.from({length:3*t.count},(e,s)=>t.getComponent(Math.floor(s/3),s%3))}function Oi(n){if(ArrayBuffer.isView(n))return new Uint8Array(n.buffer,n.byteOffset,n.byteLength).slice();if(!/Buffer/.test(Object.prototype.toString.call(n)))throw new TypeError("buffer: got something else, expected an ArrayBuffer or a view of one");return new Uint8Array(n).slice()}var Te=n=>({codeName:"WORKER",message:`ath_worker.js: got no worker (${n??"not found or not allowed"}), expected it beside the loader or where setDecoderPath() says`}),Jt=()=>j({message:"loading was aborted",codeName:"AbortError"}),Qt=class{views=new Map;state={fetched:0,requests:0,ready:new Int8Array(1).fill(-1)};failure=null;sent=0;decodedAt=null;known=new Map;#t=new Map;#e=1;#i=1;#r=null;constructor(t,e){this.id=++Ei,this.worker=t,this.release=e,this.settle={};for(let s of["opened","whole","arrays"])this[s]=new Promise((i,o)=>{this.settle[s]={resolve:i,reject:o}}),this[s].catch(()=>{});t.channels.set(this.id,this)}#o(t){for(let{reject:e}of[this.settle.opened,this.settle.whole,...this.#t.values()])e(t);this.#t.clear()}send(t,e=[]){this.worker.postMessage({...t,file:this.id},e)}receive(t){let{type:e}=t;if(this.sent=t.sent-performance.timeOrigin,e==="opened")Object.assign(this,t,{type:void 0},Zt(t.rest)),this.state.ready=new Int8Array(t.info.segmentCount).fill(-1),this.settle.opened.resolve(this);else if(e==="rest")this.#n(t.rest);else if(e==="failed"){let s=j(t);this.#o(s);for(let i of this.views.values())i.fail(s);this.#s({...t,type:"stopped"})}else if(e==="attributes")this.settle.arrays.resolve(t.attributes);else if(e==="state")this.#h(t);else if(e==="picture")this.views.get(t.view)?.picture(t);else if(e==="parts")this.#a(t);else if(e==="decoded"){this.decodedAt??=this.sent;for(let s of this.views.values())s.refresh()}else e==="baked"?this.#l(`bake ${t.id}`,t):e==="gpu"||e==="wind"?this.#l(`${e} ${t.id}`,t):(e==="stopped"&&this.settle.whole.reject(j(t)),this.#s(t))}#s({type:t,level:e=null,message:s,codeName:i}){this.failure={type:t,level:e,message:s,codeName:i},this.#u(this.failure)}#a({level:t,parts:e,texels:s}){let i={parts:e,texels:s,vertices:this.#d(e,s),boxes:this.#c(e)};this.known.set(t,i),this.#l(`parts ${t}`,i)}#c({branch:t,first:e,count:s,index:i}){let{rest:o,vertexSource:r}=this,a=new Oe,h=new di,l=new Oe,c=[];for(let u=0;u<t.length;u++)if(!(t[u]<0)){h.makeEmpty();for(let f=e[u];f<e[u]+s[u];f++)h.expandByPoint(a.fromArray(o,3*r[f]));c.push([12*i[u],...h.getCenter(a),...h.getSize(l).multiplyScalar(.5)])}return c}#h(t){let e=t.ready.some((s,i)=>s!==this.state.ready[i]);if(this.state=t,this.#u({type:"progress",loaded:t.fetched,total:t.total}),t.whole&&this.settle.whole.resolve(),!!e){this.#u({type:"ready"});for(let s of this.views.values())s.refresh()}}get easing(){return this.#r!==null}#n(t){let e=this.rest.slice(),s=performance.now(),i=Math.max(0,...[...this.views.values()].map(({level:r,fade:a})=>r===0?a:0)),o=()=>{let r=_t((performance.now()-s)/1e3/i);r===1?this.endEasing():this.#f(t.map((a,h)=>e[h]+r*(a-e[h])))};this.#r={to:t,timer:setInterval(o,Mi)},o()}endEasing(){if(!this.easing)return;let{to:t,timer:e}=this.#r;clearInterval(e),this.#r=null,this.#f(t);for(let s of this.views.values())s.refresh()}#f(t){this.rest.set(t);let{box:e,sphere:s}=Zt(t);this.box.copy(e),this.sphere.copy(s);for(let i of this.known.values())i.boxes=this.#c(i.parts);for(let i of this.views.values())i.setRest()}#u(t){for(let e of this.views.values())e.dispatchEvent({...t})}async parts(t){return this.known.get(t)??this.#p(`parts ${t}`,{type:"parts",level:t})}bake(t,e,s){let i=this.#i++;return this.#p(`bake ${i}`,{type:"bake",id:i,clip:t,level:e,step:s})}async gpu(t,e=null){let s=this.#i++,i=await this.#p(`gpu ${s}`,{type:"gpu",id:s,level:t,segment:e});if(!i.words)throw j(i);return i}windWeights(t,e){let s=this.#i++;return this.#p(`wind ${s}`,{type:"wind",id:s,strength:t,heading:e})}#p(t,e){if(!this.#t.has(t)){let s={};s.promise=new Promise((i,o)=>{Object.assign(s,{resolve:i,reject:o})}),this.#t.set(t,s),this.send(e)}return this.#t.get(t).promise}#l(t,e){this.#t.get(t)?.resolve(e),this.#t.delete(t)}fetchAll(){return this.send({type:"all"}),this.whole}abort(){this.settle.opened.reject(Jt()),this.settle.whole.reject(Jt()),this.send({type:"abort"})}#d({nodeCount:t,exactCount:e,branch:s,first:i,count:o,index:r},a){let h=new Float32Array(this.info.placeCount),l=e>0?(a-3*t)/e:1;for(let c=0;c<s.length;c++)for(let u=0;u<o[c];u++)h[i[c]+u]=s[c]>=0?1+3*r[c]:-(1+3*t+l*(r[c]+u));return this.#m(h)}#m(t){return t.constructor.from(this.vertexPlaces,e=>t[e])}nodeNumbers({parts:{branch:t,first:e,count:s}}){let i=this.#b();for(let o=0;o<t.length;o++)t[o]>=0&&i.fill(t[o],e[o],e[o]+s[o]);return this.#m(i)}get vertexBranch(){return this.#m(this.#b())}#b(){let{branches:{first:t,count:e}}=this,s=new Int32Array(this.info.placeCount);for(let i=0;i<t.length;i++)s.fill(i,t[i],t[i]+e[i]);return s}view(t=this.clips[this.first]){return new et(this,this.#e++,t)}dropView(t){this.views.delete(t)&&this.send({type:"drop",view:t})}close(){if(this.worker.channels.delete(this.id)){clearInterval(this.#r?.timer),this.send({type:"close"});for(let t of[...this.views.values()])t.dispose();this.#o(Jt()),this.release()}}},at=class extends vi{attributes={};#t;#e;#i=null;#r=null;#o=null;#s=null;#a=null;#c=null;#h=new St;constructor(t,e){super(),this.#t=t,this.motion=t.view().setMode(e),this.motion.addEventListener("frame",()=>this.#n(!1)),this.metadata=t.statics.metadata,this.#e=$t(t.statics,{}),this.arrays=t.arrays.then(s=>this.#u(s))}get loaded(){return this.#c??=this.#t.fetchAll().then(()=>this)}abort(){this.#t.abort()}get hasFaces(){return this.#e!==null}get geometry(){return!this.#i&&this.#e&&(this.#i=this.motion.attach(be(this.#t,this.#e)),qt(this.#i,this.#t,this.attributes),this.#n(!0)),this.#i}get lines(){let{statics:t}=this.#t;return!this.#r&&(t.edges||!this.#e)&&(this.#r=this.motion.attach(ve(this.#t,t.edges??t.skeleton)),this.#n(!0)),this.#r}get object(){return this.#o||(this.#o=B(new pi,this.metadata),this.#o.name="ath",this.#f()),this.#o}#n(t){this.#h.show(this,[this.#i,this.#r].filter(Boolean),t)}#f(){let{geometry:t,motion:e}=this,s=this.#s;if(!s||t&&!s.isMesh){let o=t?new bi({color:9083499,roughness:.8,side:xi}):new mi({color:7035717});this.#a=e.bind(o),this.#s=t?new yi(t,o):new gi(this.lines,o),s?Si.prototype.copy.call(this.#s,s):this.#s.castShadow=this.#s.receiveShadow=!0,this.#o.add(e.bindShadows(this.#s)),s?.removeFromParent(),s?.material.dispose()}let{vertexColors:i}=this.#a;!t?.hasAttribute("color")||i||(this.#a.color.set(16777215),Object.assign(this.#a,{vertexColors:!0,needsUpdate:!0}))}get skeleton(){return this.#t.statics.skeleton}get rest(){return this.#t.rest}get branches(){return this.#t.branches}get vertexBranch(){return this.#t.vertexBranch}get sphere(){return this.#t.sphere}get box(){return this.#t.box}get channel(){return this.#t}#u(t){return this.attributes=t,this.#e??=$t(this.#t.statics,t),this.#i&&qt(this.#i,this.#t,t),this.#o&&this.#e&&this.#f(),this.#n(!0),this.dispatchEvent({type:"arrays"}),t}dispose(){for(let t of[this.#i,this.#r])t?.dispose();this.#a?.dispose(),this.#t.close()}},K=class extends wi{constructor(t){super(t),this.workerLimit=4,this.workerPool=[],this.workerURL=null,this.mode="matrices",this.clip=null,this.hostMesh=null,this.bandwidth=null,this.begun=null}setDecoderPath(t){return this.workerURL=/\/$/.test(t)?`${t}ath_worker.js`:t,this}setWorkerLimit(t){return this.workerLimit=t,this}setMode(t){return this.mode=t,this}setClip(t){return this.clip=t,this}setHostMesh(t){return this.hostMesh=Ai(t),this}setBandwidth(t){return this.bandwidth=t,this}preload(){return this.workerPool.length===0&&this.#o(),this}takeOver({worker:t,url:e=null,front:s=null}){return this.#s(t),this.begun={url:e,front:s},this}load(t,e,s,i){let o=this.manager.resolveURL(_i.resolveURL(t,this.path)),r={headers:this.requestHeader,credentials:this.withCredentials?"include":"same-origin"};this.manager.itemStart(t);let a=(h,l)=>{h===i&&this.manager.itemError(t),h?.(l),this.manager.itemEnd(t)};this.#t(new URL(o,globalThis.location?.href).href,r,s).then(h=>a(e,h),h=>{i||console.error(h),a(i,h)})}parse(t,e,s=i=>console.error(i)){this.parseAsync(t).then(e,s)}async parseAsync(t){let{buffer:e}=Oi(t);return this.#e({bytes:e},[e])}abort(){for(let{channels:t}of this.workerPool)for(let e of[...t.values()])e.abort();return this}async#t(t,e,s){let{clip:i,hostMesh:o,bandwidth:r,begun:a}=this,h=a?.url===t&&r===null?await a.front:null;return this.begun=null,this.#e({url:t,options:{...e,front:h},clip:i,hostMesh:o,bandwidth:r},h?[h.bytes]:[],s)}async#e(t,e,s){let i=this.#r(),o=this.manager.abortController?.signal,r=()=>a.abort(),a=new Qt(i,()=>{i.files--,o?.removeEventListener("abort",r)});o?.addEventListener("abort",r),i.files++;try{a.send({type:"open",clip:this.clip,hostMesh:this.hostMesh,bandwidth:this.bandwidth,...t},e),await a.opened;let h=new at(a,this.mode);return s&&h.motion.addEventListener("progress",({loaded:l,total:c})=>s({loaded:l,total:c,lengthComputable:!0})),await this.#i(h.motion),h}catch(h){throw a.close(),h}}#i(t){return new Promise((e,s)=>{let i=o=>{t.level<0&&t.show(0,0).catch(()=>s(j(o)))};t.addEventListener("frame",e),t.addEventListener("stopped",i),t.addEventListener("damaged",i),t.setTime(0)})}#r(){let t=this.workerPool.find(e=>e.files===0);return t||(this.workerPool.length<this.workerLimit?this.#o():this.workerPool.reduce((e,s)=>s.files<e.files?s:e))}#o(){return this.#s(this.#a())}#s(t){return Object.assign(t,{files:0,channels:new Map}),t.onmessage=({data:e})=>t.channels.get(e.file)?.receive(e),t.onerror=({message:e})=>{this.workerPool.splice(this.workerPool.indexOf(t),1);for(let s of t.channels.values())s.receive({type:"failed",...Te(e)})},this.workerPool.push(t),t}#a(){let{href:t,origin:e}=globalThis.location??{};try{let s=new URL(this.workerURL??new URL("./ath_worker.js",import.meta.url),t),o=s.protocol==="blob:"||s.origin===e||!/^http/.test(e)?s:URL.createObjectURL(new Blob([`import ${JSON.stringify(s.href)};`],{type:"text/javascript"}));return new Worker(o,{type:s.protocol==="blob:"?"classic":"module"})}catch({message:s}){throw j(Te(s))}}dispose(){for(let t of this.workerPool)t.terminate();return this.workerPool.length=0,this}};import{Color as Ci,Mesh as ki,Vector4 as Ni}from"./three.webgpu.js";import{BufferAttribute as Ti,InstancedBufferAttribute as Pi,InstancedBufferGeometry as Di,ShaderMaterial as De,Vector2 as Re}from"./three.webgpu.js";var Ce=`
+attribute vec3 rest,restOther,color,colorOther;
+attribute float athPartOther,radius,radiusOther;
+uniform vec2 screen;
+varying vec3 vColor;
+varying float vSide;
+varying vec3 vAcross;
+${vt}
+void main(){
+bool far=position.x>.5;
+vec4 p=modelViewMatrix*vec4(athMoved(rest,athPart),1.);
+vec4 q=modelViewMatrix*vec4(athMoved(restOther,athPartOther),1.);
+vec2 along=isOrthographic?p.xy - q.xy:p.xy/-p.z - q.xy/-q.z;
+vec2 across=length(along)>1e-9?normalize(vec2(-along.y,along.x)):vec2(1.,.0);
+if (far) p=q;
+float pixel=(isOrthographic?1.:-p.z)*2./(projectionMatrix[1][1]*screen.y);
+float wide=max(far?radiusOther:radius,.55*pixel);
+p.xy+=wide*(across*position.y+vec2(across.y,-across.x)*(far?-.6:.6));
+gl_Position=projectionMatrix*p;
+vColor=far?colorOther:color;
+vSide=position.y;
+vAcross=vec3(across,.0);
+}`,Ri=`
+uniform float shade;
+varying vec3 vColor;
+varying float vSide;
+varying vec3 vAcross;
+void main(){
+float s=clamp(vSide,-1.,1.);
+vec3 n=normalize(vAcross*s+vec3(.0,.0,sqrt(max(1. - s*s,.0))));
+float light=.55+.55*max(dot(n,normalize(vec3(.45,.65,.6))),.0)+.1*n.y;
+gl_FragColor=vec4(vColor*mix(1.,light,shade),1.);
+#include <colorspace_fragment>
+}`;function Mt(n,t){let e=n.skeleton,s=e.length/2,i=new Uint32Array(s),o=new Uint32Array(s);for(let a=0;a<s;a++)i[a]=e[2*a],o[a]=e[2*a+1];let r=new Di;return r.setAttribute("position",new Ti(Float32Array.of(0,1,0,0,-1,0,1,1,0,1,-1,0),3)),r.setIndex([0,1,2,2,1,3]),r.setAttribute("rest",Pe(n.rest,i)),r.setAttribute("restOther",Pe(n.rest,o)),r.instanceCount=s,r.userData={source:i,other:o},ht(r,t),r}function Pe(n,t){let e=new Float32Array(3*t.length);for(let s=0,i=0;s<t.length;s++){let o=3*t[s];e[i++]=n[o],e[i++]=n[o+1],e[i++]=n[o+2]}return new Pi(e,3)}function ht(n,t){for(let[e,s]of[["radius",n.userData.source],["radiusOther",n.userData.other]]){let i=new Float32Array(s.length);for(let o=0;o<s.length;o++)i[o]=t[s[o]];q(n,e,i,1)}}function ke(n){let t=`#include <packing>
+void main() { gl_FragColor = packDepthToRGBA(gl_FragCoord.z); }`;return new De({vertexShader:Ce,fragmentShader:t,side:2,uniforms:{...n,screen:{value:new Re(2048,2048)}}})}function Et(n){return new De({vertexShader:Ce,fragmentShader:Ri,side:2,uniforms:{...n,screen:{value:new Re(1,1)},shade:{value:1}}})}function X(n){let t=n.attributes.radius,e=n.rest.length/3;if(t?.array.length===e)return Float32Array.from(t.array,Number);let{branches:{first:s,count:i,attach:o},channel:{info:r,vertexPlaces:a}}=n,h=new Float32Array(r.placeCount).fill(1);for(let u=s.length-1;u>=0;u--){for(let f=s[u]+i[u]-2;f>=s[u];f--)h[f]+=h[f+1];o[u]>=0&&(h[o[u]]+=h[s[u]])}let l=h.reduce((u,f)=>Math.max(u,f),1),c=n.sphere.radius/50;return Float32Array.from(a,u=>c*Math.sqrt(h[u]/l))}var Ii=8020552,Li=new Ni,At=class extends ki{#t;#e;#i;constructor(t,{motion:e=t.motion,color:s=Ii}={}){let i=Mt(t,X(t));super(e.attach(i),Et(e.uniforms)),this.#t=t,this.#e=e,this.#i=()=>ht(i,X(t)),t.addEventListener("arrays",this.#i),B(this,t.metadata),this.frustumCulled=!1,this.setColor(s)}setColor(t){let e=typeof t=="function"?null:new Ci(t).toArray(),{source:s,other:i}=this.geometry.userData;for(let[o,r]of[["color",s],["colorOther",i]]){let a=Float32Array.from({length:3*r.length});r.forEach((h,l)=>a.set(e??t(h),3*l)),q(this.geometry,o,a,3)}return this}onBeforeRender=t=>{let{z:e,w:s}=t.getCurrentViewport(Li);this.material.uniforms.screen.value.set(e,s),this.material.uniformsNeedUpdate=!0};dispose(){this.#t.removeEventListener("arrays",this.#i),this.#e.detach(this.geometry),this.geometry.dispose(),this.material.dispose(),this.removeFromParent()}};import{DynamicDrawUsage as Ui,Frustum as zi,Group as Fi,InstancedBufferAttribute as Bi,InstancedBufferGeometry as Ne,LineBasicMaterial as ji,LineSegments as Hi,Matrix4 as Ie,Mesh as Wi,MeshStandardMaterial as Vi,Sphere as Gi,Vector3 as $i,BufferAttribute as qi,DoubleSide as Yi}from"./three.webgpu.js";var Ki=4<<20,Xi=4096,Le=1.5,Ue=2,Zi=.85,Ji=-1,Qi=n=>n?new ji({color:7035717}):new Vi({color:9083499,roughness:.8,side:Yi}),to=()=>new Promise(n=>{setTimeout(n)}),Ot=class extends Fi{levelOfDetail=!0;pixels=1;measure="p99";fade=.2;fading=!1;counts=[];vertices=0;culled=0;#t;#e=new Map;#i=[];#r=new Set;#o=new Map;#s=new Map;#a=new Float32Array(0);#c=new Float32Array(0);#h=[];#n;#f;#u;#p=0;constructor(t,{geometry:e=t.geometry??t.lines,material:s=Qi,depthMaterial:i=null}={}){super(),this.#t=t,this.#u=e,this.#n=s,this.#f=i,this.name="ath forest",B(this,t.metadata)}get count(){return this.#a.length/4}get baked(){return this.#o.get(this.#t.motion.clip.index)??[]}setInstances(t){let{motion:e}=this.#t;for(let{clip:i}of t)i!==void 0&&!this.#s.has(i)&&this.#s.set(i,e.clone().play(i).setLevel(e.levelCount-1));let s=i=>this.#s.get(i)?.clip.index??Ji;this.#a=Float32Array.from(t.flatMap(({x:i,y:o,z:r,size:a})=>[i,o,r,a])),this.#c=Float32Array.from(t.flatMap(({angle:i,seconds:o,clip:r})=>[Math.cos(i),Math.sin(i),o,s(r)])),this.#h=[];for(let i of this.#l())this.#v(i)}#l(){return[...this.#e.values()].flat().flatMap(t=>[t,...t.fades.values()])}bakeReady(){for(let t of[this.#t.motion,...this.#s.values()])for(let e=0;e<=t.readyLevel;e++)this.#d(e,t.clip)}bake(t){return this.#d(t,this.#t.motion.clip)}async#d(t,e){let s=`${e.index}/${t}`;if(this.#r.has(s))return;this.#r.add(s);let{channel:i,metadata:o}=this.#t,r=await i.parts(t),a=Math.max(1,Math.ceil(e.frameCount*r.texels/Math.min(Ki,1024*Xi))),h=await i.bake(e.index,t,a);if(!h.data||h.texels!==r.texels||!this.#t){this.#r.delete(s);return}let l=tt(),{nodeCount:c,exactCount:u}=r.parts;l.athData.value=nt(h.data),l.athForest.value.set(h.texels,o.up_axis==="z"?1:0),l.athStride.value=u>0?(r.texels-3*c)/u:1,await this.#m(t,e,r,{uniforms:l,rows:h.rows,perRow:$(e)/h.rows||1}),this.#o.set(e.index,[...this.#o.get(e.index)??[],t]),this.dispatchEvent({type:"level",level:t})}async#m(t,e,s,i){let{channel:o,motion:r,rest:a,sphere:h}=this.#t,l=t===r.levelCount-1,c=v=>e.errors[v][this.measure],u=c(t),f=t>0?c(t-1):h.radius/4,d=o.nodeNumbers(s),p=s.vertices;d.forEach((v,g)=>{p[g]<0&&(d[g]=-1)});let m=L(this.#n(!this.#u.hasAttribute("normal"),t),i.uniforms,!0),b=(v,g)=>this.#b(e,v,m,{...i,texel:p,level:t,tolerance:g}),_=l?this.#u:Q(this.#u,a,Le*u,d);b(_,u);for(let v=Math.max(Ue*u,h.radius/2e3);v<f;v*=Ue){if(await to(),!this.#t)return;let g=Q(this.#u,a,Le*v,d);g.userData.source.length>Zi*_.userData.source.length||(b(g,v),_=g)}}#b(t,e,s,i){let o=this.#w(t.index,e,s,{...i,base:e,fades:new Map});this.#e.set(t.index,[...this.#e.get(t.index)??[],o].sort((r,a)=>r.tolerance-a.tolerance))}#w(t,e,s,i){let o=new Ne,{source:r}=e.userData,a=!e.hasAttribute("normal"),h=({texel:u})=>new qi(Y(new Float32Array(r.length),u,r,1),1);o.setIndex(e.index);for(let[u,f]of Object.entries(e.attributes))u!=="athPart"&&o.setAttribute(u,f);o.setAttribute("athPart",h(i)),i.from&&o.setAttribute("athPartBefore",h(i.from));let l=a?new Hi(o,s):new Wi(o,s);Object.assign(l,bt(i.uniforms,!0),{castShadow:this.castShadow,receiveShadow:this.receiveShadow}),this.#f&&(l.customDepthMaterial=L(this.#f(),i.uniforms,!0)),Object.assign(l.userData,{level:i.level,clip:t}),l.frustumCulled=!1;let c={...i,drawn:l,size:r.length,filled:0};return this.#v(c),this.add(l),c}#M(t,e,s){if(!e.fades.has(s.level)){let{athData:i,athForest:o,athStride:r}=s.uniforms,a=!e.base.hasAttribute("normal"),h={...e.uniforms,athDataBefore:i,athBefore:{value:o.value.clone().setY(r.value)}},l=L(this.#n(a,e.level),h,!0);e.fades.set(s.level,this.#w(t,e.base,l,{...e,uniforms:h,from:s,fades:new Map}))}return e.fades.get(s.level)}#v(t){let e=t.drawn.geometry,s=new Ne;s.setIndex(e.index);for(let[i,o]of Object.entries(e.attributes))s.setAttribute(i,o);for(let[i,o]of[["place","athPlace"],["turn","athTurn"],...t.from?[["share","athFading"]]:[]])t[i]=new Bi(new Float32Array(Math.max(4,this.#a.length)),4),s.setAttribute(o,t[i].setUsage(Ui));s.instanceCount=0,t.drawn.geometry=s,e.dispose()}update(t,e,s){let i=this.#l(),o=new Gi,r=new zi,a=o.center,h=this.#T();this.updateWorldMatrix(!0,!1);let l=new $i().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new Ie().copy(this.matrixWorld).invert());r.setFromProjectionMatrix(new Ie().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld));let c=2*Math.tan(t.fov*Math.PI/360)/e;this.#p=performance.now(),this.culled=0,this.fading=!1;for(let u of i)u.filled=0;this.#i=this.#e.get(this.#t.motion.clip.index)??this.#i;for(let u=0;u<this.#a.length&&i.length>0;u+=4){let f=this.#a[u+3];if(a.fromArray(this.#a,u),o.radius=h*f,!r.intersectsSphere(o)){this.culled++,this.#h[u/4]=null;continue}let d=Math.max(l.distanceTo(a)-.5*h*f,1e-6),p=this.#e.get(this.#c[u+3])??this.#i,m=this.pixels*c*d/f;p.length>0&&this.#y(u,p,this.levelOfDetail?m:0,s)}this.counts=new Array(this.#t.motion.levelCount).fill(0),this.vertices=0;for(let u of this.#l())this.#P(u)}#y(t,e,s,i){let o=e[this.#A(e,s)],{clip:r}=o.drawn.userData,a=this.#g(t/4,r,o.level),h=a.level===o.level?o:this.#x(e,a.level,s),l=a.from<0?null:e.find(({level:c})=>c===a.from);if(!l){this.#_(t,h,i);return}this.fading=!0,this.#_(t,this.#M(r,h,l),i,1-_t(this.#E(a)))}#x(t,e,s){let i=t.filter(o=>o.level===e);return i[this.#A(i,s)]}#g(t,e,s){let i=this.#h[t];return(!i||i.clip!==e)&&(i=this.#h[t]={clip:e,level:s,from:-1,since:0}),i.from>=0&&this.#E(i)>=1&&(i.from=-1),i.from<0&&i.level!==s&&Object.assign(i,{level:s,from:this.fade>0?i.level:-1,since:this.#p}),i}#E({since:t}){return(this.#p-t)/1e3/this.fade}#_(t,e,s,i=0){let{place:o,turn:r}=e,a=4*e.filled++;for(let h=0;h<4;h++)o.array[a+h]=this.#a[t+h];r.array[a]=this.#c[t],r.array[a+1]=this.#c[t+1],this.#O(r.array,a+2,e,s+this.#c[t+2]),e.from&&(this.#O(e.share.array,a,e.from,s+this.#c[t+2]),e.share.array[a+2]=i)}#O(t,e,{rows:s,perRow:i},o){let r=Math.fround(o/i%s),a=r<0?r+s:r;t[e]=a<s?a:0,t[e+1]=(Math.floor(t[e])+1)%s}#T(){let{center:t,radius:e}=this.#t.sphere;return t.length()+1.2*e}#A(t,e){let s=0;for(;s+1<t.length&&t[s+1].tolerance<=e;)s++;return s}#P(t){let{filled:e,drawn:s}=t;s.geometry.instanceCount=e,s.visible=e>0,this.counts[t.level]+=e,this.vertices+=e*t.size;for(let i of[t.place,t.turn,t.share].filter(Boolean))i.clearUpdateRanges(),i.addUpdateRange(0,4*e),i.needsUpdate=e>0}dispose(){for(let t of this.#s.values())t.dispose();for(let{uniforms:t,drawn:e}of this.#l()){t.athData.value.dispose(),e.geometry.dispose();for(let s of[e.material,e.customDepthMaterial,e.customDistanceMaterial])s.dispose()}this.#e.clear(),this.#t=null}};import{Box3 as bo,BufferAttribute as Ye,DoubleSide as vo,Group as xo,IndirectStorageBufferAttribute as _o,LineBasicNodeMaterial as So,LineSegments as Mo,Mesh as Eo,MeshStandardNodeMaterial as Ao,Frustum as Oo,Matrix4 as Ke,StorageBufferAttribute as To,TSL as Ct,Vector3 as ie,WebGPUCoordinateSystem as Po}from"./three.webgpu.js";var ze=`// The blocks of a level and of a segment, as core/include/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
+
+@group(0) @binding(0) var<storage, read> level: array<u32>;
+@group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
+
+// A place is a blend of its sources. A dispatch computes several, one for each y of its workgroups.
+struct Place {
+    sources: u32, // word of \`places\` that they begin at
+    source_count: u32,
+    positions: u32, // number before those of this place; so are the others
+    matrices: u32,
+    modes: u32,
+    bodies: u32,
+    strength: f32, // Factor of the motion.
+}
+// A frame that a place shows, alone or blended with others.
+struct Source {
+    segment: u32, // word that the block of its segment begins at
+    frame: u32,
+    amplitudes: u32, // number before its own
+    weight: f32,     // The weights of a place add up to 1.
+}
+@group(0) @binding(2) var<storage, read> places: array<u32>; // all of a dispatch, then all their sources
+var<private> run: Place;
+var<private> source: Source;
+const PLACE_WORDS = 8u;
+const SOURCE_WORDS = 4u;
+
+// Words of the header of a level.
+const VERTEX_COUNT = 2u;
+const BODY_COUNT = 3u;
+const POSITION_COUNT = 4u;
+const MATRIX_COUNT = 5u;
+const VERTICES = 7u;
+const BODIES = 8u;
+const ORDER = 9u;
+const DEPTHS = 10u;
+const BASES = 11u;
+
+// Words of the header of a segment.
+const FRAMES = 3u;
+const JOIN_FRAMES = 4u;
+const ROW_COUNT = 5u;
+const CORRECTED_COUNT = 6u;
+const CORRECTION_PART = 7u;
+const MOVES = 8u;
+const ROWS = 9u;
+const VALUES = 10u;
+const SHAPES = 11u;
+const TURNS = 12u;
+const JOIN_CURVE = 13u;
+const JOIN_STEPS = 14u;
+const JOINS = 15u;
+const MATRIX_JOINS = 16u;
+const CORRECTED = 17u;
+const CORRECTIONS = 18u;
+const BAKED = 19u;
+const WAVE_SETS = 20u;
+
+// Flags of bodies.
+const NODE = 1u;
+const FOLLOWS = 2u;
+const FITTED = 4u;
+
+// Words of records.
+const BODY_WORDS = 16u;
+const ROW_WORDS = 3u;
+const MOVE_WORDS = 4u;
+const VERTEX_WORDS = 4u;
+
+struct Body {
+    flags: u32,
+    parent: i32,
+    attach: i32,
+    way: u32,
+    modes: u32,
+    first: u32,
+    count: u32,
+    vertex: u32,
+    basis: u32,
+    shape_modes: u32,
+    rest_point: vec3<f32>,
+    tangent: vec3<f32>,
+}
+
+struct Row {
+    values: u32,
+    count: u32,
+    slot: u32,
+    waves: u32,
+    step: f32,
+}
+
+struct Move {
+    row: u32,
+    rows: u32,
+    shape_count: u32,
+    shapes: u32,
+    turn: u32,
+}
+
+fn place_at(y: u32) -> Place {
+    let at = PLACE_WORDS * y;
+    return Place(places[at], places[at + 1u], places[at + 2u], places[at + 3u], places[at + 4u], places[at + 5u],
+        bitcast<f32>(places[at + 6u]));
+}
+
+// The place that this invocation computes. Functions of segments read the source that is set.
+fn source_at(s: u32) -> Source {
+    let at = run.sources + SOURCE_WORDS * s;
+    return Source(places[at], places[at + 1u], places[at + 2u], bitcast<f32>(places[at + 3u]));
+}
+
+fn segment(at: u32) -> u32 {
+    return segments[source.segment + at];
+}
+
+fn level_float(at: u32) -> f32 {
+    return bitcast<f32>(level[at]);
+}
+
+fn segment_float(at: u32) -> f32 {
+    return bitcast<f32>(segment(at));
+}
+
+fn level_vector(at: u32) -> vec3<f32> {
+    return vec3<f32>(level_float(at), level_float(at + 1u), level_float(at + 2u));
+}
+
+fn body_at(b: u32) -> Body {
+    let at = level[BODIES] + BODY_WORDS * b;
+    return Body(
+        level[at],
+        bitcast<i32>(level[at + 1u]),
+        bitcast<i32>(level[at + 2u]),
+        level[at + 3u],
+        level[at + 4u],
+        level[at + 5u],
+        level[at + 6u],
+        level[at + 7u],
+        level[at + 8u],
+        level[at + 9u],
+        level_vector(at + 10u),
+        level_vector(at + 13u),
+    );
+}
+
+fn move_at(b: u32) -> Move {
+    let at = segment(MOVES) + MOVE_WORDS * b;
+    let counts = segment(at + 1u);
+    return Move(segment(at), counts & 0xffffu, counts >> 16u, segment(at + 2u), segment(at + 3u));
+}
+
+fn row_at(r: u32) -> Row {
+    let at = segment(ROWS) + ROW_WORDS * r;
+    let packed = segment(at + 1u);
+    return Row(segment(at), packed & 0xffffu, (packed >> 16u) & 0xffu, packed >> 24u, segment_float(at + 2u));
+}
+
+fn rest_of(vertex: u32) -> vec3<f32> {
+    return level_vector(level[VERTICES] + VERTEX_WORDS * vertex);
+}
+
+// One of two 16-bit integers of a word.
+fn half(word: u32, index: u32) -> i32 {
+    return bitcast<i32>(word << (16u - 16u * index)) >> 16u;
+}
+`;var Fe=`// Chooses what instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
+// hides. One invocation per instance.
+
+struct Instance {
+    place: vec4<f32>, // x, y, z, size
+    turn: vec4<f32>,  // cosine and sine of its angle, the plant that it shows, tint
+}
+
+struct View {
+    planes: array<vec4<f32>, 6>, // The planes of the view: normal, distance.
+    eye: vec3<f32>,
+    pixel: f32, // the error that is allowed at distance 1
+    count: u32,
+    shapes: u32,
+    reach: f32, // how far from its place an instance of size 1 can be seen
+    room: u32,  // Instances that a list has room for.
+}
+
+struct Shape {
+    tolerance: f32,
+    list: u32,
+}
+
+@group(0) @binding(0) var<storage, read> instances: array<Instance>;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var<storage, read> shapes: array<Shape>; // the finest first
+@group(0) @binding(3) var<storage, read_write> draws: array<atomic<u32>>; // five numbers of each list: of an indexed indirect draw
+@group(0) @binding(4) var<storage, read_write> lists: array<u32>;
+
+fn is_seen(centre: vec3<f32>, radius: f32) -> bool {
+    for (var k = 0u; k < 6u; k++) {
+        if (dot(view.planes[k].xyz, centre) + view.planes[k].w < -radius) {
+            return false;
+        }
+    }
+    return true;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if (id.x >= view.count || view.shapes == 0u) {
+        return;
+    }
+    let place = instances[id.x].place;
+    let radius = view.reach * place.w;
+    if (!is_seen(place.xyz, radius)) {
+        return;
+    }
+    let hidden = view.pixel * max(distance(view.eye, place.xyz) - 0.5 * radius, 1e-6) / place.w;
+    var chosen = 0u;
+    while (chosen + 1u < view.shapes && shapes[chosen + 1u].tolerance <= hidden) {
+        chosen++;
+    }
+    let list = shapes[chosen].list;
+    lists[list * view.room + atomicAdd(&draws[5u * list + 1u], 1u)] = id.x;
+}
+`;var Be=`// The end of pass 2, when all depths have been placed: joins, matrices, corrections, and motion that is baked.
+
+@group(0) @binding(3) var<storage, read_write> positions: array<f32>;
+@group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(5) var<uniform> which: u32; // The source of each place whose corrections are added.
+
+const FOOTPRINTS = array<array<f32, 4>, 3>(
+    array<f32, 4>(32.0, 0.0, 0.0, 0.0), array<f32, 4>(32.0, 16.0, 0.0, 0.0), array<f32, 4>(32.0, 27.0, 16.0, 5.0),
+);
+
+fn is_joined() -> bool {
+    return source.frame < segment(JOIN_FRAMES);
+}
+
+// The shares of jumps and of slopes that remain at the frame.
+fn curve() -> vec2<f32> {
+    let at = segment(JOIN_CURVE) + 2u * source.frame;
+    return run.strength * source.weight * vec2<f32>(segment_float(at), segment_float(at + 1u));
+}
+
+fn join_position(b: u32, index: u32) {
+    let steps = segment(JOIN_STEPS) + 2u * b;
+    let step = curve() * vec2<f32>(segment_float(steps), segment_float(steps + 1u));
+    for (var axis = 0u; axis < 3u; axis++) {
+        let word = segment(segment(JOINS) + 3u * index + axis);
+        positions[run.positions + 3u * index + axis] += f32(half(word, 0u)) * step.x + f32(half(word, 1u)) * step.y;
+    }
+}
+
+// Numbers of R, row by row, then of c, as a matrix has them: R and c side by side.
+fn join_matrix(index: u32) {
+    for (var k = 0u; k < 12u; k++) {
+        let at = segment(MATRIX_JOINS) + 2u * (12u * index + k);
+        let place = select(4u * (k - 9u) + 3u, 4u * (k / 3u) + k % 3u, k < 9u);
+        matrices[run.matrices + 12u * index + place] += segment_float(at) * curve().x + segment_float(at + 1u) * curve().y;
+    }
+}
+
+// From c + R (x0 - a) to R x0 and a sum.
+fn finish_matrix(index: u32, a: vec3<f32>) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        let at = run.matrices + 12u * index + 4u * axis;
+        matrices[at + 3u] -= dot(vec3<f32>(matrices[at], matrices[at + 1u], matrices[at + 2u]), a);
+    }
+}
+
+// One workgroup per body.
+@compute @workgroup_size(64)
+fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+          @builtin(local_invocation_index) i: u32) {
+    run = place_at(group.y);
+    let b = group.x + groups.x * group.z;
+    if (b >= level[BODY_COUNT]) {
+        return;
+    }
+    let body = body_at(b);
+    let is_node = (body.flags & NODE) != 0u;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (is_joined() && !is_node && i < body.count) {
+            join_position(b, body.first + i);
+        } else if (is_joined() && is_node && i == 0u) {
+            join_matrix(body.first);
+        }
+    }
+    if (is_node && i == 0u) {
+        finish_matrix(body.first, body.rest_point);
+    }
+}
+
+// One invocation per corrected position of a source.
+@compute @workgroup_size(64)
+fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    if (which >= run.source_count) {
+        return;
+    }
+    source = source_at(which);
+    if (i >= segment(CORRECTED_COUNT)) {
+        return;
+    }
+    let own = segment(CORRECTED) + 2u * i;
+    var sum = vec3<f32>(0.0);
+    for (var c = segment(own + 1u); c < segment(own + 3u); c++) {
+        let at = segment(CORRECTIONS) + 2u * c;
+        let low = segment(at);
+        let high = segment(at + 1u);
+        let away = abs(i32(source.frame) - i32((high >> 16u) & 0xffu));
+        if (away < 4) {
+            let width = high >> 24u;
+            let part = FOOTPRINTS[width & 15u][away] * exp2(f32(width >> 4u));
+            sum += part * vec3<f32>(f32(half(low, 0u)), f32(half(low, 1u)), f32(half(high, 0u)));
+        }
+    }
+    for (var axis = 0u; axis < 3u; axis++) {
+        positions[run.positions + 3u * segment(own) + axis] +=
+            sum[axis] * run.strength * source.weight * segment_float(CORRECTION_PART);
+    }
+}
+
+// One invocation per number of a position, in place of all passes before.
+@compute @workgroup_size(64)
+fn baked(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    let count = 3u * level[POSITION_COUNT];
+    if (i >= count) {
+        return;
+    }
+    var sum = 0.0;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        sum += source.weight * segment_float(segment(BAKED) + source.frame * count + i);
+    }
+    positions[run.positions + i] = sum;
+}
+`;var je=`// Pass 2: bodies of one depth, each placed from the one that it hangs on; amplitudes of all sources of a place add up. One
+// workgroup per body, one invocation per position.
+
+@group(0) @binding(8) var<uniform> depth: u32; // Depth of the bodies that this pass places.
+@group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
+@group(0) @binding(4) var<storage, read_write> positions: array<f32>;
+@group(0) @binding(5) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(6) var<storage, read_write> parent_modes: array<f32>; // The modes of a body begin at its first position.
+@group(0) @binding(7) var<storage, read_write> frames: array<f32>; // For each body: rotation, point.
+
+const SHIFT = 64u;
+const ROTATION = 65u;
+const POLAR_ITERATIONS = 4;
+const IDENTITY = mat3x3<f32>(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+
+var<workgroup> modes: array<vec3<f32>, 64>;
+var<workgroup> placed: array<vec3<f32>, 64>; // before: what modes of the parent add to its tangent
+
+struct Frame {
+    point: vec3<f32>,
+    rotation: mat3x3<f32>,
+}
+
+fn amplitude(row: u32) -> vec3<f32> {
+    let at = source.amplitudes + 3u * row;
+    return vec3<f32>(amplitudes[at], amplitudes[at + 1u], amplitudes[at + 2u]);
+}
+
+fn position_at(index: u32) -> vec3<f32> {
+    let at = run.positions + 3u * index;
+    return vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
+}
+
+// Returns what mode m of its parent adds to the tangent that a body follows.
+fn way_by_mode(body: Body, m: u32) -> vec3<f32> {
+    let parent = level[BODIES] + BODY_WORDS * u32(max(body.parent, 0));
+    if ((body.flags & FOLLOWS) == 0u || m >= level[parent + 4u]) {
+        return vec3<f32>(0.0);
+    }
+    let at = run.modes + 3u * (level[parent + 5u] + m);
+    let mode = vec3<f32>(parent_modes[at], parent_modes[at + 1u], parent_modes[at + 2u]);
+    return level_float(level[BASES] + body.way + m) * mode;
+}
+
+// The rotation of the quaternion normalize(1, q) squared.
+fn squared(q: vec3<f32>) -> mat3x3<f32> {
+    let n2 = dot(q, q);
+    let scale = 1.0 / (1.0 + n2);
+    let w = (1.0 - n2) * scale;
+    let v = 2.0 * q * scale;
+    let x = v.x;
+    let y = v.y;
+    let z = v.z;
+    return mat3x3<f32>( // columns
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+        2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+        2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y),
+    );
+}
+
+fn unit(v: vec3<f32>) -> vec3<f32> {
+    let n2 = dot(v, v);
+    return select(v, v / sqrt(n2), n2 > 1e-30);
+}
+
+// The rotation by the least angle from u to v, which have length 1; beyond a right angle by less and less.
+fn between(u: vec3<f32>, v: vec3<f32>) -> mat3x3<f32> {
+    let axis = cross(u, v);
+    let w = 1.0 + max(dot(u, v), 0.0);
+    let sine2 = dot(axis, axis);
+    let h = 2.0 / (w * w + sine2);
+    let g = w * h * axis;
+    let c = 1.0 - h * sine2;
+    return mat3x3<f32>(
+        h * axis * axis.x + vec3<f32>(c, g.z, -g.y),
+        h * axis * axis.y + vec3<f32>(-g.z, c, g.x),
+        h * axis * axis.z + vec3<f32>(g.y, -g.x, c),
+    );
+}
+
+fn hung(body: Body) -> Frame {
+    if (body.parent < 0) {
+        return Frame(body.rest_point, IDENTITY);
+    }
+    let at = run.bodies + 12u * u32(body.parent);
+    var rotation = mat3x3<f32>(
+        frames[at], frames[at + 1u], frames[at + 2u],
+        frames[at + 3u], frames[at + 4u], frames[at + 5u],
+        frames[at + 6u], frames[at + 7u], frames[at + 8u],
+    );
+    if ((body.flags & FOLLOWS) != 0u) {
+        var way = vec3<f32>(0.0);
+        for (var m = 0u; m < 64u; m++) {
+            way += placed[m];
+        }
+        rotation = rotation * between(unit(body.tangent), unit(body.tangent + way));
+    }
+    return Frame(position_at(u32(body.attach)), rotation);
+}
+
+// Returns the rotation that a row stands for.
+fn turn_of(own: Move, row: u32) -> vec3<f32> {
+    let at = segment(TURNS) + own.turn;
+    let q = amplitude(row);
+    var omega = vec3<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let turn = vec3<f32>(segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u));
+        omega[k] = dot(turn, q);
+    }
+    return omega;
+}
+
+// The rows of a shift and of a rotation, where there are any, are the first of a body.
+fn turned(b: u32, body: Body) -> Frame {
+    var frame = hung(body);
+    var omega = vec3<f32>(0.0);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        let own = move_at(b);
+        for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
+            let slot = row_at(r).slot;
+            if (slot == SHIFT) {
+                frame.point += amplitude(r);
+            } else if (slot == ROTATION) {
+                omega += turn_of(own, r);
+            }
+        }
+    }
+    frame.rotation = frame.rotation * squared(0.25 * omega);
+    return frame;
+}
+
+// Mode m of a body with shapes: what they add up to.
+fn unshaped(body: Body, own: Move, m: u32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var r = own.row; r < own.row + own.rows; r++) {
+        let slot = row_at(r).slot;
+        let tracks = amplitude(r);
+        for (var axis = 0u; axis < 3u; axis++) {
+            let shape = 3u * slot + axis;
+            if (slot < body.shape_modes && shape < own.shape_count) {
+                let at = segment(SHAPES) + own.shapes + 3u * (shape * body.shape_modes + m);
+                sum += tracks[axis] * vec3<f32>(segment_float(at), segment_float(at + 1u), segment_float(at + 2u));
+            }
+        }
+    }
+    return sum;
+}
+
+// How far modes move position i of a body, or column i of a node's map.
+fn moved_by_modes(body: Body, top: u32, i: u32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var m = 0u; m < top; m++) {
+        sum += level_float(level[BASES] + body.basis + m * body.count + i) * modes[m];
+    }
+    return sum;
+}
+
+// A step of Newton's method from R to the rotation nearest to H.
+fn turned_towards(H: mat3x3<f32>, R: mat3x3<f32>) -> mat3x3<f32> {
+    let C = H * transpose(R);
+    let axial = vec3<f32>(C[1].z - C[2].y, C[2].x - C[0].z, C[0].y - C[1].x);
+    let spare = max(1.0 - (C[0].x + C[1].y + C[2].z), 0.0) + 1e-6;
+    let a = C[1].y + C[2].z + spare; // Differences from the trace would lose precision.
+    let b = C[0].x + C[2].z + spare;
+    let c = C[0].x + C[1].y + spare;
+    let d = -0.5 * (C[1].x + C[0].y);
+    let e = -0.5 * (C[2].x + C[0].z);
+    let f = -0.5 * (C[2].y + C[1].z);
+    let x = vec3<f32>(b * c - f * f, e * f - d * c, d * f - e * b);
+    let y = vec3<f32>(e * f - d * c, a * c - e * e, d * e - a * f);
+    let z = vec3<f32>(d * f - e * b, d * e - a * f, a * b - d * d);
+    let determinant = a * x.x + d * x.y + e * x.z;
+    return squared(vec3<f32>(dot(x, axial), dot(y, axial), dot(z, axial)) * (0.25 / determinant)) * R;
+}
+
+// How a sheet has turned in its own frame: by the rotation nearest to what took its rest pose to \`placed\`.
+fn fitted(body: Body) -> mat3x3<f32> {
+    var H = mat3x3<f32>();
+    var size2 = 0.0;
+    for (var i = 0u; i < body.count; i++) {
+        let offset = rest_of(body.vertex + i) - body.rest_point;
+        size2 += dot(offset, offset);
+        H += mat3x3<f32>(placed[i] * offset.x, placed[i] * offset.y, placed[i] * offset.z);
+    }
+    H += 0.01 * size2 * IDENTITY;
+    let norm2 = dot(H[0], H[0]) + dot(H[1], H[1]) + dot(H[2], H[2]);
+    var R = IDENTITY;
+    if (norm2 > 1e-30) {
+        H = H * (1.0 / sqrt(norm2));
+        for (var step = 0; step < POLAR_ITERATIONS; step++) {
+            R = turned_towards(H, R);
+        }
+    }
+    return R;
+}
+
+fn write_column(node: u32, column: u32, v: vec3<f32>) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        matrices[run.matrices + 12u * node + 4u * axis + column] = v[axis];
+    }
+}
+
+fn write_frame(b: u32, frame: Frame) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        for (var column = 0u; column < 3u; column++) {
+            frames[run.bodies + 12u * b + 3u * column + axis] = frame.rotation[column][axis];
+        }
+        frames[run.bodies + 12u * b + 9u + axis] = frame.point[axis];
+    }
+}
+
+// Adds the modes of a body in the source that is set, and returns the least that those above are nothing of.
+fn add_modes(b: u32, body: Body, i: u32) -> u32 {
+    let own = move_at(b);
+    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
+    for (var r = i; r < own.rows; r += 64u) {
+        let slot = row_at(own.row + r).slot;
+        if (slot >= from_shapes && slot < SHIFT) {
+            modes[slot] += amplitude(own.row + r);
+        }
+    }
+    if (i < from_shapes) {
+        modes[i] += unshaped(body, own, i);
+    }
+    if (own.rows == 0u) {
+        return from_shapes;
+    }
+    let last = row_at(own.row + own.rows - 1u).slot;
+    return max(from_shapes, select(0u, last + 1u, last < SHIFT));
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) i: u32) {
+    run = place_at(group.y);
+    let at = level[level[DEPTHS] + depth] + group.x + groups.x * group.z;
+    if (at >= level[level[DEPTHS] + depth + 1u]) {
+        return;
+    }
+    let b = level[level[ORDER] + at];
+    let body = body_at(b);
+    modes[i] = vec3<f32>(0.0);
+    placed[i] = way_by_mode(body, i);
+    workgroupBarrier();
+    var top = 0u;
+    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // The count is uniform over the workgroup.
+        source = source_at(s);
+        top = max(top, add_modes(b, body, i));
+        workgroupBarrier();
+    }
+    var frame = turned(b, body);
+    workgroupBarrier();
+    let is_node = (body.flags & NODE) != 0u;
+    if (i < body.count) {
+        let by_modes = moved_by_modes(body, top, i);
+        if (is_node) {
+            write_column(body.first, i, frame.rotation * (IDENTITY[i] + by_modes));
+        } else {
+            placed[i] = rest_of(body.vertex + i) - body.rest_point + by_modes;
+            let x = frame.point + frame.rotation * placed[i];
+            for (var axis = 0u; axis < 3u; axis++) {
+                positions[run.positions + 3u * (body.first + i) + axis] = x[axis];
+                parent_modes[run.modes + 3u * (body.first + i) + axis] = modes[i][axis];
+            }
+        }
+    }
+    workgroupBarrier();
+    if (i == 0u && is_node) {
+        write_column(body.first, 3u, frame.point);
+    }
+    if (i == 0u && !is_node) {
+        if ((body.flags & FITTED) != 0u) {
+            frame.rotation = frame.rotation * fitted(body);
+        }
+        write_frame(b, frame);
+    }
+}
+`;var He=`// Pass 1: what each row is at the frame of each source. One invocation per row.
+
+@group(0) @binding(3) var<storage, read_write> amplitudes: array<f32>;
+
+const WIDE = 128u;
+
+fn value(row: Row, index: u32) -> f32 {
+    let at = segment(VALUES) + row.values;
+    if ((row.waves & WIDE) != 0u) {
+        return f32(bitcast<i32>(segment(at + index)));
+    }
+    return f32(half(segment(at + index / 2u), index % 2u));
+}
+
+fn evaluate(r: u32) {
+    let row = row_at(r);
+    let frames = segment(FRAMES);
+    let waves = segment(WAVE_SETS + (row.waves & 127u)) + source.frame;
+    var sum = vec3<f32>(0.0);
+    for (var k = 0u; k < row.count; k++) {
+        let integers = vec3<f32>(value(row, k), value(row, row.count + k), value(row, 2u * row.count + k));
+        sum += integers * segment_float(waves + k * frames);
+    }
+    for (var axis = 0u; axis < 3u; axis++) {
+        amplitudes[source.amplitudes + 3u * r + axis] = run.strength * source.weight * row.step * sum[axis];
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (i < segment(ROW_COUNT)) {
+            evaluate(i);
+        }
+    }
+}
+`;var We=`// Pass 3: vertices at a time, between two frames that the passes before have placed. \`vertex_at\` is what a vertex stage calls;
+// here it writes all of them, for tests and for engines that compute once what several views draw. One invocation per vertex.
+
+struct Run {
+    positions: vec4<u32>, // numbers before those of the two frames now, and of the two that the time drawn before lies between
+    matrices: vec4<u32>,
+    weights: vec2<f32>, // Weights of the second of each pair.
+    with_normals: u32,
+    vertices: u32, // number before those that are written
+}
+
+struct Vertex {
+    position: vec3<f32>,
+    normal: vec3<f32>,
+    previous: vec3<f32>,
+}
+
+@group(0) @binding(1) var<storage, read> corners: array<u32>; // see \`normal_at\`
+@group(0) @binding(2) var<storage, read> shows: array<Run>; // one for each y of the workgroups
+var<private> run: Run;
+@group(0) @binding(3) var<storage, read> positions: array<f32>;
+@group(0) @binding(4) var<storage, read> matrices: array<f32>;
+@group(0) @binding(5) var<storage, read_write> vertices: array<f32>; // position, normal, previous position of each
+
+const MOVED = 0x80000000u;
+const VERTEX_COUNT = 2u;
+const VERTICES = 7u;
+
+@group(0) @binding(0) var<storage, read> level: array<u32>;
+
+fn mixed_position(index: u32, now: u32) -> vec3<f32> {
+    let a = run.positions[2u * now] + 3u * index;
+    let b = run.positions[2u * now + 1u] + 3u * index;
+    return mix(
+        vec3<f32>(positions[a], positions[a + 1u], positions[a + 2u]),
+        vec3<f32>(positions[b], positions[b + 1u], positions[b + 2u]),
+        run.weights[now],
+    );
+}
+
+// The row of a matrix at the time.
+fn mixed_row(index: u32, row: u32, now: u32) -> vec4<f32> {
+    let a = run.matrices[2u * now] + 12u * index + 4u * row;
+    let b = run.matrices[2u * now + 1u] + 12u * index + 4u * row;
+    return mix(
+        vec4<f32>(matrices[a], matrices[a + 1u], matrices[a + 2u], matrices[a + 3u]),
+        vec4<f32>(matrices[b], matrices[b + 1u], matrices[b + 2u], matrices[b + 3u]),
+        run.weights[now],
+    );
+}
+
+// now: 0; 1: at the time drawn before.
+fn position_at(v: u32, now: u32) -> vec3<f32> {
+    let at = level[VERTICES] + 4u * v;
+    let binding = level[at + 3u];
+    let index = binding & ~MOVED;
+    if ((binding & MOVED) == 0u) {
+        return mixed_position(index, now);
+    }
+    let rest = vec4<f32>(bitcast<f32>(level[at]), bitcast<f32>(level[at + 1u]), bitcast<f32>(level[at + 2u]), 1.0);
+    return vec3<f32>(
+        dot(mixed_row(index, 0u, now), rest), dot(mixed_row(index, 1u, now), rest), dot(mixed_row(index, 2u, now), rest),
+    );
+}
+
+// The mean normal of the triangles at a vertex, by their area. corners: where those of each vertex begin, and one behind the last;
+// then of each triangle at a vertex its two other corners.
+fn normal_at(v: u32, x: vec3<f32>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var c = corners[v]; c < corners[v + 1u]; c += 2u) {
+        sum += cross(position_at(corners[c], 0u) - x, position_at(corners[c + 1u], 0u) - x);
+    }
+    let n2 = dot(sum, sum);
+    return select(vec3<f32>(0.0), sum / sqrt(n2), n2 > 0.0);
+}
+
+fn vertex_at(v: u32) -> Vertex {
+    let x = position_at(v, 0u);
+    var normal = vec3<f32>(0.0);
+    if (run.with_normals != 0u) {
+        normal = normal_at(v, x);
+    }
+    return Vertex(x, normal, position_at(v, 1u));
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = shows[id.y];
+    if (i >= level[VERTEX_COUNT]) {
+        return;
+    }
+    let vertex = vertex_at(i);
+    for (var axis = 0u; axis < 3u; axis++) {
+        vertices[run.vertices + 9u * i + axis] = vertex.position[axis];
+        vertices[run.vertices + 9u * i + 3u + axis] = vertex.normal[axis];
+        vertices[run.vertices + 9u * i + 6u + axis] = vertex.previous[axis];
+    }
+}
+`;var[Ve,Ge,ao,ho,lo,co]=[2,3,4,5,6,10],[uo,fo,po]=[5,6,19],mo=64,lt=8,ee=4,se=12,go=9,Tt=n=>Math.ceil(n/mo),Pt=class{constructor(t,{blocks:e,time:s,hierarchy:i,finish:o,vertices:r}){let a=(...c)=>t.createShaderModule({code:c.join(`
+`)}),h=(c,u="main")=>t.createComputePipeline({layout:"auto",compute:{module:c,entryPoint:u}}),l=a(e,o);this.time=h(a(e,s)),this.hierarchy=h(a(e,i)),this.bodies=h(l,"bodies"),this.corrections=h(l,"corrections"),this.baked=h(l,"baked"),this.vertices=h(a(r))}},Dt=class{uploaded=0;#t=new Map;#e=0;#i=0;#r=0;constructor(t,e,s,{slots:i=2,shown:o=1,vertices:r=null,across:a=t.limits.maxComputeWorkgroupsPerDimension}={}){Object.assign(this,{device:t,kernels:e,words:s,slots:i,shown:o,across:a}),this.size={positions:3*s[ao],matrices:12*s[ho],bodies:12*s[Ge],vertices:go*s[Ve]},this.baked=!1;let{positions:h,matrices:l,bodies:c}=this.size;this.buffers={level:this.#s(s),segments:this.#o(1),places:this.#o((lt+ee)*i),shows:this.#o(se*o),amplitudes:this.#o(1),positions:this.#o(i*h),matrices:this.#o(i*l),modes:this.#o(i*h),bodies:this.#o(i*c),corners:this.#o(1),vertices:r??this.#o(o*this.size.vertices)},this.ownsVertices=!r,this.depths=Array.from({length:s[lo]},(u,f)=>{let[d,p]=s.subarray(s[co]+f);return{count:p-d,uniform:this.#a(f)}}),this.ordinals=[],this.hasCorners=!1}get bytes(){return Object.values(this.buffers).reduce((t,{size:e})=>t+e,0)}#o(t,e=140){return this.device.createBuffer({size:Math.max(16,4*t),usage:e})}#s(t,e=140){let s=this.#o(t.length,e);return this.#c(s,t),s}#a(t){return this.#s(new Uint32Array([t,0,0,0]),72)}#c(t,e,s=0,i=e.length){this.uploaded+=4*i,this.device.queue.writeBuffer(t,4*s,e.buffer,e.byteOffset,4*i)}#h(t,e,s=0){let i=this.buffers[t],{device:o}=this;if(4*e<=i.size)return;let r=this.#o(e);if(s>0){let a=o.createCommandEncoder();a.copyBufferToBuffer(i,0,r,0,4*s),o.queue.submit([a.finish()])}i.destroy(),this.buffers[t]=r,this.#t.clear()}segment(t){let e=this.#r;return e+t.length>this.buffers.segments.size/4&&this.#h("segments",2*(e+t.length),e),this.#c(this.buffers.segments,t,e),this.#r+=t.length,this.#e=Math.max(this.#e,t[uo]),this.#i=Math.max(this.#i,t[fo]),this.baked||=t[po]!==0,e}setCorners(t){this.buffers.corners.destroy(),this.buffers.corners=this.#s(t),this.hasCorners=!0,this.#t.clear()}#n(t,e,[s,i],o,r=null){if(s===0||i===0)return;let a=r??e;if(!this.#t.has(a)){let l=o.flatMap((u,f)=>u?[{binding:f,resource:{buffer:this.buffers[u]}}]:[]);r&&l.push({binding:o.length,resource:{buffer:r}});let c=this.kernels[e].getBindGroupLayout(0);this.#t.set(a,this.device.createBindGroup({layout:c,entries:l}))}t.setPipeline(this.kernels[e]),t.setBindGroup(0,this.#t.get(a));let h=Math.min(s,this.across);t.dispatchWorkgroups(h,i,Math.ceil(s/h))}run(t,e){let s=this.device.createCommandEncoder(),i=s.beginComputePass();t.length>0&&this.#f(i,t),e.length>0&&this.#p(i,e),i.end(),this.device.queue.submit([s.finish()])}#f(t,e){let{positions:s,bodies:i}=this.size,o=e.length;if(this.#u(e),this.baked){this.#n(t,"baked",[Tt(s),o],["level","segments","places","positions"]);return}this.#n(t,"time",[Tt(this.#e),o],[null,"segments","places","amplitudes"]);let r=["amplitudes","positions","matrices","modes","bodies"];for(let h of this.depths)this.#n(t,"hierarchy",[h.count,o],["level","segments","places",...r],h.uniform);this.#n(t,"bodies",[this.words[Ge],o],["level","segments","places","positions","matrices"]);let a=Math.max(...e.map(({sources:h})=>h.length));for(;this.ordinals.length<a;)this.ordinals.push(this.#a(this.ordinals.length));for(let h of this.ordinals.slice(0,a))this.#n(t,"corrections",[Tt(this.#i),o],[null,"segments","places","positions",null],h)}#u(t){let{positions:e,matrices:s,bodies:i}=this.size,o=t.reduce((c,{sources:u})=>c+u.length,0),r=new Uint32Array(lt*t.length+ee*o),a=new Float32Array(r.buffer),h=lt*t.length,l=0;t.forEach(({sources:c,slot:u,strength:f=1},d)=>{r.set([h,c.length,u*e,u*s,d*e,d*i],lt*d),a[lt*d+6]=f;for(let{segment:p,frame:m,weight:b=1}of c)r.set([p,m,3*this.#e*l++],h),a[h+3]=b,h+=ee}),this.#h("places",r.length),this.#h("amplitudes",3*this.#e*o),this.#c(this.buffers.places,r)}#p(t,e){let{positions:s,matrices:i,vertices:o}=this.size,r=new Uint32Array(se*e.length),a=new Float32Array(r.buffer);e.forEach(({slots:h,weight:l,previous:c=h,previousWeight:u=l,at:f=null},d)=>{let p=se*d;[...h,...c].forEach((m,b)=>{r[p+b]=m*s,r[p+4+b]=m*i}),a[p+8]=l,a[p+9]=u,r[p+10]=this.hasCorners?1:0,r[p+11]=(f??d)*o}),this.#c(this.buffers.shows,r),this.#n(t,"vertices",[Tt(this.words[Ve]),e.length],["level","corners","shows","positions","matrices","vertices"])}async read(t){this.run([],t);let e=this.device.createCommandEncoder(),s=4*this.size.vertices*t.length,i=this.device.createBuffer({size:s,usage:9});e.copyBufferToBuffer(this.buffers.vertices,0,i,0,s),this.device.queue.submit([e.finish()]),await i.mapAsync(1);let o=new Float32Array(i.getMappedRange().slice(0));return i.destroy(),o}dispose(){for(let t of[...this.depths.map(e=>e.uniform),...this.ordinals])t.destroy();for(let[t,e]of Object.entries(this.buffers))(t!=="vertices"||this.ownsVertices)&&e.destroy()}};var ct=null,wo=.001,Rt=class{#t=new Map([[ct,1]]);#e=new Map([[ct,1]]);set(t){let e=t?[...t.values()].reduce((s,i)=>s+i,0):0;this.#t=e>0?new Map([...t].map(([s,i])=>[s,i/e])):new Map([[ct,1]])}get clips(){return[...this.#t.keys()].filter(t=>t!==ct)}advance(t,e){let s=[...this.#t].filter(([l,c])=>c>0&&(l===ct||e(l))),i=s.reduce((l,[,c])=>l+c,0),o=new Map(s.map(([l,c])=>[l,c/i]));if(o.size===0)return;let a=[...new Set([...this.#e.keys(),...o.keys()])].map(l=>[l,(this.#e.get(l)??0)*(1-t)+(o.get(l)??0)*t]).filter(([l,c])=>c>wo||o.has(l)),h=a.reduce((l,[,c])=>l+c,0);this.#e=new Map(a.map(([l,c])=>[l,c/h]))}of(t){let e=new Map;for(let[s,i]of this.#e)e.set(s??t,(e.get(s??t)??0)+i);return e}};function $e(n,t,e){let{firstFrame:s,frameCount:i,duration:o}=t,r=$(t);if(i===1||!(r>0))return[{frame:s,weight:1}];let a=(e%r+r)%r;return a<o?yo(n,t,a):qe(s+i-1,s,Math.min((a-o)/(r-o),1))}function yo(n,{firstFrame:t,frameCount:e},s){let i=n[t]+s,o=t,r=t+e-1;for(;r-o>1;){let a=o+r>>1;n[a]<=i?o=a:r=a}return r===o?[{frame:o,weight:1}]:qe(o,r,Math.min(Math.max((i-n[o])/(n[r]-n[o]),0),1))}var qe=(n,t,e)=>[{frame:n,weight:1-e},{frame:t,weight:e}];var ut=32,ft=4,Xe=1.5,Ze=2,Do=.85,Je=32,Qe=9,Ro=16777215,Co=n=>n?new So({color:7035717}):new Ao({color:9083499,roughness:.8,side:vo}),st=class extends xo{pixels=1;measure="p99";phases=8;ease=.2;bytesOfMotion=0;bytesOfParameters=0;levels=[];#t;#e;#i;#r;#o;#s;#a;#c;#h=new Map;#n=[];#f=[];#u=new Rt;#p=0;#l=null;#d=null;#m=null;#b=null;#w=[];#M=new bo;#v=1;#y=0;#x=!1;#g=0;#E=new Float32Array(Je);#_=null;#O=null;#T=1;#A=Ct.uniform(new ie(1,0,0));constructor(t,e,{geometry:s=e.geometry??e.lines,material:i=Co,shape:o=r=>r}={}){if(super(),this.name="ath forest",this.#s=t.backend.device,!this.#s)throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");this.#t=t,this.#e=e,B(this,e.metadata),this.#i=s,this.#r=i,this.#o=o,this.#a=new Pt(this.#s,{blocks:ze,time:He,hierarchy:je,finish:Be,vertices:We}),this.#c=this.#s.createComputePipeline({layout:"auto",compute:{module:this.#s.createShaderModule({code:Fe}),entryPoint:"main"}}),this.view=this.#s.createBuffer({size:4*Je,usage:GPUBufferUsage.UNIFORM|GPUBufferUsage.COPY_DST}),this.tolerances=this.#s.createBuffer({size:8*ut,usage:GPUBufferUsage.STORAGE|GPUBufferUsage.COPY_DST})}get count(){return this.#y}get plantCount(){return this.#n.length}get plants(){return this.#n.map(({clip:t,phase:e})=>[t.name,e])}get clips(){return Array.from(this.#h.keys(),({name:t})=>t)}get bytes(){return this.levels.reduce((t,{passes:e})=>t+e.bytes,0)}setInstances(t){let{motion:e,channel:s}=this.#e,{limits:i}=this.#s,o=new Float32Array(8*Math.max(1,t.length));this.#U();let r=f=>this.#P(f)??e.clip,a=new Set(t.map(({clip:f})=>r(f))),h=Math.floor(i.maxStorageBufferBindingSize/(12*ft*s.info.placeCount)/Math.max(1,a.size)),l=Math.max(1,Math.min(this.phases,h)),c=new Map,u=(f,d=0)=>{let p=$(f)||1,m=Math.floor((d/p%1+1)%1*l),b=f.index*l+m;return c.has(b)||c.set(b,{index:c.size,clip:f,phase:m/l}),c.get(b).index};t.forEach(({x:f,y:d,z:p,size:m=1,angle:b=0,seconds:_,clip:v,tint:g=Ro},y)=>{o.set([f,d,p,m,Math.cos(b),Math.sin(b),u(r(v),_),g],8*y),this.#M.expandByPoint(new ie(f,d,p)),this.#v=Math.max(this.#v,m)}),this.#n=[...c.values()],this.#y=t.length;for(let f of[...a,...this.#u.clips])this.#R(f);return this.#l=this.#D(o,4),this.#d=new _o(new Uint32Array(5*ut),5),this.#t.backend.createIndirectStorageAttribute(this.#d),this.#m=this.#D(new Uint32Array(ut*Math.max(1,this.#y)),1),this.#_=new Uint32Array(5*ut),this.#b=this.#s.createBindGroup({layout:this.#c.getBindGroupLayout(0),entries:[this.#S(this.#l),this.view,this.tolerances,this.#S(this.#d),this.#S(this.#m)].map((f,d)=>({binding:d,resource:{buffer:f}}))}),this}#P(t){return this.#e.motion.clips.find(({index:e,name:s})=>t===e||t===s)}#R(t){this.#h.has(t)||this.#h.set(t,this.#e.motion.clone().play(t.index).setLevel(Math.max(0,this.levels.length-1)).setTime(0))}#D(t,e){let s=new To(t,e);return this.#t.backend.createStorageAttribute(s),s}#S(t){return this.#t.backend.get(t).buffer}blend(t){let e=Object.entries(t??{}).map(([i,o])=>[this.#P(i),o]);if(e.findIndex(([i,o])=>!i||!(o>=0&&o<1/0))>=0||t&&!e.some(([,i])=>i>0))throw new RangeError(`blend: got ${JSON.stringify(t)}, expected weights of clips, ${this.#e.motion.clips.map(({name:i})=>i).join(", ")}`);for(let[i,o]of e)o>0&&this.#R(i);return this.#u.set(t&&new Map(e)),this}async wind(t,e=0){if(![t,e].every(Number.isFinite))throw new RangeError(`wind: got ${t} and ${e}, expected two finite numbers`);let s=this.#O={},{weights:i}=await this.#e.channel.windWeights(t,e),{clips:o}=this.#e.motion;return s===this.#O&&this.blend(Object.fromEntries(o.map(({name:r},a)=>[r,i[a]]))),this}sway(t,e=null){return this.#T=t,this.#A.value.set(Math.cos(e??0),Math.sin(e??0),e===null?0:1),this}#z(t){let e=this.levels.length,{motion:s}=this.#e;if(!this.#x){for(let i of this.levels)for(let[o,{readyLevel:r}]of this.#h)if(!i.clips.has(o)&&r>=i.level)return this.#k(()=>this.#B(i,o));if(!(e>=s.levelCount||e>0&&this.#C(e-1)<=t)){for(let i of this.#h.values())i.target<e&&i.setLevel(e);[...this.#h.values()].every(({readyLevel:i})=>i>=e)&&this.#k(()=>this.#F(e))}}}#k(t){this.#x=!0,t().catch(({message:e,codeName:s})=>this.#e.motion.dispatchEvent({type:"error",message:e,codeName:s}))}#C(t){return Math.max(...Array.from(this.#h.keys(),({errors:e})=>e[t][this.measure]))}async#F(t){let{channel:e}=this.#e,s=this.#g,i=()=>s===this.#g,[o,{words:r}]=[await e.parts(t),await e.gpu(t)];if(!i())return;let a=this.#n.length,h=this.#D(new Float32Array(Qe*r[2]*a),1),l=new Dt(this.#s,this.#a,r,{slots:ft*a,shown:a,vertices:this.#S(h)}),c={level:t,passes:l,shared:h,clips:new Set,places:new Map,uploaded:0,bytesOfMotion:0,bytesOfParameters:0,strength:NaN,slots:this.#n.map(()=>new Array(ft).fill(-1)),before:this.#n.map(()=>null)};this.#e.hasFaces&&l.setCorners(ko(this.#e.geometry,e));for(let u of this.#h.keys())if(!await this.#N(c,u,i)){l.dispose();return}this.levels.push(c),this.#j(c,o),this.#x=!1,this.dispatchEvent({type:"level",level:t})}async#B(t,e){let s=this.#g;await this.#N(t,e,()=>s===this.#g)&&(this.#x=!1)}async#N(t,e,s){let{channel:i}=this.#e,{passes:o,level:r,places:a}=t;for(let h=e.firstSegment;h<e.firstSegment+e.segmentCount;h++){let{words:l,coded:c}=await i.gpu(r,h);if(!s())return!1;let u=o.segment(l);this.#I(t,"bytesOfMotion"),c.forEach((f,d)=>a.set(i.segments[h]+d,{segment:u,frame:f}))}return t.clips.add(e),!0}#I(t,e){this[e]+=t.passes.uploaded-t.uploaded,t[e]+=t.passes.uploaded-t.uploaded,t.uploaded=t.passes.uploaded}#j(t,e){let{channel:s,motion:i,rest:o,sphere:r}=this.#e,{level:a}=t,h=this.#C(a),l=a>0?this.#C(a-1):r.radius/4,c=s.nodeNumbers(e);e.vertices.forEach((p,m)=>{p<0&&(c[m]=-1)});let u=a===i.levelCount-1?this.#i:Q(this.#i,o,Xe*h,c);this.#L(t,u,h);for(let p=Math.max(Ze*h,r.radius/2e3);p<l;p*=Ze){let m=Q(this.#i,o,Xe*p,c);m.userData.source.length>Do*u.userData.source.length||(this.#L(t,m,p),u=m)}let f=Float32Array.from({length:2*this.#w.length}),d=new Uint32Array(f.buffer);this.#w.sort((p,m)=>p.tolerance-m.tolerance).forEach((p,m)=>{f[2*m]=p.tolerance,d[2*m+1]=p.list}),this.#s.queue.writeBuffer(this.tolerances,0,f)}#L(t,e,s){let i=this.#w.length;if(i===ut)return;let o=this.#o(e,s).clone(),{source:r}=e.userData,a=!o.hasAttribute("normal"),h=this.#e.channel.vertexPlaces,l=o.userData.vertices??r;o.setAttribute("athVertex",new Ye(Uint32Array.from(l,f=>h[f]),1)),o.setAttribute("position",new Ye(Float32Array.from({length:3*l.length},(f,d)=>this.#e.rest[3*l[Math.floor(d/3)]+d%3]),3)),o.setIndirect(this.#d,20*i),this.#_[5*i]=o.index.count;let c=this.#r(a,t.level),u=a?new Mo(o,c):new Eo(o,c);this.#H(c,o,t,i),u.frustumCulled=!1,u.castShadow=u.receiveShadow=!a,this.#w.push({level:t.level,tolerance:s,list:i,drawn:u,size:o.index.count}),this.add(u)}#H(t,e,{passes:s,shared:i},o){let{Fn:r,storage:a,uint:h,float:l,vec3:c,attribute:u,instanceIndex:f,positionGeometry:d,positionPrevious:p,normalLocal:m,normalGeometry:b,select:_}=Ct,{metadata:v,channel:{info:g}}=this.#e,y=v.up_axis==="z",S=this.#A,E=c(...g.origin),R=h(s.words[2]),w=a(i,"float",i.count).toReadOnly(),M=a(this.#l,"vec4",2*Math.max(1,this.#y)).toReadOnly(),T=a(this.#m,"uint",this.#m.count).toReadOnly(),P=(N,F,W)=>y?c(F.mul(N.x).sub(W.mul(N.y)),W.mul(N.x).add(F.mul(N.y)),N.z):c(F.mul(N.x).add(W.mul(N.z)),N.y,F.mul(N.z).sub(W.mul(N.x))),I=()=>T.element(h(o*Math.max(1,this.#y)).add(f)),Ht=e.hasAttribute("athOffset"),Cs=s.hasCorners&&!e.userData.vertices;t.positionNode=r((N,F)=>{let W=I().toVar(),me=M.element(W.mul(2)).toVar(),V=M.element(W.mul(2).add(1)).toVar(),Ns=h(V.z).mul(R).add(u("athVertex","uint")).mul(Qe).toVar(),Wt=Vt=>c(...[0,1,2].map(gt=>w.element(Ns.add(Vt+gt)))),ge=Vt=>{let gt=Vt.add(E).toVar(),Is=gt.sub(d).toVar(),Ls=S.x.mul(V.x).add(S.y.mul(V.y)),Us=S.y.mul(V.x).sub(S.x.mul(V.y)),zs=d.add(P(Is,Ls,Us)),we=_(S.z.greaterThan(.5),zs,gt).toVar(),Fs=Ht?we.add(u("athOffset","vec3")):we;return P(Fs,V.x,V.y).mul(me.w).add(me.xyz)};return e.hasAttribute("normal")&&m.assign(P(Cs?Wt(3):b,V.x,V.y)),F.needsPreviousData?.()&&p.assign(ge(Wt(6))),ge(Wt(0))})();let ks=r(()=>{let N=h(M.element(I().mul(2).add(1)).w),F=W=>l(N.shiftRight(h(W)).bitAnd(h(255))).div(255);return c(F(16),F(8),F(0))})();t.colorNode=Ct.varying(ks).mul(t.colorNode??(e.hasAttribute("color")?u("color","vec3"):Ct.materialColor))}update(t,e,s){if(!this.#b)return;let i=this.#W(t,e);this.#z(i),this.#V(s);for(let o of this.levels)(o.level===0||this.#C(o.level-1)>i)&&this.#G(o);this.#Y()}#W(t,e){this.updateWorldMatrix(!0,!1),t.updateMatrixWorld();let{sphere:s}=this.#e,i=s.center.length()+1.2*s.radius,o=this.#E,r=new ie().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new Ke().copy(this.matrixWorld).invert());new Oo().setFromProjectionMatrix(new Ke().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld),t.coordinateSystem??Po).planes.forEach(({normal:c,constant:u},f)=>o.set([c.x,c.y,c.z,u],4*f));let h=this.pixels*2*Math.tan(t.fov*Math.PI/360)/e,l=this.#M.distanceToPoint(r);return o.set([r.x,r.y,r.z,h],24),new Uint32Array(o.buffer).set([this.#y,this.#w.length],28),o[30]=i,new Uint32Array(o.buffer)[31]=Math.max(1,this.#y),h*Math.max(l-.5*i*this.#v,1e-6)/this.#v}#V(t){let e=performance.now(),s=this.ease>0?1-Math.exp((this.#p-e)/(1e3*this.ease)):1;this.#p=e,this.#u.advance(s,o=>this.levels.every(r=>r.clips.has(o)));let{times:i}=this.#e.channel;this.#f=this.#n.map(({clip:o,phase:r})=>[...this.#u.of(o)].flatMap(([a,h])=>$e(i,a,t+r*$(a)).map(({frame:l,weight:c})=>({frame:l,weight:h*c}))))}#G(t){let e=[],s=[],i=this.#T,o=t.strength!==i;t.strength=i,this.#f.forEach((r,a)=>{let h=t.before[a];o&&t.slots[a].fill(-1);let l=r.length>2?this.#q(t,a,r,e):this.#$(t,a,r,e);s.push({...l,previous:h?.slots??l.slots,previousWeight:h?.weight??l.weight}),t.before[a]=l}),t.passes.run(e,s),this.#I(t,"bytesOfParameters")}#$(t,e,s,i){let o=t.slots[e],r=ft*e,a=s.map(({frame:l})=>l),h=a.map(l=>{let c=o.indexOf(l);return c<0&&(c=o.findIndex((u,f)=>!a.includes(u)&&!t.before[e]?.slots.includes(r+f)),o[c]=l,i.push({sources:[t.places.get(l)],slot:r+c,strength:t.strength})),r+c});return{slots:[h[0],h.at(-1)],weight:s.length>1?s[1].weight:0}}#q(t,e,s,i){let o=t.slots[e],r=ft*e,a=o.findIndex((l,c)=>!t.before[e]?.slots.includes(r+c));o[a]=-1;let h=s.filter(({weight:l})=>l>0).map(({frame:l,weight:c})=>({...t.places.get(l),weight:c}));return i.push({sources:h,slot:r+a,strength:t.strength}),{slots:[r+a,r+a],weight:0}}#Y(){let{queue:t}=this.#s,e=this.#s.createCommandEncoder();t.writeBuffer(this.view,0,this.#E),t.writeBuffer(this.#S(this.#d),0,this.#_),this.bytesOfParameters+=this.#E.byteLength+this.#_.byteLength;let s=e.beginComputePass();s.setPipeline(this.#c),s.setBindGroup(0,this.#b),s.dispatchWorkgroups(Math.ceil(Math.max(1,this.#y)/64)),s.end(),t.submit([e.finish()])}async drawn(){let t=this.#_.byteLength,e=this.#s.createBuffer({size:t,usage:GPUBufferUsage.COPY_DST|GPUBufferUsage.MAP_READ}),s=this.#s.createCommandEncoder(),i=new Array(this.#e.motion.levelCount).fill(0);s.copyBufferToBuffer(this.#S(this.#d),0,e,0,t),this.#s.queue.submit([s.finish()]),await e.mapAsync(GPUMapMode.READ);let o=new Uint32Array(e.getMappedRange().slice(0));e.destroy();for(let{level:r,list:a}of this.#w)i[r]+=o[5*a+1];return i}async vertices(t){let{shared:e}=this.levels[t];return new Float32Array(await this.#t.getArrayBufferAsync(e))}#U(){this.#g++,this.#x=!1;for(let{drawn:t}of this.#w)t.removeFromParent(),t.geometry.dispose(),t.material.dispose();for(let{passes:t,shared:e}of this.levels)t.dispose(),this.#t.backend.destroyAttribute(e);for(let t of[this.#l,this.#d,this.#m].filter(Boolean))this.#t.backend.destroyAttribute(t);for(let t of this.#h.values())t.dispose();this.#h.clear(),this.levels=[],this.#w=[],this.#b=null,this.#M.makeEmpty(),this.#v=1e-9}dispose(){this.#U(),this.view.destroy(),this.tolerances.destroy()}};function ko(n,{vertexPlaces:t,info:{placeCount:e}}){let s=Uint32Array.from(n.index.array,r=>t[n.userData.source[r]]),i=new Uint32Array(e+1),o=new Uint32Array(e+1+2*s.length);for(let r of s)i[r+1]++;for(let r=0;r<e;r++)i[r+1]+=i[r];for(let r=0;r<=e;r++)o[r]=e+1+2*i[r];for(let r=0;r<s.length;r++){let a=r-r%3,h=e+1+2*i[s[r]]++;o[h]=s[a+(r+1)%3],o[h+1]=s[a+(r+2)%3]}return o}import{ACESFilmicToneMapping as Br,DoubleSide as jr,MeshStandardNodeMaterial as Hr,PerspectiveCamera as Wr,Scene as Vr,Vector3 as Gr,WebGPURenderer as $r}from"./three.webgpu.js";import{Controls as No,MOUSE as ot,Quaternion as ts,Spherical as es,TOUCH as it,Vector2 as U,Vector3 as H,Plane as Io,Ray as Lo,MathUtils as Uo}from"./three.webgpu.js";var ss={type:"change"},re={type:"start"},os={type:"end"},kt=new Lo,is=new Io,zo=Math.cos(70*Uo.DEG2RAD),A=new H,k=2*Math.PI,x={NONE:-1,ROTATE:0,DOLLY:1,PAN:2,TOUCH_ROTATE:3,TOUCH_PAN:4,TOUCH_DOLLY_PAN:5,TOUCH_DOLLY_ROTATE:6},oe=1e-6,Nt=class extends No{constructor(t,e=null){super(t,e),this.state=x.NONE,this.target=new H,this.cursor=new H,this.minDistance=0,this.maxDistance=1/0,this.minZoom=0,this.maxZoom=1/0,this.minTargetRadius=0,this.maxTargetRadius=1/0,this.minPolarAngle=0,this.maxPolarAngle=Math.PI,this.minAzimuthAngle=-1/0,this.maxAzimuthAngle=1/0,this.enableDamping=!1,this.dampingFactor=.05,this.enableZoom=!0,this.zoomSpeed=1,this.enableRotate=!0,this.rotateSpeed=1,this.keyRotateSpeed=1,this.enablePan=!0,this.panSpeed=1,this.screenSpacePanning=!0,this.keyPanSpeed=7,this.zoomToCursor=!1,this.autoRotate=!1,this.autoRotateSpeed=2,this.keys={LEFT:"ArrowLeft",UP:"ArrowUp",RIGHT:"ArrowRight",BOTTOM:"ArrowDown"},this.mouseButtons={LEFT:ot.ROTATE,MIDDLE:ot.DOLLY,RIGHT:ot.PAN},this.touches={ONE:it.ROTATE,TWO:it.DOLLY_PAN},this.target0=this.target.clone(),this.position0=this.object.position.clone(),this.zoom0=this.object.zoom,this._cursorStyle="auto",this._domElementKeyEvents=null,this._lastPosition=new H,this._lastQuaternion=new ts,this._lastTargetPosition=new H,this._quat=new ts().setFromUnitVectors(t.up,new H(0,1,0)),this._quatInverse=this._quat.clone().invert(),this._spherical=new es,this._sphericalDelta=new es,this._scale=1,this._panOffset=new H,this._rotateStart=new U,this._rotateEnd=new U,this._rotateDelta=new U,this._panStart=new U,this._panEnd=new U,this._panDelta=new U,this._dollyStart=new U,this._dollyEnd=new U,this._dollyDelta=new U,this._dollyDirection=new H,this._mouse=new U,this._performCursorZoom=!1,this._pointers=[],this._pointerPositions={},this._controlActive=!1,this._onPointerMove=Bo.bind(this),this._onPointerDown=Fo.bind(this),this._onPointerUp=jo.bind(this),this._onContextMenu=Yo.bind(this),this._onMouseWheel=Vo.bind(this),this._onKeyDown=Go.bind(this),this._onTouchStart=$o.bind(this),this._onTouchMove=qo.bind(this),this._onMouseDown=Ho.bind(this),this._onMouseMove=Wo.bind(this),this._interceptControlDown=Ko.bind(this),this._interceptControlUp=Xo.bind(this),this.domElement!==null&&this.connect(this.domElement),this.update()}set cursorStyle(t){this._cursorStyle=t,t==="grab"?this.domElement.style.cursor="grab":this.domElement.style.cursor="auto"}get cursorStyle(){return this._cursorStyle}connect(t){super.connect(t),this.domElement.addEventListener("pointerdown",this._onPointerDown),this.domElement.addEventListener("pointercancel",this._onPointerUp),this.domElement.addEventListener("contextmenu",this._onContextMenu),this.domElement.addEventListener("wheel",this._onMouseWheel,{passive:!1}),this.domElement.ownerDocument.addEventListener("keydown",this._interceptControlDown,{passive:!0,capture:!0}),this.domElement.style.touchAction="none"}disconnect(){this.state=x.NONE,this.domElement.removeEventListener("pointerdown",this._onPointerDown),this.domElement.ownerDocument.removeEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.removeEventListener("pointerup",this._onPointerUp),this.domElement.removeEventListener("pointercancel",this._onPointerUp),this.domElement.removeEventListener("wheel",this._onMouseWheel),this.domElement.removeEventListener("contextmenu",this._onContextMenu),this.stopListenToKeyEvents(),this.domElement.ownerDocument.removeEventListener("keydown",this._interceptControlDown,{capture:!0}),this.domElement.ownerDocument.removeEventListener("keyup",this._interceptControlUp,{capture:!0}),this._controlActive=!1,this._pointers.length=0,this._pointerPositions={},this.domElement.style.touchAction="",this.domElement.style.cursor="auto"}dispose(){this.disconnect()}getPolarAngle(){return this._spherical.phi}getAzimuthalAngle(){return this._spherical.theta}getDistance(){return this.object.position.distanceTo(this.target)}listenToKeyEvents(t){t.addEventListener("keydown",this._onKeyDown),this._domElementKeyEvents=t}stopListenToKeyEvents(){this._domElementKeyEvents!==null&&(this._domElementKeyEvents.removeEventListener("keydown",this._onKeyDown),this._domElementKeyEvents=null)}saveState(){this.target0.copy(this.target),this.position0.copy(this.object.position),this.zoom0=this.object.zoom}reset(){this.target.copy(this.target0),this.object.position.copy(this.position0),this.object.zoom=this.zoom0,this.object.updateProjectionMatrix(),this.dispatchEvent(ss),this.update(),this.state=x.NONE}pan(t,e){this._pan(t,e),this.update()}dollyIn(t){this._dollyIn(t),this.update()}dollyOut(t){this._dollyOut(t),this.update()}rotateLeft(t){this._rotateLeft(t),this.update()}rotateUp(t){this._rotateUp(t),this.update()}update(t=null){let e=this.object.position;A.copy(e).sub(this.target),A.applyQuaternion(this._quat),this._spherical.setFromVector3(A),this.autoRotate&&this.state===x.NONE&&this._rotateLeft(this._getAutoRotationAngle(t)),this.enableDamping?(this._spherical.theta+=this._sphericalDelta.theta*this.dampingFactor,this._spherical.phi+=this._sphericalDelta.phi*this.dampingFactor):(this._spherical.theta+=this._sphericalDelta.theta,this._spherical.phi+=this._sphericalDelta.phi);let s=this.minAzimuthAngle,i=this.maxAzimuthAngle;isFinite(s)&&isFinite(i)&&(s<-Math.PI?s+=k:s>Math.PI&&(s-=k),i<-Math.PI?i+=k:i>Math.PI&&(i-=k),s<=i?this._spherical.theta=Math.max(s,Math.min(i,this._spherical.theta)):this._spherical.theta=this._spherical.theta>(s+i)/2?Math.max(s,this._spherical.theta):Math.min(i,this._spherical.theta)),this._spherical.phi=Math.max(this.minPolarAngle,Math.min(this.maxPolarAngle,this._spherical.phi)),this._spherical.makeSafe(),this.enableDamping===!0?this.target.addScaledVector(this._panOffset,this.dampingFactor):this.target.add(this._panOffset),this.target.sub(this.cursor),this.target.clampLength(this.minTargetRadius,this.maxTargetRadius),this.target.add(this.cursor);let o=!1;if(this.zoomToCursor&&this._performCursorZoom||this.object.isOrthographicCamera)this._spherical.radius=this._clampDistance(this._spherical.radius);else{let r=this._spherical.radius;this._spherical.radius=this._clampDistance(this._spherical.radius*this._scale),o=r!=this._spherical.radius}if(A.setFromSpherical(this._spherical),A.applyQuaternion(this._quatInverse),e.copy(this.target).add(A),this.object.lookAt(this.target),this.enableDamping===!0?(this._sphericalDelta.theta*=1-this.dampingFactor,this._sphericalDelta.phi*=1-this.dampingFactor,this._panOffset.multiplyScalar(1-this.dampingFactor)):(this._sphericalDelta.set(0,0,0),this._panOffset.set(0,0,0)),this.zoomToCursor&&this._performCursorZoom){let r=null;if(this.object.isPerspectiveCamera){let a=A.length();r=this._clampDistance(a*this._scale);let h=a-r;this.object.position.addScaledVector(this._dollyDirection,h),this.object.updateMatrixWorld(),o=!!h}else if(this.object.isOrthographicCamera){let a=new H(this._mouse.x,this._mouse.y,0);a.unproject(this.object);let h=this.object.zoom;this.object.zoom=Math.max(this.minZoom,Math.min(this.maxZoom,this.object.zoom/this._scale)),this.object.updateProjectionMatrix(),o=h!==this.object.zoom;let l=new H(this._mouse.x,this._mouse.y,0);l.unproject(this.object),this.object.position.sub(l).add(a),this.object.updateMatrixWorld(),r=A.length()}else console.warn("WARNING: OrbitControls.js encountered an unknown camera type - zoom to cursor disabled."),this.zoomToCursor=!1;r!==null&&(this.screenSpacePanning?this.target.set(0,0,-1).transformDirection(this.object.matrix).multiplyScalar(r).add(this.object.position):(kt.origin.copy(this.object.position),kt.direction.set(0,0,-1).transformDirection(this.object.matrix),Math.abs(this.object.up.dot(kt.direction))<zo?this.object.lookAt(this.target):(is.setFromNormalAndCoplanarPoint(this.object.up,this.target),kt.intersectPlane(is,this.target))))}else if(this.object.isOrthographicCamera){let r=this.object.zoom;this.object.zoom=Math.max(this.minZoom,Math.min(this.maxZoom,this.object.zoom/this._scale)),r!==this.object.zoom&&(this.object.updateProjectionMatrix(),o=!0)}return this._scale=1,this._performCursorZoom=!1,o||this._lastPosition.distanceToSquared(this.object.position)>oe||8*(1-this._lastQuaternion.dot(this.object.quaternion))>oe||this._lastTargetPosition.distanceToSquared(this.target)>oe?(this.dispatchEvent(ss),this._lastPosition.copy(this.object.position),this._lastQuaternion.copy(this.object.quaternion),this._lastTargetPosition.copy(this.target),!0):!1}_getAutoRotationAngle(t){return t!==null?k/60*this.autoRotateSpeed*t:k/60/60*this.autoRotateSpeed}_getZoomScale(t){let e=Math.abs(t*.01);return Math.pow(.95,this.zoomSpeed*e)}_rotateLeft(t){this._sphericalDelta.theta-=t}_rotateUp(t){this._sphericalDelta.phi-=t}_panLeft(t,e){A.setFromMatrixColumn(e,0),A.multiplyScalar(-t),this._panOffset.add(A)}_panUp(t,e){this.screenSpacePanning===!0?A.setFromMatrixColumn(e,1):(A.setFromMatrixColumn(e,0),A.crossVectors(this.object.up,A)),A.multiplyScalar(t),this._panOffset.add(A)}_pan(t,e){let s=this.domElement;if(this.object.isPerspectiveCamera){let i=this.object.position;A.copy(i).sub(this.target);let o=A.length();o*=Math.tan(this.object.fov/2*Math.PI/180),this._panLeft(2*t*o/s.clientHeight,this.object.matrix),this._panUp(2*e*o/s.clientHeight,this.object.matrix)}else this.object.isOrthographicCamera?(this._panLeft(t*(this.object.right-this.object.left)/this.object.zoom/s.clientWidth,this.object.matrix),this._panUp(e*(this.object.top-this.object.bottom)/this.object.zoom/s.clientHeight,this.object.matrix)):(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - pan disabled."),this.enablePan=!1)}_dollyOut(t){this.object.isPerspectiveCamera||this.object.isOrthographicCamera?this._scale/=t:(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - dolly/zoom disabled."),this.enableZoom=!1)}_dollyIn(t){this.object.isPerspectiveCamera||this.object.isOrthographicCamera?this._scale*=t:(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - dolly/zoom disabled."),this.enableZoom=!1)}_updateZoomParameters(t,e){if(!this.zoomToCursor)return;this._performCursorZoom=!0;let s=this.domElement.getBoundingClientRect(),i=t-s.left,o=e-s.top,r=s.width,a=s.height;this._mouse.x=i/r*2-1,this._mouse.y=-(o/a)*2+1,this._dollyDirection.set(this._mouse.x,this._mouse.y,1).unproject(this.object).sub(this.object.position).normalize()}_clampDistance(t){return Math.max(this.minDistance,Math.min(this.maxDistance,t))}_handleMouseDownRotate(t){this._rotateStart.set(t.clientX,t.clientY)}_handleMouseDownDolly(t){this._updateZoomParameters(t.clientX,t.clientY),this._dollyStart.set(t.clientX,t.clientY)}_handleMouseDownPan(t){this._panStart.set(t.clientX,t.clientY)}_handleMouseMoveRotate(t){this._rotateEnd.set(t.clientX,t.clientY),this._rotateDelta.subVectors(this._rotateEnd,this._rotateStart).multiplyScalar(this.rotateSpeed);let e=this.domElement;this._rotateLeft(k*this._rotateDelta.x/e.clientHeight),this._rotateUp(k*this._rotateDelta.y/e.clientHeight),this._rotateStart.copy(this._rotateEnd),this.update()}_handleMouseMoveDolly(t){this._dollyEnd.set(t.clientX,t.clientY),this._dollyDelta.subVectors(this._dollyEnd,this._dollyStart),this._dollyDelta.y>0?this._dollyOut(this._getZoomScale(this._dollyDelta.y)):this._dollyDelta.y<0&&this._dollyIn(this._getZoomScale(this._dollyDelta.y)),this._dollyStart.copy(this._dollyEnd),this.zoomToCursor&&(this._performCursorZoom=!0,this._dollyDirection.set(this._mouse.x,this._mouse.y,1).unproject(this.object).sub(this.object.position).normalize()),this.update()}_handleMouseMovePan(t){this._panEnd.set(t.clientX,t.clientY),this._panDelta.subVectors(this._panEnd,this._panStart).multiplyScalar(this.panSpeed),this._pan(this._panDelta.x,this._panDelta.y),this._panStart.copy(this._panEnd),this.update()}_handleMouseWheel(t){this._updateZoomParameters(t.clientX,t.clientY),t.deltaY<0?this._dollyIn(this._getZoomScale(t.deltaY)):t.deltaY>0&&this._dollyOut(this._getZoomScale(t.deltaY)),this.update()}_handleKeyDown(t){let e=!1;switch(t.code){case this.keys.UP:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateUp(k*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(0,this.keyPanSpeed),e=!0;break;case this.keys.BOTTOM:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateUp(-k*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(0,-this.keyPanSpeed),e=!0;break;case this.keys.LEFT:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateLeft(k*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(this.keyPanSpeed,0),e=!0;break;case this.keys.RIGHT:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateLeft(-k*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(-this.keyPanSpeed,0),e=!0;break}e&&(t.preventDefault(),this.update())}_handleTouchStartRotate(t){if(this._pointers.length===1)this._rotateStart.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._rotateStart.set(s,i)}}_handleTouchStartPan(t){if(this._pointers.length===1)this._panStart.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._panStart.set(s,i)}}_handleTouchStartDolly(t){let e=this._getSecondPointerPosition(t),s=t.pageX-e.x,i=t.pageY-e.y,o=Math.sqrt(s*s+i*i);this._dollyStart.set(0,o)}_handleTouchStartDollyPan(t){this.enableZoom&&this._handleTouchStartDolly(t),this.enablePan&&this._handleTouchStartPan(t)}_handleTouchStartDollyRotate(t){this.enableZoom&&this._handleTouchStartDolly(t),this.enableRotate&&this._handleTouchStartRotate(t)}_handleTouchMoveRotate(t){if(this._pointers.length==1)this._rotateEnd.set(t.pageX,t.pageY);else{let s=this._getSecondPointerPosition(t),i=.5*(t.pageX+s.x),o=.5*(t.pageY+s.y);this._rotateEnd.set(i,o)}this._rotateDelta.subVectors(this._rotateEnd,this._rotateStart).multiplyScalar(this.rotateSpeed);let e=this.domElement;this._rotateLeft(k*this._rotateDelta.x/e.clientHeight),this._rotateUp(k*this._rotateDelta.y/e.clientHeight),this._rotateStart.copy(this._rotateEnd)}_handleTouchMovePan(t){if(this._pointers.length===1)this._panEnd.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._panEnd.set(s,i)}this._panDelta.subVectors(this._panEnd,this._panStart).multiplyScalar(this.panSpeed),this._pan(this._panDelta.x,this._panDelta.y),this._panStart.copy(this._panEnd)}_handleTouchMoveDolly(t){let e=this._getSecondPointerPosition(t),s=t.pageX-e.x,i=t.pageY-e.y,o=Math.sqrt(s*s+i*i);this._dollyEnd.set(0,o),this._dollyDelta.set(0,Math.pow(this._dollyEnd.y/this._dollyStart.y,this.zoomSpeed)),this._dollyOut(this._dollyDelta.y),this._dollyStart.copy(this._dollyEnd);let r=(t.pageX+e.x)*.5,a=(t.pageY+e.y)*.5;this._updateZoomParameters(r,a)}_handleTouchMoveDollyPan(t){this.enableZoom&&this._handleTouchMoveDolly(t),this.enablePan&&this._handleTouchMovePan(t)}_handleTouchMoveDollyRotate(t){this.enableZoom&&this._handleTouchMoveDolly(t),this.enableRotate&&this._handleTouchMoveRotate(t)}_addPointer(t){this._pointers.push(t.pointerId)}_removePointer(t){delete this._pointerPositions[t.pointerId];for(let e=0;e<this._pointers.length;e++)if(this._pointers[e]==t.pointerId){this._pointers.splice(e,1);return}}_isTrackingPointer(t){for(let e=0;e<this._pointers.length;e++)if(this._pointers[e]==t.pointerId)return!0;return!1}_trackPointer(t){let e=this._pointerPositions[t.pointerId];e===void 0&&(e=new U,this._pointerPositions[t.pointerId]=e),e.set(t.pageX,t.pageY)}_getSecondPointerPosition(t){let e=t.pointerId===this._pointers[0]?this._pointers[1]:this._pointers[0];return this._pointerPositions[e]}_customWheelEvent(t){let e=t.deltaMode,s={clientX:t.clientX,clientY:t.clientY,deltaY:t.deltaY};switch(e){case 1:s.deltaY*=16;break;case 2:s.deltaY*=100;break}return t.ctrlKey&&!this._controlActive&&(s.deltaY*=10),s}};function Fo(n){this.enabled!==!1&&(this._pointers.length===0&&(this.domElement.setPointerCapture(n.pointerId),this.domElement.ownerDocument.addEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.addEventListener("pointerup",this._onPointerUp)),!this._isTrackingPointer(n)&&(this._addPointer(n),n.pointerType==="touch"?this._onTouchStart(n):this._onMouseDown(n),this._cursorStyle==="grab"&&(this.domElement.style.cursor="grabbing")))}function Bo(n){this.enabled!==!1&&(n.pointerType==="touch"?this._onTouchMove(n):this._onMouseMove(n))}function jo(n){switch(this._removePointer(n),this._pointers.length){case 0:this.domElement.releasePointerCapture(n.pointerId),this.domElement.ownerDocument.removeEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.removeEventListener("pointerup",this._onPointerUp),this.dispatchEvent(os),this.state=x.NONE,this._cursorStyle==="grab"&&(this.domElement.style.cursor="grab");break;case 1:let t=this._pointers[0],e=this._pointerPositions[t];this._onTouchStart({pointerId:t,pageX:e.x,pageY:e.y});break}}function Ho(n){let t;switch(n.button){case 0:t=this.mouseButtons.LEFT;break;case 1:t=this.mouseButtons.MIDDLE;break;case 2:t=this.mouseButtons.RIGHT;break;default:t=-1}switch(t){case ot.DOLLY:if(this.enableZoom===!1)return;this._handleMouseDownDolly(n),this.state=x.DOLLY;break;case ot.ROTATE:if(n.ctrlKey||n.metaKey||n.shiftKey){if(this.enablePan===!1)return;this._handleMouseDownPan(n),this.state=x.PAN}else{if(this.enableRotate===!1)return;this._handleMouseDownRotate(n),this.state=x.ROTATE}break;case ot.PAN:if(n.ctrlKey||n.metaKey||n.shiftKey){if(this.enableRotate===!1)return;this._handleMouseDownRotate(n),this.state=x.ROTATE}else{if(this.enablePan===!1)return;this._handleMouseDownPan(n),this.state=x.PAN}break;default:this.state=x.NONE}this.state!==x.NONE&&this.dispatchEvent(re)}function Wo(n){switch(this.state){case x.ROTATE:if(this.enableRotate===!1)return;this._handleMouseMoveRotate(n);break;case x.DOLLY:if(this.enableZoom===!1)return;this._handleMouseMoveDolly(n);break;case x.PAN:if(this.enablePan===!1)return;this._handleMouseMovePan(n);break}}function Vo(n){this.enabled===!1||this.enableZoom===!1||this.state!==x.NONE||(n.preventDefault(),this.dispatchEvent(re),this._handleMouseWheel(this._customWheelEvent(n)),this.dispatchEvent(os))}function Go(n){this.enabled!==!1&&this._handleKeyDown(n)}function $o(n){switch(this._trackPointer(n),this._pointers.length){case 1:switch(this.touches.ONE){case it.ROTATE:if(this.enableRotate===!1){this.state=x.NONE;break}this._handleTouchStartRotate(n),this.state=x.TOUCH_ROTATE;break;case it.PAN:if(this.enablePan===!1){this.state=x.NONE;break}this._handleTouchStartPan(n),this.state=x.TOUCH_PAN;break;default:this.state=x.NONE}break;case 2:switch(this.touches.TWO){case it.DOLLY_PAN:if(this.enableZoom===!1&&this.enablePan===!1)return;this._handleTouchStartDollyPan(n),this.state=x.TOUCH_DOLLY_PAN;break;case it.DOLLY_ROTATE:if(this.enableZoom===!1&&this.enableRotate===!1)return;this._handleTouchStartDollyRotate(n),this.state=x.TOUCH_DOLLY_ROTATE;break;default:this.state=x.NONE}break;default:this.state=x.NONE}this.state!==x.NONE&&this.dispatchEvent(re)}function qo(n){switch(this._trackPointer(n),this.state){case x.TOUCH_ROTATE:if(this.enableRotate===!1)return;this._handleTouchMoveRotate(n),this.update();break;case x.TOUCH_PAN:if(this.enablePan===!1)return;this._handleTouchMovePan(n),this.update();break;case x.TOUCH_DOLLY_PAN:if(this.enableZoom===!1&&this.enablePan===!1)return;this._handleTouchMoveDollyPan(n),this.update();break;case x.TOUCH_DOLLY_ROTATE:if(this.enableZoom===!1&&this.enableRotate===!1)return;this._handleTouchMoveDollyRotate(n),this.update();break;default:this.state=x.NONE}}function Yo(n){this.enabled!==!1&&n.preventDefault()}function Ko(n){n.key==="Control"&&(this._controlActive=!0,this.domElement.ownerDocument.addEventListener("keyup",this._interceptControlUp,{passive:!0,capture:!0}))}function Xo(n){n.key==="Control"&&(this._controlActive=!1,this.domElement.ownerDocument.removeEventListener("keyup",this._interceptControlUp,{passive:!0,capture:!0}))}function C(n,t){let e=Math.sin(12.9898*n+78.233*t)*43758.5453;return e-Math.floor(e)}import{BufferAttribute as rs,BufferGeometry as Zo,Color as as,Vector3 as Z}from"./three.webgpu.js";var Jo=new as(6968380),Qo=[5208628,7050304,8825162].map(n=>new as(n)),ns=2600;function hs(n,t){let{rest:e,sphere:s}=n,i=[...t].sort((h,l)=>h-l)[Math.floor(.7*t.length)],o=.026*s.radius,r=h=>t[h]<=i,a=h=>new Z().fromArray(e,3*h);return h=>{let{source:l}=h.userData,c=h.index.array,u={offset:[],normal:[],color:[],vertices:[],index:[]},f=(g,y,S,E)=>(u.vertices.push(g),u.offset.push(y.x,y.y,y.z),u.normal.push(S.x,S.y,S.z),u.color.push(E.r,E.g,E.b),u.vertices.length-1),d=(g,y,S,E)=>{let R=(M,T)=>f(M,S.clone().multiplyScalar(T*t[M]),E,Jo),w=[R(g,-1),R(g,1),R(y,-1),R(y,1)];u.index.push(w[0],w[1],w[2],w[2],w[1],w[3])},p=Array.from({length:c.length/2},(g,y)=>[l[c[2*y]],l[c[2*y+1]]]);for(let[g,y]of p){let S=a(y).sub(a(g)).normalize(),E=new Z(S.y,-S.x,S.z*.1).cross(S).normalize(),R=new Z().crossVectors(S,E);d(g,y,E,R),r(y)||d(g,y,R,E)}let m=p.map(([,g])=>g).filter(r),b=Math.min(ns,2*m.length),_=o*Math.sqrt(ns/Math.max(b,60));for(let g=0;g<b;g++){let y=m[Math.floor(g*m.length/b)],S=2*Math.PI*C(g,1),E=C(g,2)-.35,R=new Z(Math.cos(S),E,Math.sin(S)).normalize().multiplyScalar(_),w=new Z(-Math.sin(S),.6*(C(g,3)-.5),Math.cos(S)).multiplyScalar(.42*_),M=a(y).sub(s.center).normalize().add(new Z(0,.7,0)).normalize(),T=Qo[g%3].clone().multiplyScalar(.8+.4*C(g,4)),P=R.clone().multiplyScalar(.5),I=f(y,new Z,M,T);f(y,P.clone().add(w),M,T),f(y,P.clone().sub(w),M,T),f(y,R,M,T),u.index.push(I,I+1,I+2,I+2,I+1,I+3)}let v=new Zo;for(let[g,y]of[["athOffset",u.offset],["normal",u.normal],["color",u.color]])v.setAttribute(g,new rs(Float32Array.from(y),3));return v.setIndex(new rs(Uint32Array.from(u.index),1)),v.userData.vertices=Uint32Array.from(u.vertices),v}}import{Color as tr,DirectionalLight as er,Fog as sr,HemisphereLight as ir,Mesh as or,MeshStandardNodeMaterial as rr,PlaneGeometry as nr,TSL as ar,Vector3 as hr}from"./three.webgpu.js";var{Fn:ds,clamp:lr,color:ne,dot:cr,max:ur,mix:It,mx_noise_float:fr,normalWorldGeometry:ls,positionWorld:dr,pow:cs,smoothstep:us,vec3:dt}=ar,J=new hr(-.62,.72,.32).normalize(),pr=7317210,ps=15002600,mr=16773334,fs=2048,gr=9,wr=ds(()=>{let n=lr(ls.y,0,1),t=ur(cr(ls,dt(J.x,J.y,J.z)),0);return It(It(ne(ps),ne(pr),cs(n,.55)),ne(mr),cs(t,6).mul(.4))}),yr=n=>ds(()=>{let t=dr.xz.div(n),e=r=>fr(dt(t.x.mul(r),t.y.mul(r),r)),s=us(-.5,.6,e(.35).add(e(1.9).mul(.5))),i=e(23).mul(.5).add(e(61).mul(.5)),o=It(dt(.085,.12,.03),dt(.16,.19,.055),s);return It(o,dt(.13,.1,.05),us(.25,.75,e(.8)).mul(.5)).mul(i.mul(.5).add(1))})(),Lt=class{constructor(t,e){let s=260*e,i=gr*e;this.sun=new er(16773592,3.2),this.ground=new or(new nr(4*s,4*s),new rr({roughness:1})),this.ground.material.colorNode=yr(e),this.ground.rotation.x=-Math.PI/2,this.ground.receiveShadow=!0,Object.assign(this.sun.shadow.camera,{left:-i,right:i,top:i,bottom:-i,near:.1*i,far:5*i}),Object.assign(this.sun.shadow,{bias:-5e-4,normalBias:.004*e}),this.sun.shadow.mapSize.setScalar(fs),this.reach=i,t.backgroundNode=wr(),t.fog=new sr(new tr(ps),10*e,.55*s),t.add(this.ground,this.sun,this.sun.target,new ir(14478328,9211746,1.3))}set shadows(t){this.sun.castShadow=t}around(t){let e=2*this.reach/fs*16,s=i=>Math.round(i/e)*e;this.sun.target.position.set(s(t.x),0,s(t.z)),this.sun.position.copy(this.sun.target.position).addScaledVector(J,2.5*this.reach)}};import{DoubleSide as _r,MeshStandardNodeMaterial as Sr,TSL as Mr}from"./three.webgpu.js";import{DoubleSide as Sa,MeshDepthMaterial as Ma,MeshStandardMaterial as Ea,RGBADepthPacking as Aa}from"./three.webgpu.js";var br=["bark","stalks"],vr=["leaves","blades","pinnae"];function ms({surfaces:n}){let[t,e]=typeof n=="string"?n.split(", "):[];return br.includes(t)&&vr.includes(e)?[t,e]:null}var xr=`
 float athIn=athInside();
 diffuseColor.a=clamp(athIn/max(fwidth(athIn),1e-4)+.5,.0,1.);
 #ifdef ALPHA_TO_COVERAGE
@@ -6,8 +892,8 @@ if (diffuseColor.a<.02) discard;
 #else
 if (diffuseColor.a<.5) discard;
 #endif
-`,jt=`
-${et}
+`,Oa=`
+${xr}
 bool athIsLeaf=athUv.x>=1.;
 float athThin=.0,athBump=.0;
 if (athIsLeaf){
@@ -37,4 +923,4 @@ bark=mix(bark,bark*vec3(.85,.92,.8),age);
 diffuseColor.rgb=mix(bark,vec3(.17,.19,.12),.35*lichen*athBump);
 #endif
 }
-`;var{Fn:K,abs:Y,attribute:at,clamp:X,dot:st,float:U,floor:rt,fract:it,fwidth:de,max:Z,mix:z,mx_noise_float:fe,normalWorld:ct,pow:j,select:F,sin:me,smoothstep:q,vec3:P}=nt;function lt(o,e){if(o==="blades")return U(2);if(o==="pinnae")return U(.97).sub(j(Y(me(e.mul(40.84).add(1.5708))),3).mul(.55).mul(e.mul(-.6).add(1)));let t=X(e.sub(.1).div(.9),0,1);return Z(j(me(j(t,.8).mul(Math.PI)),.8).mul(.92),F(e.lessThan(.2),U(.04),U(0)))}function J(o,e){let t=he(o),n=new ot({color:t?16777215:8362581,roughness:.8,side:tt});if(!t)return n;let[a,s]=t,h=at("uv","vec2"),d=h.x,c=h.y,l=d.greaterThanEqual(1),u=rt(d.sub(1).mul(.5)).div(7),i=it(d.sub(1).mul(.5)).mul(4).sub(1),f=K(()=>{let A=z(P(.062,.155,.018),P(.145,.255,.03),u).toVar();s==="blades"&&A.mulAssign(q(0,.45,c).mul(.6).add(.5));let O=q(.08,0,Y(i)).mul(q(.12,.03,de(c)));return z(A,A.mul(1.5).add(.015),O.mul(.5))}),y=K(()=>{if(a==="stalks")return z(P(.1,.075,.03),P(.12,.17,.04),X(c.mul(.02),0,1));let A=fe(P(d.mul(11),c.mul(2.6),4)).mul(.6).add(fe(P(d.mul(18),c.mul(16),9)).mul(.3)).add(.45);return z(P(.05,.037,.027),P(.27,.215,.165),X(A,0,1))}),I=F(l,f(),y());n.colorNode=I;let T=K(()=>{let A=lt(s,c).sub(Y(i)),O=Z(de(A),1e-4);return F(l,A.div(O).add(.5),U(1))});n.opacityNode=T(),n.alphaTest=.5;let N=Z(st(ct,P(e.x,e.y,e.z)).negate(),0);return n.emissiveNode=F(l,I.mul(P(1.5,1.45,.45)).mul(N).mul(.8),P(0)),n}var ht=12e3,dt=Math.PI*(3-Math.sqrt(5)),ue=({sphere:o},e,t=1)=>1.1*o.radius*t*Math.sqrt(e);function pe({metadata:o,motion:e,rest:t},n,a){let s=e.duration||1,h=o.up_axis==="z";return Array.from({length:n},(d,c)=>{let l=a*Math.sqrt((c+.3)/n),u=c*dt+.5*Math.sin(c*12.9898),i=.75+.5*(Math.sin(c*78.233)*.5+.5),f=l*Math.cos(u),y=l*Math.sin(u);return{...h?{x:f,y,z:t[2]*(1-i)}:{x:f,y:t[1]*(1-i),z:y},size:i,angle:c*2.4,seconds:c*.7548776662%1*s}})}var ge=(o,{metadata:e})=>o.map(({x:t,y:n,z:a})=>e.up_axis==="z"?[t,-n]:[t,a]);function xe(o,e,t,n){return Array.from({length:Math.min(ht,Math.round(e*o.length))},(a,s)=>{let[h,d]=o[Math.floor(s/e)],c=Math.floor(s%e/3),l=20*n,u=2*Math.PI*S(Math.floor(s/e)*7+c+1,l),i=t*(.12+.88*S(Math.floor(s/e)*5+c+1,l+1)),f=.16*t*Math.sqrt(S(s+1,l+2)),y=2*Math.PI*S(s+1,l+3);return{x:h+i*Math.cos(u)+f*Math.cos(y),z:d+i*Math.sin(u)+f*Math.sin(y),size:.8+.8*S(s+1,l+4),angle:2*Math.PI*S(s+1,l+5),seconds:100*S(s+1,l+6)}})}function we(o,{metadata:e,rest:t}){return e.up_axis==="z"?o.map(({x:n,z:a,size:s,...h})=>({...h,size:s,x:n,y:-a,z:t[2]*(1-s)})):o.map(({size:n,...a})=>({...a,size:n,y:t[1]*(1-n)}))}var ft=4;function ve(o){let e=o.getAll("each").map(Number);return o.getAll("floor").map((t,n)=>({source:t,each:e[n]>0?e[n]:ft}))}var ye=["The file cannot be fetched","The server did not answer, or it has no such file. Check the address, and whether you are online."],be=["The file is cut off too early","Its end is missing, as after a download that was interrupted. Get it again."],mt={NOT_AN_ATH_FILE:["This is not an .ath file","It begins as another kind of file. If it came from the web, its address may lead to a page about the file and not to the file."],NO_MOTION:["This GLB holds no plant that moves","athcodec encode FILE.glb --into OUT.glb puts the motion of its animation into it."],UNSUPPORTED_VERSION:["This file is of another version of the format","A newer viewer may show it, or the file can be made again from its source."],HTTP:ye,NETWORK:ye,MISSING:be,TRUNCATED:be,NEEDS_HOST_MESH:["This file needs the mesh that it was made for","It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],UNSUPPORTED_FEATURE:["This file uses something newer than this viewer","A newer viewer may show it."],WRONG_HOST_MESH:["The mesh is not the one that this file was made for","The file fits one mesh alone, point for point."],CLIP:["The file has no such clip","The address names a clip that is not in the file."],CHANGED:["The file has changed","While it was loading, another one took its place. Load it again."],WORKER:["The decoder cannot be started","The page is not complete: ath_worker.js belongs beside it."],GRAPHICS:["This browser cannot draw in 3D","The page needs WebGL 2. It may be turned off in the browser's settings."]},ut=["The file is damaged","Some of its bytes are not what they were when it was made. Get it again."],pt=["HTTP","NETWORK","MISSING","TRUNCATED","CHANGED","WORKER"];function Se(o){let[e,t]=mt[o]??ut;return{title:e,advice:t,passing:pt.includes(o)}}import{Euler as Me,Vector3 as Q}from"three/webgpu";var G={KeyW:[0,1],ArrowUp:[0,1],KeyS:[0,-1],ArrowDown:[0,-1],KeyA:[-1,0],ArrowLeft:[-1,0],KeyD:[1,0],ArrowRight:[1,0]},gt=2.6,Ee=.0035,Te=1.3,xt=.12,B=class{on=!1;#e=new Set;#o=[0,0];#n=new Q;#t=new Me(0,0,0,"YXZ");constructor(e,t,n,{height:a,speed:s,changed:h}){Object.assign(this,{camera:e,canvas:t,height:a,speed:s,changed:h}),addEventListener("keydown",d=>this.#a(d)),addEventListener("keyup",({code:d})=>this.#e.delete(d)),addEventListener("blur",()=>this.#e.clear()),t.addEventListener("pointermove",d=>this.#s(d)),this.#r(n)}begin(){if(this.on)return;let{camera:e}=this,t=e.getWorldDirection(new Q);this.on=!0,this.#t.set(Math.max(-.3,Math.min(Math.asin(t.y),.1)),Math.atan2(-t.x,-t.z),0),this.changed(!0)}end(){this.on&&(this.on=!1,this.#e.clear(),this.changed(!1))}#a(e){let{code:t,target:n}=e;e.ctrlKey||e.metaKey||e.altKey||n.closest?.("input, button")||(t==="Escape"&&this.end(),!(!(t in G)&&!t.startsWith("Shift"))&&(this.#e.add(t),t in G&&(e.preventDefault(),this.begin())))}#s({buttons:e,movementX:t,movementY:n}){!this.on||!(e&1)||(this.#t.y+=Ee*t,this.#t.x=Math.max(-Te,Math.min(this.#t.x+Ee*n,Te)))}#r(e){let t=a=>{let{left:s,top:h,width:d,height:c}=e.getBoundingClientRect(),l=(a.clientX-s)/d*2-1,u=1-(a.clientY-h)/c*2,i=Math.max(1,Math.hypot(l,u));this.#o=[l/i,u/i],e.style.setProperty("--x",l/i),e.style.setProperty("--y",-u/i)},n=()=>{this.#o=[0,0],e.style.setProperty("--x",0),e.style.setProperty("--y",0)};e.addEventListener("pointerdown",a=>{e.setPointerCapture(a.pointerId),this.begin(),t(a)}),e.addEventListener("pointermove",a=>{e.hasPointerCapture(a.pointerId)&&t(a)});for(let a of["pointerup","pointercancel"])e.addEventListener(a,n)}update(e){if(!this.on)return;let t=[...this.#e].reduce(([c,l],u)=>[c+(G[u]?.[0]??0),l+(G[u]?.[1]??0)],this.#o),n=Math.max(1,Math.hypot(...t)),a=this.speed*([...this.#e].some(c=>c.startsWith("Shift"))?gt:1),s=new Q(t[0]/n,0,-t[1]/n).multiplyScalar(a).applyEuler(new Me(0,this.#t.y,0)),h=1-Math.exp(-e/xt),{position:d}=this.camera;this.#n.lerp(s,h),d.addScaledVector(this.#n,e),d.y+=(this.height-d.y)*(1-Math.exp(-3*e)),this.camera.quaternion.setFromEuler(this.#t)}};var v=o=>document.getElementById(o),R=new URLSearchParams(location.search),W=Number(R.get("count")??1e4),Lt=.85,Ot=.28,Pt=.7,It=40,Nt=12,x={frames:0,milliseconds:0,forest:null,ath:null,error:null};window.athcodecForest=x;var _t=o=>Math.floor(200+55*S(o,3))<<16|Math.floor(215+40*S(o,6))<<8|205;function Oe({motion:{clips:o},metadata:e}){let t=o.map(({name:s})=>e.clips?.[s]?.strength).filter(Number.isFinite),[n,a]=[Math.min(...t),Math.max(...t)];return a>n?{calm:n,wild:a}:null}function Ht(o,e,t){return Promise.all(ve(R).map(async({source:n,each:a},s)=>{let h=await new Ae().loadAsync(n),d=Oe(h),{clips:c}=h.motion,l=()=>J(h.metadata,C),u=new Le(o,h,{material:l}),i=f=>c[d?0:f%c.length].name;return u.setInstances(we(xe(e,a,t,s),h).map((f,y)=>({...f,clip:i(y)}))),{forest:u,winds:d}}))}async function Ct(){if(!await navigator.gpu?.requestAdapter())return null;let o=new Tt({canvas:v("canvas"),antialias:!0});return o.init().then(()=>o.backend.isWebGPUBackend?o:null,()=>null)}async function kt(){let o=await Ct();if(!o){location.replace(`index.html${location.search}#forest=${W}`);return}let e=await new Ae().loadAsync(R.get("file")),t=e.hasFaces,{radius:n}=e.sphere,a=new Le(o,e,{shape:t?void 0:ne(e,wt(e)),material:()=>t?J(e.metadata,C):new bt({roughness:.85,side:yt})}),s=Oe(e),{clips:h}=e.motion,d=s?1:h.length,c=pe(e,W,ue(e,W,Lt)).map((r,g)=>({...r,clip:h[g%d].name,tint:_t(g)}));a.setInstances(c);let l=await Ht(o,ge(c,e),.9*n),u=new Mt,i=new St(40,1,.02*n,400*n),f=new At(i,v("canvas")),y=new D(u,n),I=/swiftshader|llvmpipe/i.test(o.backend.device.adapterInfo?.architecture??""),T=new B(i,v("canvas"),v("stick"),{height:Ot*n,speed:Pt*n,changed:r=>A(r)});o.toneMapping=vt,o.shadowMap.enabled=!0,y.shadows=R.get("quality")==="full"||!I,u.add(a,...l.map(r=>r.forest)),i.position.set(3*n,2.4*n,8*n),f.target.set(0,.9*n,0),f.maxPolarAngle=.49*Math.PI,f.maxDistance=150*n,f.enableDamping=!0,Object.assign(x,{ath:e,forest:a,floor:l.map(r=>r.forest),renderer:o,camera:i,controls:f,scene:u,walk:T,time:null,seconds:0,playing:!0});let N=r=>{x.moves=r,v("play").textContent=r?"Pause":"Play"};N(!matchMedia("(prefers-reduced-motion: reduce)").matches),v("play").addEventListener("click",()=>N(!x.moves));let A=r=>{v("walk").setAttribute("aria-pressed",r),f.enabled=!r,r||f.target.copy(i.position).add(i.getWorldDirection(new Et).multiplyScalar(4*n)).setY(.9*n)};v("walk").addEventListener("click",()=>T.on?T.end():T.begin()),s&&Object.assign(v("strength"),{min:s.calm,max:s.wild,step:(s.wild-s.calm)/100,value:s.wild});let O=()=>{let r=Number(v("strength").value),g=Number(v("heading").value);v("strength-value").textContent=r.toFixed(1),v("heading-value").textContent=`${g}°`;for(let{forest:b,winds:E}of[{forest:a,winds:s},...l])E&&b.wind(s?r:E.calm+.5*r*(E.wild-E.calm)),b.sway(E||s?1:r,g*Math.PI/180)};for(let r of["strength","heading"])v(r).addEventListener("input",O);O();let p=null,m=0,w=r=>{m=r>It?m+1:0,!(m<Nt||R.get("quality")==="full")&&(m=0,y.sun.castShadow?y.shadows=!1:o.setPixelRatio(1))},M=r=>{let g=p===null?0:r-p;p=r,w(g),T.update(Math.min(g,1e3)/1e3),y.around(T.on?i.position:f.target);let{clientWidth:b,clientHeight:E}=v("canvas");(b!==x.width||E!==x.height)&&(Object.assign(x,{width:b,height:E}),o.setPixelRatio(Math.min(devicePixelRatio,2)),o.setSize(b,E,!1),i.aspect=b/E,i.updateProjectionMatrix()),T.on||f.update();let _=performance.now();x.moves&&(x.seconds+=g/1e3);for(let Pe of[a,...x.floor])Pe.update(i,E,x.time??x.seconds);x.milliseconds=performance.now()-_,o.render(u,i),x.frames++},L=()=>{let r=[a,...x.floor].reduce((g,{bytesOfMotion:b})=>g+b,0)/1e3;v("status").textContent=`${W.toLocaleString("en")} plants, ${Math.round(r).toLocaleString("en")} kB of motion on the graphics card`};for(let r of[a,...x.floor])r.addEventListener("level",L);o.setAnimationLoop(r=>{x.playing&&M(r)}),x.draw=M}kt().catch(o=>{let{title:e,advice:t}=Se(o.codeName);x.error=o.message,Object.assign(v("status"),{textContent:o.codeName?`${e}. ${t}`:o.message,title:o.message,className:"wrong"}),v("controls").hidden=!0});
+`;var{Fn:ae,abs:ce,attribute:Er,clamp:ue,dot:Ar,float:pt,floor:Or,fract:Tr,fwidth:gs,max:fe,mix:Ut,mx_noise_float:ws,normalWorld:Pr,pow:he,select:zt,sin:ys,smoothstep:le,vec3:z}=Mr;function Dr(n,t){if(n==="blades")return pt(2);if(n==="pinnae")return pt(.97).sub(he(ce(ys(t.mul(40.84).add(1.5708))),3).mul(.55).mul(t.mul(-.6).add(1)));let e=ue(t.sub(.1).div(.9),0,1);return fe(he(ys(he(e,.8).mul(Math.PI)),.8).mul(.92),zt(t.lessThan(.2),pt(.04),pt(0)))}function de(n,t){let e=ms(n),s=new Sr({color:e?16777215:8362581,roughness:.8,side:_r});if(!e)return s;let[i,o]=e,r=Er("uv","vec2"),a=r.x,h=r.y,l=a.greaterThanEqual(1),c=Or(a.sub(1).mul(.5)).div(7),u=Tr(a.sub(1).mul(.5)).mul(4).sub(1),f=ae(()=>{let _=Ut(z(.062,.155,.018),z(.145,.255,.03),c).toVar();o==="blades"&&_.mulAssign(le(0,.45,h).mul(.6).add(.5));let v=le(.08,0,ce(u)).mul(le(.12,.03,gs(h)));return Ut(_,_.mul(1.5).add(.015),v.mul(.5))}),d=ae(()=>{if(i==="stalks")return Ut(z(.1,.075,.03),z(.12,.17,.04),ue(h.mul(.02),0,1));let _=ws(z(a.mul(11),h.mul(2.6),4)).mul(.6).add(ws(z(a.mul(18),h.mul(16),9)).mul(.3)).add(.45);return Ut(z(.05,.037,.027),z(.27,.215,.165),ue(_,0,1))}),p=zt(l,f(),d());s.colorNode=p;let m=ae(()=>{let _=Dr(o,h).sub(ce(u)),v=fe(gs(_),1e-4);return zt(l,_.div(v).add(.5),pt(1))});s.opacityNode=m(),s.alphaTest=.5;let b=fe(Ar(Pr,z(t.x,t.y,t.z)).negate(),0);return s.emissiveNode=zt(l,p.mul(z(1.5,1.45,.45)).mul(b).mul(.8),z(0)),s}var Rr=12e3,Cr=Math.PI*(3-Math.sqrt(5)),bs=({sphere:n},t,e=1)=>1.1*n.radius*e*Math.sqrt(t);function vs({metadata:n,motion:t,rest:e},s,i){let o=t.duration||1,r=n.up_axis==="z";return Array.from({length:s},(a,h)=>{let l=i*Math.sqrt((h+.3)/s),c=h*Cr+.5*Math.sin(h*12.9898),u=.75+.5*(Math.sin(h*78.233)*.5+.5),f=l*Math.cos(c),d=l*Math.sin(c);return{...r?{x:f,y:d,z:e[2]*(1-u)}:{x:f,y:e[1]*(1-u),z:d},size:u,angle:h*2.4,seconds:h*.7548776662%1*o}})}var xs=(n,{metadata:t})=>n.map(({x:e,y:s,z:i})=>t.up_axis==="z"?[e,-s]:[e,i]);function _s(n,t,e,s){return Array.from({length:Math.min(Rr,Math.round(t*n.length))},(i,o)=>{let[r,a]=n[Math.floor(o/t)],h=Math.floor(o%t/3),l=20*s,c=2*Math.PI*C(Math.floor(o/t)*7+h+1,l),u=e*(.12+.88*C(Math.floor(o/t)*5+h+1,l+1)),f=.16*e*Math.sqrt(C(o+1,l+2)),d=2*Math.PI*C(o+1,l+3);return{x:r+u*Math.cos(c)+f*Math.cos(d),z:a+u*Math.sin(c)+f*Math.sin(d),size:.8+.8*C(o+1,l+4),angle:2*Math.PI*C(o+1,l+5),seconds:100*C(o+1,l+6)}})}function Ss(n,{metadata:t,rest:e}){return t.up_axis==="z"?n.map(({x:s,z:i,size:o,...r})=>({...r,size:o,x:s,y:-i,z:e[2]*(1-o)})):n.map(({size:s,...i})=>({...i,size:s,y:e[1]*(1-s)}))}var kr=4;function Ms(n){let t=n.getAll("each").map(Number);return n.getAll("floor").map((e,s)=>({source:e,each:t[s]>0?t[s]:kr}))}var Es=["The file cannot be fetched","The server did not answer, or it has no such file. Check the address, and whether you are online."],As=["The file is cut off too early","Its end is missing, as after a download that was interrupted. Get it again."],Nr={NOT_AN_ATH_FILE:["This is not an .ath file","It begins as another kind of file. If it came from the web, its address may lead to a page about the file and not to the file."],NO_MOTION:["This GLB holds no plant that moves","athcodec encode FILE.glb --into OUT.glb puts the motion of its animation into it."],UNSUPPORTED_VERSION:["This file is of another version of the format","A newer viewer may show it, or the file can be made again from its source."],HTTP:Es,NETWORK:Es,MISSING:As,TRUNCATED:As,NEEDS_HOST_MESH:["This file needs the mesh that it was made for","It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],UNSUPPORTED_FEATURE:["This file uses something newer than this viewer","A newer viewer may show it."],WRONG_HOST_MESH:["The mesh is not the one that this file was made for","The file fits one mesh alone, point for point."],CLIP:["The file has no such clip","The address names a clip that is not in the file."],CHANGED:["The file has changed","While it was loading, another one took its place. Load it again."],WORKER:["The decoder cannot be started","The page is not complete: ath_worker.js belongs beside it."],GRAPHICS:["This browser cannot draw in 3D","The page needs WebGL 2. It may be turned off in the browser's settings."]},Ir=["The file is damaged","Some of its bytes are not what they were when it was made. Get it again."],Lr=["HTTP","NETWORK","MISSING","TRUNCATED","CHANGED","WORKER"];function Os(n){let[t,e]=Nr[n]??Ir;return{title:t,advice:e,passing:Lr.includes(n)}}import{Euler as Ts,Vector3 as pe}from"./three.webgpu.js";var Ft={KeyW:[0,1],ArrowUp:[0,1],KeyS:[0,-1],ArrowDown:[0,-1],KeyA:[-1,0],ArrowLeft:[-1,0],KeyD:[1,0],ArrowRight:[1,0]},Ur=2.6,Ps=.0035,Ds=1.3,zr=.12,Bt=class{on=!1;#t=new Set;#e=[0,0];#i=new pe;#r=new Ts(0,0,0,"YXZ");constructor(t,e,s,{height:i,speed:o,changed:r}){Object.assign(this,{camera:t,canvas:e,height:i,speed:o,changed:r}),addEventListener("keydown",a=>this.#o(a)),addEventListener("keyup",({code:a})=>this.#t.delete(a)),addEventListener("blur",()=>this.#t.clear()),e.addEventListener("pointermove",a=>this.#s(a)),this.#a(s)}begin(){if(this.on)return;let{camera:t}=this,e=t.getWorldDirection(new pe);this.on=!0,this.#r.set(Math.max(-.3,Math.min(Math.asin(e.y),.1)),Math.atan2(-e.x,-e.z),0),this.changed(!0)}end(){this.on&&(this.on=!1,this.#t.clear(),this.changed(!1))}#o(t){let{code:e,target:s}=t;t.ctrlKey||t.metaKey||t.altKey||s.closest?.("input, button")||(e==="Escape"&&this.end(),!(!(e in Ft)&&!e.startsWith("Shift"))&&(this.#t.add(e),e in Ft&&(t.preventDefault(),this.begin())))}#s({buttons:t,movementX:e,movementY:s}){!this.on||!(t&1)||(this.#r.y+=Ps*e,this.#r.x=Math.max(-Ds,Math.min(this.#r.x+Ps*s,Ds)))}#a(t){let e=i=>{let{left:o,top:r,width:a,height:h}=t.getBoundingClientRect(),l=(i.clientX-o)/a*2-1,c=1-(i.clientY-r)/h*2,u=Math.max(1,Math.hypot(l,c));this.#e=[l/u,c/u],t.style.setProperty("--x",l/u),t.style.setProperty("--y",-c/u)},s=()=>{this.#e=[0,0],t.style.setProperty("--x",0),t.style.setProperty("--y",0)};t.addEventListener("pointerdown",i=>{t.setPointerCapture(i.pointerId),this.begin(),e(i)}),t.addEventListener("pointermove",i=>{t.hasPointerCapture(i.pointerId)&&e(i)});for(let i of["pointerup","pointercancel"])t.addEventListener(i,s)}update(t){if(!this.on)return;let e=[...this.#t].reduce(([h,l],c)=>[h+(Ft[c]?.[0]??0),l+(Ft[c]?.[1]??0)],this.#e),s=Math.max(1,Math.hypot(...e)),i=this.speed*([...this.#t].some(h=>h.startsWith("Shift"))?Ur:1),o=new pe(e[0]/s,0,-e[1]/s).multiplyScalar(i).applyEuler(new Ts(0,this.#r.y,0)),r=1-Math.exp(-t/zr),{position:a}=this.camera;this.#i.lerp(o,r),a.addScaledVector(this.#i,t),a.y+=(this.height-a.y)*(1-Math.exp(-3*t)),this.camera.quaternion.setFromEuler(this.#r)}};var D=n=>document.getElementById(n),mt=new URLSearchParams(location.search),jt=Number(mt.get("count")??1e4),qr=.85,Yr=.28,Kr=.7,Xr=40,Zr=12,O={modules:{three:Fr,loading:te},frames:0,milliseconds:0,forest:null,ath:null,error:null};window.athcodecForest=O;var Jr=n=>Math.floor(200+55*C(n,3))<<16|Math.floor(215+40*C(n,6))<<8|205;function Rs({motion:{clips:n},metadata:t}){let e=n.map(({name:o})=>t.clips?.[o]?.strength).filter(Number.isFinite),[s,i]=[Math.min(...e),Math.max(...e)];return i>s?{calm:s,wild:i}:null}function Qr(n,t,e){return Promise.all(Ms(mt).map(async({source:s,each:i},o)=>{let r=await new K().loadAsync(s),a=Rs(r),{clips:h}=r.motion,l=()=>de(r.metadata,J),c=new st(n,r,{material:l}),u=f=>h[a?0:f%h.length].name;return c.setInstances(Ss(_s(t,i,e,o),r).map((f,d)=>({...f,clip:u(d)}))),{forest:c,winds:a}}))}async function tn(){if(!await navigator.gpu?.requestAdapter())return null;let n=new $r({canvas:D("canvas"),antialias:!0});return n.init().then(()=>n.backend.isWebGPUBackend?n:null,()=>null)}async function en(){let n=await tn();if(!n){location.replace(`index.html${location.search}#forest=${jt}`);return}let t=await new K().loadAsync(mt.get("file")),e=t.hasFaces,{radius:s}=t.sphere,i=new st(n,t,{shape:e?void 0:hs(t,X(t)),material:()=>e?de(t.metadata,J):new Hr({roughness:.85,side:jr})}),o=Rs(t),{clips:r}=t.motion,a=o?1:r.length,h=vs(t,jt,bs(t,jt,qr)).map((w,M)=>({...w,clip:r[M%a].name,tint:Jr(M)}));i.setInstances(h);let l=await Qr(n,xs(h,t),.9*s),c=new Vr,u=new Wr(40,1,.02*s,400*s),f=new Nt(u,D("canvas")),d=new Lt(c,s),p=/swiftshader|llvmpipe/i.test(n.backend.device.adapterInfo?.architecture??""),m=new Bt(u,D("canvas"),D("stick"),{height:Yr*s,speed:Kr*s,changed:w=>_(w)});n.toneMapping=Br,n.shadowMap.enabled=!0,d.shadows=mt.get("quality")==="full"||!p,c.add(i,...l.map(w=>w.forest)),u.position.set(3*s,2.4*s,8*s),f.target.set(0,.9*s,0),f.maxPolarAngle=.49*Math.PI,f.maxDistance=150*s,f.enableDamping=!0,Object.assign(O,{ath:t,forest:i,floor:l.map(w=>w.forest),renderer:n,camera:u,controls:f,scene:c,walk:m,time:null,seconds:0,playing:!0});let b=w=>{O.moves=w,D("play").textContent=w?"Pause":"Play"};b(!matchMedia("(prefers-reduced-motion: reduce)").matches),D("play").addEventListener("click",()=>b(!O.moves));let _=w=>{D("walk").setAttribute("aria-pressed",w),f.enabled=!w,w||f.target.copy(u.position).add(u.getWorldDirection(new Gr).multiplyScalar(4*s)).setY(.9*s)};D("walk").addEventListener("click",()=>m.on?m.end():m.begin()),o&&Object.assign(D("strength"),{min:o.calm,max:o.wild,step:(o.wild-o.calm)/100,value:o.wild});let v=()=>{let w=Number(D("strength").value),M=Number(D("heading").value);D("strength-value").textContent=w.toFixed(1),D("heading-value").textContent=`${M}°`;for(let{forest:T,winds:P}of[{forest:i,winds:o},...l])P&&T.wind(o?w:P.calm+.5*w*(P.wild-P.calm)),T.sway(P||o?1:w,M*Math.PI/180)};for(let w of["strength","heading"])D(w).addEventListener("input",v);v();let g=null,y=0,S=w=>{y=w>Xr?y+1:0,!(y<Zr||mt.get("quality")==="full")&&(y=0,d.sun.castShadow?d.shadows=!1:n.setPixelRatio(1))},E=w=>{let M=g===null?0:w-g;g=w,S(M),m.update(Math.min(M,1e3)/1e3),d.around(m.on?u.position:f.target);let{clientWidth:T,clientHeight:P}=D("canvas");(T!==O.width||P!==O.height)&&(Object.assign(O,{width:T,height:P}),n.setPixelRatio(Math.min(devicePixelRatio,2)),n.setSize(T,P,!1),u.aspect=T/P,u.updateProjectionMatrix()),m.on||f.update();let I=performance.now();O.moves&&(O.seconds+=M/1e3);for(let Ht of[i,...O.floor])Ht.update(u,P,O.time??O.seconds);O.milliseconds=performance.now()-I,n.render(c,u),O.frames++},R=()=>{let w=[i,...O.floor].reduce((M,{bytesOfMotion:T})=>M+T,0)/1e3;D("status").textContent=`${jt.toLocaleString("en")} plants, ${Math.round(w).toLocaleString("en")} kB of motion on the graphics card`};for(let w of[i,...O.floor])w.addEventListener("level",R);n.setAnimationLoop(w=>{O.playing&&E(w)}),O.draw=E}en().catch(n=>{let{title:t,advice:e}=Os(n.codeName);O.error=n.message,Object.assign(D("status"),{textContent:n.codeName?`${t}. ${e}`:n.message,title:n.message,className:"wrong"}),D("controls").hidden=!0});
