@@ -39,7 +39,8 @@ def framed(page):
 
 def test_an_exported_page_plays_in_a_sandboxed_frame(watched, sample_ath, tmp_path):
     view.export_page(sample_ath, tmp_path / "plant.html")
-    outer = '<!doctype html><link rel="icon" href="data:,"><iframe sandbox="allow-scripts" src="/plant.html" width="800" height="600"></iframe>'
+    frame = '<iframe sandbox="allow-scripts" src="/plant.html" width="800" height="600"></iframe>'
+    outer = f'<!doctype html><link rel="icon" href="data:,">{frame}'
     with ThrottledServer({"plant.html": (tmp_path / "plant.html").read_bytes(), "o.html": outer.encode()}) as line:
         watched.goto(f"{line.address}o.html")
         framed(watched).wait_for_function(MOVES)
@@ -62,7 +63,7 @@ def test_the_page_plays_under_a_policy_without_inline_scripts(watched, sample_at
 
 
 def test_three_and_the_decoder_come_in_parallel_with_the_front_of_the_file(watched, sample_ath):
-    """three.js is not answered before the worker and the file are asked for: one after the other, that would never be."""
+    """three.js is not answered before the worker and the file are asked for, which else would never be."""
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
         asked = {"ath_worker.js": threading.Event(), "tree.ath": threading.Event()}
         held = []

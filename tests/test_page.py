@@ -98,8 +98,7 @@ def test_one_sentence_says_what_the_file_holds_and_how_small_it_is(page, sample_
 
 def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     with athcodec.open(sample_ath) as decoder:
-        level = decoder.levels[0]
-        size, error = decoder.file.prelude_length + level.byte_size, level.max_error
+        size, error = decoder.levels[0].bytes, decoder.levels[0].max_error
     chip = page.inner_text("#level-choice [data-value='0']").replace("\xa0", " ").split("\n")
     assert [chip[0], chip[1]] == [f"{size / 1e3:.0f} kB", f"{100 * error:.2g} cm"]
     assert not page.is_visible("#level")
@@ -220,7 +219,7 @@ def test_wind_is_one_weight_from_calm_to_gale_and_the_gale_comes_first(opened_fi
 
 
 def test_a_file_opens_with_the_story_of_how_it_comes(opened_file, windy, opened):
-    """Six seconds of what has come beside all of it, unless somebody does anything; not where an address says what is seen."""
+    """What has come beside all of it, unless somebody does anything; not where an address says what is seen."""
     with ThrottledServer({"tree.ath": windy}) as line:
         page = opened(line.page("tree.ath", intro="on"), "globalThis.athcodecViewer?.state.intro")
         words = "document.getElementById('split-left').textContent.startsWith('What has come')"
@@ -441,7 +440,8 @@ def test_a_line_says_what_of_an_address_was_not_understood(opened, sample_ath):
         assert all(value == text.lower() for pairs in words.values() for value, text in pairs), words
 
 
-BUTTONS = """(group) => [...document.querySelectorAll(`#${group} button`)].map((each) => [each.dataset.value, each.textContent])"""
+BUTTONS = """(group) => [...document.querySelectorAll(`#${group} button`)]
+  .map((each) => [each.dataset.value, each.textContent])"""
 
 
 @pytest.mark.parametrize(
@@ -465,6 +465,12 @@ def test_a_dropped_file_of_another_program_is_named_with_the_command_that_encode
             assert f"athcodec encode {quoted[0]} {quoted[1]}" in page.inner_text("#message p")
 
 
+CUT_OFF = """() => [...document.querySelectorAll("h1, #sizes, #sizes *, #arrived, #clock, footer")].filter((each) => {
+  const { left, right } = each.getBoundingClientRect(), { clientWidth, scrollWidth } = each;
+  return each.checkVisibility() && (left < 0 || right > innerWidth || (clientWidth > 0 && scrollWidth > clientWidth + 1));
+}).map((each) => each.id || each.tagName)"""
+
+
 @pytest.mark.parametrize("font", [16, 32])
 def test_a_page_of_320_pixels_reflows_and_its_text_follows_the_font_size(browser, sample_ath, font):
     page = browser.new_page(viewport={"width": 320, "height": 640})
@@ -473,12 +479,9 @@ def test_a_page_of_320_pixels_reflows_and_its_text_follows_the_font_size(browser
         page.goto(line.page("tree.ath"))
         page.wait_for_function("() => globalThis.athcodecViewer?.motion?.complete")
         page.evaluate(f"document.documentElement.style.fontSize = '{font}px'")
-        wide = page.evaluate("""() => [...document.querySelectorAll("h1, #sizes, #sizes *, #arrived, #clock, footer")].filter((each) => {
-          const { left, right } = each.getBoundingClientRect();
-          return each.checkVisibility() && (left < 0 || right > innerWidth || each.scrollWidth > each.clientWidth + 1 && each.clientWidth > 0);
-        }).map((each) => each.id || each.tagName)""")
+        wide = page.evaluate(CUT_OFF)
         assert wide == []
-        assert page.evaluate("getComputedStyle(document.querySelector('#sizes')).fontSize") == f"{0.875 * font}px"
+        assert page.evaluate("getComputedStyle(document.querySelector('#sizes')).fontSize") == f"{0.875 * font:g}px"
     page.close()
 
 

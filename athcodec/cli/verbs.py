@@ -58,7 +58,7 @@ from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.facts import facts_of
 from athcodec.errors import AthError, ClipError
 from athcodec.files.atomic import scratch_folder
-from athcodec.files.shown import counted, echo, print_table
+from athcodec.files.shown import echo, print_table
 from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders

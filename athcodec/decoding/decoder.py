@@ -166,8 +166,9 @@ class Decoder(ArrayLike):
         return self.show()._repr_html_() + report
 
     def show(self, height: int = 480) -> Frame:
-        """Return the plant in motion, for the last value of a notebook's cell: the viewer, in a frame that reaches nothing
-        outside of itself.
+        """Return the plant in motion, for the last value of a notebook's cell.
+
+        It is the viewer, in a frame that reaches nothing outside of itself.
 
         Parameters
         ----------

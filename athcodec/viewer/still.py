@@ -1,4 +1,4 @@
-"""A still picture of a plant as SVG, in a few kilobytes and without a browser: what a page shows where scripts are off."""
+"""A still picture of a plant as SVG, in a few kilobytes and without a browser, for pages where scripts are off."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ def still_svg(decoder: Decoder) -> str:
     wood = orders < _STEM_ORDERS
     paths = (_dots(x[wood], y[wood], "#6b5138", 4), _dots(x[~wood], y[~wood], "#5c8a3e", 3))
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIDE} {SIDE}" role="img" aria-label="The plant at rest" '
-        f'fill="none" stroke-linecap="round">{"".join(paths)}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SIDE} {SIDE}" role="img" '
+        f'aria-label="The plant at rest" fill="none" stroke-linecap="round">{"".join(paths)}</svg>'
     )
 
 

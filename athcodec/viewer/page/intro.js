@@ -4,7 +4,7 @@ import { app, main, state } from "./app.js";
 import { $ } from "./ui.js";
 
 const SECONDS = 6;
-let timers = [], isOver = new URLSearchParams(location.search).get("intro") === "off";
+let timers = [], isOver = false;
 
 /** Begins, where nobody has asked for anything else: once, with a file that has several levels, for who likes motion. */
 function beginIntro() {
@@ -34,5 +34,6 @@ function endIntro() {
 
 export default function begin() {
   Object.assign(app, { beginIntro, endIntro });
+  isOver = new URLSearchParams(location.search).get("intro") === "off";
   for (const type of ["pointerdown", "keydown", "wheel"]) addEventListener(type, endIntro, { capture: true, passive: true });
 }
