@@ -426,6 +426,8 @@ def view(args: argparse.Namespace) -> int:
     from athcodec.viewer import view
 
     file = args.file
+    if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
+        raise ClipError(f"--export: got {args.export}, expected PAGE.html")
     floor = dict(args.floor or [])
     with naming(file):
         if args.export:

@@ -20,6 +20,12 @@ class Frame:
         Of the file, and of the clip to begin with. The file is read when the frame is shown.
     height : int
         Height in pixels.
+
+    Examples
+    --------
+    >>> with athcodec.open(athcodec.sample_path("fern")) as fern:
+    ...     fern.show(height=360)
+    <Frame: fern.ath, 360 pixels high; a notebook shows it as the last value of a cell>
     """
 
     def __init__(self, decoder: Decoder, height: int = 480):
