@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import os
 import re
+import socket
+import subprocess
+import sys
 import threading
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from conftest import SLOWEST
+from playwright.sync_api import Error
 
 import athcodec
 from athcodec.viewer import view
@@ -96,11 +104,59 @@ def test_without_scripts_there_are_a_sentence_and_a_still(browser, sample_ath, t
     page.close()
 
 
-def test_a_notebook_plays_a_decoder(watched, sample_ath):
+def test_a_frame_without_an_origin_plays_and_may_be_turned(watched, sample_ath):
+    """As a notebook has it: the page stands in an attribute, and may not change an address."""
     with athcodec.open(sample_ath) as decoder:
         cell = f'<!doctype html><link rel="icon" href="data:,">{decoder.show(height=360)._repr_html_()}'
-        assert decoder.show()._repr_html_() in decoder._repr_html_()
     with ThrottledServer({"cell.html": cell.encode()}) as line:
         watched.goto(f"{line.address}cell.html")
-        framed(watched).wait_for_function(MOVES)
+        frame = framed(watched)
+        frame.wait_for_function(MOVES)
+        frame.evaluate("athcodecViewer.endIntro?.(); athcodecViewer.moveView(1, 0)")
+        frame.wait_for_timeout(700)  # in which the address would be written
         assert watched.locator("iframe").bounding_box()["height"] == 360
+
+
+NOTEBOOK = """{{"cells": [{{"cell_type": "code", "id": "a", "metadata": {{}}, "outputs": [], "execution_count": null,
+  "source": {source}}}], "metadata": {{"kernelspec": {{"name": "python3", "display_name": "Python 3", "language": "python"}}}},
+  "nbformat": 4, "nbformat_minor": 5}}"""
+
+
+@pytest.fixture
+def jupyter(tmp_path):
+    """A notebook server for a notebook of one cell, and its address."""
+    source = json.dumps('import athcodec\nathcodec.open(athcodec.sample_path("fern"))')
+    (tmp_path / "plant.ipynb").write_text(NOTEBOOK.format(source=source))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    options = ["--no-browser", "--allow-root", f"--ServerApp.port={port}", "--IdentityProvider.token=t"]
+    homes = {name: str(tmp_path / name) for name in ("HOME", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "notebook", *options, f"--ServerApp.root_dir={tmp_path}"],
+        env=os.environ | homes,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        yield f"http://127.0.0.1:{port}/notebooks/plant.ipynb?token=t"
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def test_a_notebook_server_plays_the_last_value_of_a_cell(browser, jupyter):
+    page = browser.new_page(viewport={"width": 1100, "height": 900})
+    page.set_default_timeout(SLOWEST)
+    for _ in range(60):
+        with suppress(Error):
+            page.goto(jupyter)
+            break
+        time.sleep(1)
+    page.wait_for_selector(".jp-CodeCell .cm-content")
+    page.wait_for_selector("[data-status=idle], .jp-NotebookKernelStatus")
+    page.click(".jp-CodeCell .cm-content")
+    page.keyboard.press("Shift+Enter")
+    element = page.wait_for_selector("iframe[srcdoc]")
+    element.content_frame().wait_for_function(MOVES)
+    page.close()
