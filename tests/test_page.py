@@ -100,7 +100,7 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     with athcodec.open(sample_ath) as decoder:
         size, error = decoder.levels[0].bytes, decoder.levels[0].max_error
     chip = page.inner_text("#level-choice [data-value='0']").replace("\xa0", " ").split("\n")
-    assert [chip[0], chip[1]] == [f"{size / 1e3:.0f} kB", f"{100 * error:.2g} cm"]
+    assert [chip[0], chip[1]] == [f"{size / 1e3:.1f} kB", f"{100 * error:.2g} cm"]
     assert not page.is_visible("#level")
 
 
@@ -456,13 +456,27 @@ def test_a_dropped_file_of_another_program_is_named_with_the_command_that_encode
     """However it comes: dropped, or by its address."""
     data = head + bytes(100)
     with ThrottledServer({name: data}) as line:
-        page = opened(line.page(), "document.querySelector('#message h2').textContent === 'No file yet'")
+        page = opened(line.page(), "document.querySelectorAll('#samples li').length === 0", quiet="404")
         made = name.rsplit(".", 1)[0] + ".ath"
         quoted = [f"'{each}'" if " " in each else each for each in (name, made)]
         for way in (f"open({{ bytes: Uint8Array.from({list(data)}).buffer }}, {name!r})", f"open('/{name}', {name!r})"):
             page.evaluate(f"athcodecViewer.{way}")
             page.wait_for_function(f"() => document.querySelector('#message h2').textContent === 'This is {kind}'")
             assert f"athcodec encode {quoted[0]} {quoted[1]}" in page.inner_text("#message p")
+
+
+@pytest.mark.parametrize("size", [(1000, 700), (390, 844)])
+def test_a_page_without_a_file_has_samples_that_move_and_a_field_for_an_address(opened, sample_ath, size):
+    names = ("leafed_tree", "fern", "grass")
+    files = {f"sample/{name}.ath": athcodec.sample_path(name.partition("_")[0]).read_bytes() for name in names}
+    with ThrottledServer(files | {"tree.ath": sample_ath.read_bytes()}) as line:
+        moves = "[...document.querySelectorAll('#samples ath-viewer')].every(({ currentTime }) => currentTime > 0.1)"
+        page = opened(line.page(), moves, viewport=dict(zip(("width", "height"), size)))
+        assert page.is_visible("#message-open") and page.inner_text("#message-open") == "Choose a file"
+        page.fill("#where input", f"{line.address}tree.ath")
+        page.click("#where button")
+        page.wait_for_function("() => athcodecViewer.motion?.complete")
+        assert page.url.endswith("tree.ath") and not page.is_visible("#message")
 
 
 CUT_OFF = """() => [...document.querySelectorAll("h1, #sizes, #sizes *, #arrived, #clock, footer")].filter((each) => {

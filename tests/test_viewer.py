@@ -208,6 +208,18 @@ def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_import
     printed("node", "--input-type=module", "-e", script)
 
 
+def test_the_package_has_the_viewers_material():
+    """It has leaves where a file names its surfaces, and is a plain material where it does not."""
+    script = f"""import {{ register }} from "node:module";
+      register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
+      const {{ ATHPlantMaterial }} = await import({json.dumps((WEB / "ATHLoader.js").as_uri())});
+      const shader = {{ vertexShader: "#include <common>", fragmentShader: "#include <map_fragment>" }};
+      new ATHPlantMaterial({{ surfaces: "bark, pinnae" }}).onBeforeCompile(shader);
+      const plain = new ATHPlantMaterial({{ surfaces: "brick" }}), drawn = shader.fragmentShader.includes("athIsLeaf");
+      console.log(JSON.stringify([drawn, shader.fragmentShader.includes("ATH_LEAF 2"), plain.color.getHexString()]));"""
+    assert json.loads(printed("node", "--input-type=module", "-e", script)) == [True, True, "6f8f4a"]
+
+
 @pytest.mark.programs
 def test_the_bundles_are_what_the_sources_make():
     printed(sys.executable, VIEWER / "build_viewer.py", "--check")
@@ -265,7 +277,7 @@ TYPED = """
 import { type Loader, PerspectiveCamera, Scene } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { NodeIO } from "@gltf-transform/core";
-import { type ATH, ATHForest, ATHLimbs, ATHLoader, type ATHMotion } from "athcodec-three";
+import { type ATH, ATHForest, ATHLimbs, ATHLoader, type ATHMotion, ATHPlantMaterial } from "athcodec-three";
 import { athMotion } from "athcodec-three/gltf/three";
 import type { ATHViewerElement } from "athcodec-three/viewer";
 import type { ATHBabylonMotion } from "athcodec-three/gltf/babylon";
@@ -288,6 +300,7 @@ for (const bytes of [new ArrayBuffer(8), new SharedArrayBuffer(8), xyz.subarray(
 new Scene().add(new ATHLimbs(ath, { color: "brown" }).setColor((vertex) => [vertex, 0, 0]));
 const pixelsOff = ({ ath, camera }: ATHViewerElement): number | undefined => ath?.motion.pixelError(0, camera, 9);
 pixelsOff(new HTMLElement() as ATHViewerElement);
+ath.motion.bind(new ATHPlantMaterial(ath.metadata)).roughness = 0.5;
 ath.abort();
 new GLTFLoader().register(athMotion(new ATHLoader()));
 const io = new NodeIO().registerExtensions([ATHMotionExtension]), document = await io.read("tree_motion.glb");

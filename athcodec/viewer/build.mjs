@@ -30,7 +30,7 @@ const onlyModels = (used) => ({ name: "three", setup({ onResolve, onLoad }) {
     contents: `export { ${used.join(", ")} } from "page"; export * from "three/src/Three.Core.js";`, resolveDir: modules }));
 } });
 
-// three.js from its sources: without virtual reality, which no page here enters, and with shaders in few bytes.
+// three.js from its sources: without virtual reality and maps of surroundings, which no page here has, and with shaders in few bytes.
 const NO_XR = `export class WebXRManager {
   enabled = false; isPresenting = false; cameraAutoUpdate = false;
   addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {} getCamera() {}
@@ -38,6 +38,8 @@ const NO_XR = `export class WebXRManager {
 }`;
 const fewBytes = { name: "few bytes", setup: ({ onLoad }) => {
   onLoad({ filter: /WebXRManager\.js$/ }, () => ({ contents: NO_XR }));
+  onLoad({ filter: /WebGLEnvironments\.js$/ }, ({ path }) => // pages have lights and no maps of surroundings
+    ({ contents: readFileSync(path, "utf8").replace(/^import .*PMREMGenerator.*$/m, "class PMREMGenerator {}") }));
   onLoad({ filter: /(ShaderChunk|ShaderLib).\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")) }));
 } };
 

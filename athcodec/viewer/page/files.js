@@ -53,8 +53,9 @@ function openAddress() {
 }
 
 function ask() {
-  say("No file yet", "Drop an .ath file or a GLB that holds one here, or open it. It stays on this computer.");
+  say("Plants in motion", "Look at one of these, or open an .ath file, or a GLB that holds one. A file of yours stays on this device.");
   app.loadingStory(null);
+  app.beginStart();
 }
 
 function say(title, text, technical = "", again = null) {
@@ -65,6 +66,7 @@ function say(title, text, technical = "", again = null) {
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
+  app.endStart();
   breath().then(() => app.staged).then(app.bare);
 }
 
@@ -113,6 +115,7 @@ function close(files) {
 async function open(source, name, beside = false, again = null, clip = null) {
   const wish = ++asked, retry = () => open(source, name, beside, again, clip);
   $("message").hidden = true;
+  app.endStart();
   if (!beside) {
     Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
     $("trouble").hidden = true;
@@ -200,7 +203,7 @@ function choose(beside = "") {
 }
 
 export default function begin() {
-  Object.assign(app, { openAddress, refuse, open, loadAgain, choose });
+  Object.assign(app, { nameOf, openAddress, refuse, open, loadAgain, choose });
   $("open").addEventListener("click", () => choose());
   $("message-open").addEventListener("click", () => choose());
   $("file").addEventListener("change", async () => {

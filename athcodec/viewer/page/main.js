@@ -18,6 +18,7 @@ import { lineMaterial, meshMaterial } from "./plant.js";
 import scripts from "./scripts.js";
 import sharing from "./sharing.js";
 import { Stage } from "./stage.js";
+import start from "./samples.js";
 import story from "./story.js";
 import time from "./time.js";
 import { $ } from "./ui.js";
@@ -95,7 +96,7 @@ async function setUp() {
   }
 }
 
-for (const begin of [address, arrange, camera, clips, files, forests, intro, look, panel, sharing, story, time, wind, scripts, keys]) begin();
+for (const begin of [address, arrange, camera, clips, files, forests, intro, look, panel, sharing, start, story, time, wind, scripts, keys]) begin();
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) app.setPlaying(false);
 app.openAddress();
 loader.preload();
