@@ -118,8 +118,8 @@ def test_a_frame_without_an_origin_plays_and_may_be_turned(watched, sample_ath):
 
 
 NOTEBOOK = """{{"cells": [{{"cell_type": "code", "id": "a", "metadata": {{}}, "outputs": [], "execution_count": null,
-  "source": {source}}}], "metadata": {{"kernelspec": {{"name": "python3", "display_name": "Python 3", "language": "python"}}}},
-  "nbformat": 4, "nbformat_minor": 5}}"""
+  "source": {source}}}], "nbformat": 4, "nbformat_minor": 5,
+  "metadata": {{"kernelspec": {{"name": "python3", "display_name": "Python 3", "language": "python"}}}}}}"""
 
 
 @pytest.fixture

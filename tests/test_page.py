@@ -481,7 +481,8 @@ def test_a_page_without_a_file_has_samples_that_move_and_a_field_for_an_address(
 
 CUT_OFF = """() => [...document.querySelectorAll("h1, #sizes, #sizes *, #arrived, #clock, footer")].filter((each) => {
   const { left, right } = each.getBoundingClientRect(), { clientWidth, scrollWidth } = each;
-  return each.checkVisibility() && (left < 0 || right > innerWidth || (clientWidth > 0 && scrollWidth > clientWidth + 1));
+  return each.checkVisibility()
+    && (left < 0 || right > innerWidth || (clientWidth > 0 && scrollWidth > clientWidth + 1));
 }).map((each) => each.id || each.tagName)"""
 
 

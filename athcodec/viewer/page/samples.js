@@ -7,6 +7,7 @@ import { $ } from "./ui.js";
 
 const FOLDER = "../../sample/"; // beside the viewer in the package and on the documentation's site
 const CLIP = "gale";
+const ALONE = "Open an .ath file, or a GLB that holds one. A file of yours stays on this device.";
 
 const buttons = () => [...$("samples").querySelectorAll("button")];
 
@@ -23,7 +24,9 @@ function beginStart() {
 // A host of the viewer's folder alone has no samples.
 function dropSample(button) {
   button.parentElement.remove();
-  if (buttons().length === 0) $("samples").hidden = true;
+  if (buttons().length > 0) return;
+  $("samples").hidden = true;
+  $("message").querySelector("p").textContent = ALONE;
 }
 
 function endStart() {
