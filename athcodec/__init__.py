@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.opening import open
     from athcodec.sources import read, read_hdf5, sample_path
     from athcodec.truncation import truncate
+    from athcodec.viewer.frame import Frame
 
 __version__ = "0.13.0"
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Comparison",
     "Decoder",
     "Found",
+    "Frame",
     "MotionClip",
     "OntoMesh",
     "OntoReport",
@@ -74,6 +76,7 @@ _LAZY = {
     "motion.joining": ("in_wind", "join", "looped", "split"),
     "sources": ("read", "read_hdf5", "sample_path"),
     "truncation": ("truncate",),
+    "viewer.frame": ("Frame",),
 }
 _MODULES = ("errors", "metrics")
 

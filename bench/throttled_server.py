@@ -48,8 +48,10 @@ class ThrottledServer(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_address[1]}/"
 
     def page(self, name: str | None = None, **more: str) -> str:
-        """The viewer's address with a file."""
-        query = ([f"file=/{name}"] if name else []) + [f"{key}={value}" for key, value in more.items()]
+        """The viewer's address with a file, which it shows without the story of its first seconds."""
+        query = ([f"file=/{name}"] if name else []) + [
+            f"{key}={value}" for key, value in ({"intro": "off"} | more).items()
+        ]
         return self.address + ("?" + "&".join(query) if query else "")
 
     def sent(self, name: str) -> int:

@@ -18,7 +18,7 @@ COMPARE = """([left, right, seconds]) => {
   const press = (group, value) => document.querySelector(`#${group} [data-value="${value}"]`).click();
   athcodecViewer.setPlaying(false);
   press("compare", "levels");
-  press("colour", "distance");
+  press("colour", "error");
   document.getElementById("compare-level").value = left;
   athcodecViewer.setLevel(String(right));
   athcodecViewer.seek(seconds);

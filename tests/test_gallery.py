@@ -1,4 +1,4 @@
-"""Galleries: folders with a page of several plants that start when they come into view, and the documentation's own."""
+"""Pages of several plants that start when they come into view, and the one of the documentation."""
 
 from __future__ import annotations
 
@@ -11,67 +11,12 @@ import pytest
 from conftest import SLOWEST
 
 import athcodec
-from athcodec import cli
-from athcodec.viewer import gallery, picture
 from athcodec.viewer.build_viewer import modules
-from bench.throttled_server import WEB, ThrottledServer
+from bench.throttled_server import ThrottledServer
 
 pytestmark = pytest.mark.web
 
 DOCS = Path(__file__).parents[1] / "docs"
-
-
-def small_files(sample_ath: Path, folder: Path, names: list[str]) -> list[str]:
-    """Copies of one file under several names."""
-    paths = [folder / name for name in names]
-    for path in paths:
-        path.write_bytes(sample_ath.read_bytes())
-    return [str(path) for path in paths]
-
-
-@pytest.fixture
-def bare(monkeypatch):
-    """Without what still pictures take."""
-    monkeypatch.setattr(picture, "browser_path", lambda: None)
-
-
-def test_a_gallery_is_a_folder_with_page_viewer_and_files(sample_ath, bare, tmp_path, capsys):
-    files = small_files(sample_ath, tmp_path, ["oak & ash.ath", "fern.ath"])
-    out = tmp_path / "gallery"
-    assert cli.main(["view", *files, "--export", str(out)]) == 0
-    said = capsys.readouterr()
-    assert f"{out}: 2 plants, " in said.out and "no still pictures" in said.err
-    page = (out / "index.html").read_text("utf-8")
-    assert "<h2>oak &amp; ash</h2>" in page and "CARDS" not in page
-    with athcodec.open(files[0]) as decoder:
-        assert f"{decoder.file.vertex_count:,} points, {decoder.frame_count} frames" in page
-    assert {path.name for path in (out / "plants").iterdir()} == {"oak & ash.ath", "fern.ath"}
-    named = re.findall(r'(?:src|href)="((?:viewer|plants)/[^"?]*)', page) + re.findall(r'": "\./([^"]*)"', page)
-    for name in named:
-        assert (out / name.replace("%20", " ").replace("%26", "&")).is_file(), name
-
-
-def test_a_gallery_refuses_what_it_cannot_show_before_it_writes(sample_ath, bare, tmp_path, capsys):
-    out = tmp_path / "gallery"
-    (tmp_path / "no.ath").write_bytes(b"nothing of the kind")
-    (tmp_path / "else").mkdir()
-    (twin,) = small_files(sample_ath, tmp_path / "else", [sample_ath.name])
-    for files, words in (
-        ([str(sample_ath), str(tmp_path / "no.ath")], "no.ath"),
-        ([str(sample_ath), twin], "names that differ"),
-        (["https://example.org/oak.ath"], "got a URL"),
-    ):
-        assert cli.main(["view", *files, "--export", str(out)]) == 1
-        assert words in capsys.readouterr().err and not out.exists()
-
-
-def test_several_files_are_no_page_and_no_server(sample_ath, tmp_path, capsys):
-    two = [str(sample_ath), str(sample_ath)]
-    assert cli.main(["view", *two, "--export", str(tmp_path / "page.html")]) != 0
-    assert cli.main(["view", *two, "--no-browser"]) != 0
-    assert "--export DIR" in capsys.readouterr().err
-    assert cli.main(["view", *two, "--export", str(tmp_path / "gallery"), "--clip", "calm"]) != 0
-    assert "--clip" in capsys.readouterr().err and not (tmp_path / "gallery").exists()
 
 
 def test_all_that_the_gallery_of_the_documentation_names_is_there():
@@ -86,14 +31,22 @@ def test_all_that_the_gallery_of_the_documentation_names_is_there():
     assert all((viewer / name).is_file() for name in files)
 
 
+MAP = re.search(r'<script type="importmap">(.*?)</script>', (DOCS / "gallery.md").read_text("utf-8"))[0]
+HEAD = f"""<!doctype html><html lang="en"><meta charset="utf-8"><title>Plants</title><link rel="icon" href="data:,">
+  <link rel="stylesheet" href="gallery.css">{MAP.replace("../athcodec/viewer/web/", "./")}
+  <script type="module" src="ath-viewer.js"></script><body class="ath-page"><main>"""
+CARD = """<li><ath-viewer src="{0}" scenery loading="lazy" camera-controls="turn" alt="A tree, moving"></ath-viewer>
+  <h2>{0}</h2><p>A tree</p><p><a href="index.html?file={0}">Open in the viewer</a></p></li>"""
+
+
 @pytest.fixture
-def shown(opened, sample_ath, tmp_path):
-    """The page of a gallery of four plants on a low screen, and `line`, the server that it comes from."""
-    files, out = small_files(sample_ath, tmp_path, [f"tree {number}.ath" for number in range(4)]), tmp_path / "gallery"
-    gallery.export_gallery(files, out, stills=False)
-    made = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*.*")}
-    with ThrottledServer(made) as line:
-        page = opened(line.address, "true", viewport={"width": 360, "height": 360})
+def shown(opened, sample_ath):
+    """A page of four plants on cards on a low screen, and `line`, the server that it comes from."""
+    files = {f"tree{number}.ath": sample_ath.read_bytes() for number in range(4)}
+    cards = f'<h1>Plants</h1><ul class="ath-gallery">{"".join(map(CARD.format, files))}</ul></main>'
+    files |= {"cards.html": f"{HEAD}{cards}".encode(), "grass.ath": athcodec.sample_path("grass").read_bytes()}
+    with ThrottledServer(files) as line:
+        page = opened(f"{line.address}cards.html", "true", viewport={"width": 360, "height": 360})
         page.line = line
         page.evaluate("globalThis.plants = [...document.querySelectorAll('ath-viewer')]")
         yield page
@@ -102,7 +55,7 @@ def shown(opened, sample_ath, tmp_path):
 @pytest.mark.browser
 def test_a_plant_of_a_gallery_starts_when_it_comes_into_view_and_is_given_back_behind(shown):
     shown.wait_for_function("() => plants[0].currentTime > 0.1")
-    assert {name for name, *_ in shown.line.log if name.startswith("plants/")} == {"plants/tree 0.ath"}
+    assert {name for name, *_ in shown.line.log if name.startswith("tree")} == {"tree0.ath"}
     assert shown.evaluate("plants[3].ath") is None
     assert shown.evaluate("plants[3].shadowRoot.querySelector('canvas')") is None
     shown.evaluate("plants[3].scrollIntoView()")
@@ -132,7 +85,7 @@ BESIDE = """() => {
   globalThis.other = document.createElement("ath-viewer");
   other.style.cssText = "display: block; width: 100px; height: 80px";
   other.innerHTML = "<b></b>";
-  other.src = "viewer/gallery.css";
+  other.src = "gallery.css";
   globalThis.failed = new Promise((done) => {
     other.addEventListener("error", ({ detail }) => done(detail.codeName));
   });
@@ -147,16 +100,15 @@ def test_what_stands_in_an_element_is_seen_until_the_plant_is(shown):
     drawn = "other.shadowRoot.querySelector('canvas').classList.contains('drawn')"
     assert shown.evaluate(drawn) is False
     assert shown.evaluate("other.firstChild.getBoundingClientRect().width") == 100
-    shown.evaluate("other.src = 'plants/tree 1.ath'")
+    shown.evaluate("other.src = 'tree1.ath'")
     shown.wait_for_function(f"() => {drawn}")
 
 
 @pytest.mark.browser
-def test_attributes_of_an_element_say_what_it_shows(shown, tmp_path):
-    (tmp_path / "gallery" / "plants" / "grass.ath").write_bytes(athcodec.sample_path("grass").read_bytes())
+def test_attributes_of_an_element_say_what_it_shows(shown):
     shown.evaluate("""() => {
       globalThis.tuft = document.createElement("ath-viewer");
-      const wanted = { src: "plants/grass.ath", clip: "gale", level: 0, alt: "Grass", speed: 4, "camera-controls": "" };
+      const wanted = { src: "grass.ath", clip: "gale", level: 0, alt: "Grass", speed: 4, "camera-controls": "" };
       for (const [name, value] of Object.entries(wanted)) tuft.setAttribute(name, value);
       tuft.style.cssText = "display: block; width: 320px; height: 240px";
       document.body.prepend(tuft);
@@ -170,16 +122,15 @@ def test_attributes_of_an_element_say_what_it_shows(shown, tmp_path):
     shown.evaluate("tuft.removeAttribute('camera-controls')")
     shown.wait_for_function("() => tuft.ath.motion.clip.name === 'calm' && tuft.ath.motion.level > 0")
     assert shown.evaluate("tuft.currentTime === stopped") and shown.evaluate(f"{canvas}.tabIndex") == -1
-    shown.evaluate("tuft.removeAttribute('clip'); tuft.setAttribute('src', 'plants/tree 0.ath')")
+    shown.evaluate("tuft.removeAttribute('clip'); tuft.setAttribute('src', 'tree0.ath')")
     shown.wait_for_function("() => tuft.ath?.motion.clips.length === 1")
 
 
 @pytest.mark.browser
-def test_an_element_shows_a_forest_with_plants_on_its_floor(shown, tmp_path):
-    (tmp_path / "gallery" / "plants" / "grass.ath").write_bytes(athcodec.sample_path("grass").read_bytes())
+def test_an_element_shows_a_forest_with_plants_on_its_floor(shown):
     shown.evaluate("""() => {
       globalThis.wood = document.createElement("ath-viewer");
-      const wanted = { src: "plants/tree 0.ath", scenery: "", forest: 9, floor: "plants/grass.ath=2" };
+      const wanted = { src: "tree0.ath", scenery: "", forest: 9, floor: "grass.ath=2" };
       for (const [name, value] of Object.entries(wanted)) wood.setAttribute(name, value);
       wood.style.cssText = "display: block; width: 160px; height: 120px";
       document.body.prepend(wood);
@@ -202,10 +153,8 @@ def test_a_browser_that_cannot_draw_shows_stills_and_plain_sentences(browser, sa
     page, still = browser.new_page(), (DOCS / "gallery" / "fern.webp").read_bytes()
     page.set_default_timeout(SLOWEST)
     page.add_init_script(NO_WEBGL)
-    head = re.search(r'<script type="importmap">.*?</script>', (WEB / "index.html").read_text("utf-8"))[0]
-    head += '<link rel="stylesheet" href="gallery.css"><script type="module" src="ath-viewer.js"></script>'
     card = '<ath-viewer src="/tree.ath" scenery><img src="fern.webp" alt=""></ath-viewer>'
-    cards = f'<!doctype html>{head}<ul class="ath-gallery"><li>{card}</li></ul>'
+    cards = f'{HEAD}<ul class="ath-gallery"><li>{card}</li></ul>'
     page.route("**/cards.html", lambda route: route.fulfill(body=cards, content_type="text/html"))
     page.route("**/fern.webp", lambda route: route.fulfill(body=still, content_type="image/webp"))
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
@@ -244,8 +193,8 @@ def test_axe_finds_nothing_in_a_gallery(shown, scheme):
 @pytest.mark.browser
 def test_still_pictures_are_drawn_where_chromium_is(sample_ath, tmp_path):
     """In a process of its own: the tests' browser is Playwright's only one in this."""
-    command = [sys.executable, "-m", "athcodec", "view", str(sample_ath), "--export", str(tmp_path / "gallery")]
-    subprocess.run(command, check=True, capture_output=True, text=True)
-    still = tmp_path / "gallery" / "stills" / f"{sample_ath.stem}.webp"
-    assert still.read_bytes()[8:12] == b"WEBP"
-    assert f'src="stills/{sample_ath.stem}.webp"' in (tmp_path / "gallery" / "index.html").read_text("utf-8")
+    script = """import pathlib, sys
+from athcodec.viewer import picture
+pathlib.Path(sys.argv[2]).write_bytes(picture.still(sys.argv[1]))"""
+    subprocess.run([sys.executable, "-c", script, sample_ath, tmp_path / "still.webp"], check=True)
+    assert (tmp_path / "still.webp").read_bytes()[8:12] == b"WEBP"

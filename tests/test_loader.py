@@ -345,7 +345,7 @@ def test_fifty_loads_and_disposals_leave_no_memory_behind(layered_ath):
 
 
 DISPOSED = """async () => {
-  const { ATHLoader } = await import("athcodec-three"), { Scene } = await import("three");
+  const { three: { Scene }, loading: { ATHLoader } } = athcodecViewer.modules;
   const { renderer, camera } = athcodecViewer.stage, scene = new Scene();
   const loader = new ATHLoader(), url = new URLSearchParams(location.search).get("file"), counts = [];
   for (let i = 0; i < 50; i++) {

@@ -40,7 +40,7 @@ from programs import printed
 import athcodec
 from athcodec.gpu import GpuFile
 from athcodec.gpu.evaluate import Passes, Source
-from athcodec.viewer import gallery, view
+from athcodec.viewer import view
 from bench import codec_registry, odd, report
 from bench import codecs as bench_codecs
 from bench.codecs import coder
@@ -294,11 +294,15 @@ def test_positions_follow_from_the_blocks_of_the_gpu_form(small_ath):
         np.testing.assert_allclose(shown, decoder.positions(), rtol=0, atol=1e-4)
 
 
-def test_pages_and_galleries_hold_the_files_that_they_show(small_ath, tmp_path):
+def test_pages_and_frames_of_notebooks_hold_the_files_that_they_show(small_ath, tmp_path):
     view.export_page(small_ath, tmp_path / "page.html")
-    assert base64.b64encode(small_ath.read_bytes()[:30]).decode() in (tmp_path / "page.html").read_text("utf-8")
-    gallery.export_gallery([small_ath], tmp_path / "gallery", stills=False)
-    assert (tmp_path / "gallery" / "plants" / small_ath.name).read_bytes() == small_ath.read_bytes()
+    page, front = (tmp_path / "page.html").read_text("utf-8"), base64.b64encode(small_ath.read_bytes()[:30]).decode()
+    assert front in page and '<noscript><div id="no-script"><svg' in page
+    with athcodec.open(small_ath) as decoder:
+        frame = decoder.show(height=300)
+        assert 'sandbox="allow-scripts"' in frame._repr_html_() and 'height="300"' in frame._repr_html_()
+        assert front in frame._repr_html_() and frame._repr_html_() == athcodec.Frame(decoder, 300)._repr_html_()
+        assert frame._repr_html_()[:40] in decoder._repr_html_()
 
 
 def test_a_worker_in_this_process_encodes_a_batch(small_file, tmp_path):

@@ -7,7 +7,7 @@ Tests with the marker `browser` look at the page in Chromium (Debian: apt-get in
 from __future__ import annotations
 
 import base64
-import hashlib
+import gzip
 import json
 import math
 import re
@@ -29,7 +29,8 @@ from athcodec import cli
 from athcodec.decoding import container as ct
 from athcodec.exporters import write
 from athcodec.viewer import view
-from athcodec.viewer.build_viewer import MOST_BYTES, own_bytes
+from athcodec.viewer.build_viewer import MOST_BYTES, MOST_PAGE_BYTES, own_bytes
+from athcodec.viewer.still import still_svg
 from bench.throttled_server import WEB, ThrottledServer
 from bench.trees.plant import grow
 
@@ -72,7 +73,7 @@ def test_view_serves_the_page_and_ranges_of_the_file(served, sample_ath):
     assert base.startswith("http://127.0.0.1:")
     with get(base) as page:
         named = re.findall(r'(?:href|src)="([\w.]+)"', page.read().decode())
-    for name in {*named, "ath_worker.js"}:
+    for name in {*named, "ath_worker.js"} - {"still.svg"}:  # which is that of the file
         with get(base + name) as answer:
             assert answer.read() == (WEB / name).read_bytes(), name
     with get(base + file, Range="bytes=100-299") as answer:
@@ -108,10 +109,10 @@ def test_an_exported_page_holds_everything(sample_ath, tmp_path, capsys):
     file = re.search(r'id="ath-file" data-name="sample.ath">([^<]*)<', text)[1]
     assert base64.b64decode(file) == sample_ath.read_bytes()
     modules = json.loads(re.search(r'<script type="importmap">(.*?)</script>', text)[1])["imports"]
-    for url in modules.values():
-        kind, _, body = url.partition(",")
-        assert kind == "data:text/javascript;base64"
-        assert base64.b64decode(body) in {path.read_bytes() for path in WEB.glob("*.js")}
+    assert modules.keys() == {"three"}
+    kind, _, body = modules["three"].partition(",")
+    assert kind == "data:text/javascript;base64" and base64.b64decode(body) == (WEB / "three.js").read_bytes()
+    assert not re.search(r'(?:from|import\()"\./', text)
     outside = re.sub(r"<script.*?</script>|<style.*?</style>", "", text, flags=re.DOTALL)
     assert not re.search(r'(?:src|href)="(?!data:)', outside)
     assert "connect-src 'none'" in outside
@@ -149,13 +150,41 @@ def test_a_file_that_cannot_be_shown_is_an_error_of_one_line(sample_ath, tmp_pat
     assert cli.main(["view", str(sample_ath), "--export", str(tmp_path / "x.html")]) == 0
 
 
-def test_the_page_allows_no_scripts_but_its_own():
-    text = (WEB / "index.html").read_text("utf-8")
-    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
-    scripts = re.findall(r"<script(?: [^>]*)?>([^<]+)</script>", text)
-    digests = [f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'" for script in scripts]
-    assert re.search(r"script-src ([^;]*);", policy)[1].split() == ["'self'", "'wasm-unsafe-eval'", *digests]
-    assert "unsafe-inline" not in policy and not re.search(r'\son\w+="|style="', text)
+def test_pages_have_no_inline_scripts_and_styles():
+    for name in ("index.html", "forest.html"):
+        text = (WEB / name).read_text("utf-8")
+        policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', text)[1]
+        assert re.search(r"script-src ([^;]*);", policy)[1].split() == ["'self'", "'wasm-unsafe-eval'"]
+        assert not re.search(r"<script(?: [^>]*)?>[^<]|<style|unsafe-inline|\son\w+=\"|style=\"", text), name
+
+
+def test_the_page_is_served_compressed_and_small(served):
+    """Until the first picture come the page, its style, three.js, the viewer, and the worker with the decoder."""
+    base, size = served.split("?file=")[0], 0
+    for name in ("", "viewer.css", "start.js", "three.js", "viewer.js", "ath_worker.js"):
+        with get(base + name, **{"Accept-Encoding": "gzip"}) as answer:
+            packed = answer.read()
+            assert answer.headers["Content-Encoding"] == "gzip", name
+            assert gzip.decompress(packed) == (WEB / (name or "index.html")).read_bytes(), name
+            size += len(packed)
+    assert size <= MOST_PAGE_BYTES
+
+
+def test_without_scripts_the_server_has_a_still_of_the_file(served, sample_ath):
+    with get(served.split("?file=")[0] + "still.svg") as answer, athcodec.open(sample_ath) as decoder:
+        assert answer.headers["Content-Type"] == "image/svg+xml" and answer.read().decode() == still_svg(decoder)
+
+
+def test_a_still_is_as_wide_and_as_tall_as_the_plant(forked_clip, tmp_path):
+    """A stem of four vertices and a branch of two, in 360 by 360 units, turned by 20 degrees."""
+    athcodec.encode(forked_clip, tmp_path / "a.ath", rel_error=1e-3, exact_rest=True)
+    with athcodec.open(tmp_path / "a.ath") as decoder:
+        dots = {(int(x), int(y)) for x, y in re.findall(r"M(\d+) (\d+)h0", still_svg(decoder))}
+    across = 120 * math.cos(math.radians(20))  # a unit sideways, where three are 360 upward
+    left = 200 - across
+    assert dots == {(round(left), 380 - 120 * up) for up in range(4)} | {
+        (round(left + n * across), 140) for n in (1, 2)
+    }
 
 
 def test_the_bundles_are_small_and_their_licences_are_there():
@@ -177,6 +206,18 @@ def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_import
       register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
       for (const view of {json.dumps(views)}) await import({json.dumps(page.as_uri())} + `/${{view}}.js`);"""
     printed("node", "--input-type=module", "-e", script)
+
+
+def test_the_package_has_the_viewers_material():
+    """It has leaves where a file names its surfaces, and is a plain material where it does not."""
+    script = f"""import {{ register }} from "node:module";
+      register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
+      const {{ ATHPlantMaterial }} = await import({json.dumps((WEB / "ATHLoader.js").as_uri())});
+      const shader = {{ vertexShader: "#include <common>", fragmentShader: "#include <map_fragment>" }};
+      new ATHPlantMaterial({{ surfaces: "bark, pinnae" }}).onBeforeCompile(shader);
+      const plain = new ATHPlantMaterial({{ surfaces: "brick" }}), drawn = shader.fragmentShader.includes("athIsLeaf");
+      console.log(JSON.stringify([drawn, shader.fragmentShader.includes("ATH_LEAF 2"), plain.color.getHexString()]));"""
+    assert json.loads(printed("node", "--input-type=module", "-e", script)) == [True, True, "6f8f4a"]
 
 
 @pytest.mark.programs
@@ -209,15 +250,34 @@ def test_the_npm_package_installs_from_its_tarball(tmp_path):
     wanted = ["function", "function", True, "/x/ath_worker.js", "ATH_motion", "ATH_motion", "function"]
     assert json.loads(printed("node", "use.mjs", cwd=tmp_path)) == wanted
     (tmp_path / "use.ts").write_text(TYPED)
-    command = "npx tsc --noEmit --strict --target esnext --module esnext --moduleResolution bundler use.ts".split()
-    printed(*command, cwd=tmp_path)
+    command = "npx tsc --noEmit --strict --target esnext --module esnext --moduleResolution bundler".split()
+    printed(*command, "use.ts", cwd=tmp_path)
+    printed("npm", "install", "--silent", "--no-audit", "--no-fund", "@types/react@19", cwd=tmp_path)
+    (tmp_path / "use.tsx").write_text(REACT)
+    printed(*command, "--jsx", "react-jsx", "--jsxImportSource", "react", "use.tsx", cwd=tmp_path)
+    (tmp_path / "wrong.tsx").write_text(REACT.replace('camera-controls="turn"', 'camera-controls="spin"'))
+    wrong = subprocess.run([*command, "--jsx", "react-jsx", "wrong.tsx"], cwd=tmp_path, capture_output=True, text=True)
+    assert "spin" in wrong.stdout
 
+
+REACT = """
+import "athcodec-three/viewer";
+import type { ATHViewerElement } from "athcodec-three/viewer";
+import { useRef } from "react";
+export function Plant() {
+  const viewer = useRef<ATHViewerElement>(null);
+  const play = () => viewer.current?.play();
+  return <ath-viewer ref={viewer} src="oak.ath" level={2} scenery camera-controls="turn" className="oak" onClick={play}>
+    <img src="oak.webp" alt="" />
+  </ath-viewer>;
+}
+"""
 
 TYPED = """
 import { type Loader, PerspectiveCamera, Scene } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { NodeIO } from "@gltf-transform/core";
-import { type ATH, ATHForest, ATHLimbs, ATHLoader, type ATHMotion } from "athcodec-three";
+import { type ATH, ATHForest, ATHLimbs, ATHLoader, type ATHMotion, ATHPlantMaterial } from "athcodec-three";
 import { athMotion } from "athcodec-three/gltf/three";
 import type { ATHViewerElement } from "athcodec-three/viewer";
 import type { ATHBabylonMotion } from "athcodec-three/gltf/babylon";
@@ -240,6 +300,7 @@ for (const bytes of [new ArrayBuffer(8), new SharedArrayBuffer(8), xyz.subarray(
 new Scene().add(new ATHLimbs(ath, { color: "brown" }).setColor((vertex) => [vertex, 0, 0]));
 const pixelsOff = ({ ath, camera }: ATHViewerElement): number | undefined => ath?.motion.pixelError(0, camera, 9);
 pixelsOff(new HTMLElement() as ATHViewerElement);
+ath.motion.bind(new ATHPlantMaterial(ath.metadata)).roughness = 0.5;
 ath.abort();
 new GLTFLoader().register(athMotion(new ATHLoader()));
 const io = new NodeIO().registerExtensions([ATHMotionExtension]), document = await io.read("tree_motion.glb");
@@ -636,7 +697,7 @@ def test_a_tree_that_sharpens_as_bytes_come_does_not_jump(opened, sample_ath):
 
 
 FOREST = """async ([from, to]) => {
-  const three = await import("three"), { ATHForest, ATHLoader } = await import("athcodec-three");
+  const { three, loading: { ATHForest, ATHLoader } } = athcodecViewer.modules;
   const { stage, plants } = athcodecViewer, { ath } = plants[0], clock = { now: performance.now() };
   performance.now = () => clock.now;
   const loader = new ATHLoader(), forest = new ATHForest(ath);
@@ -883,7 +944,7 @@ def test_a_glb_with_a_motion_is_shown_with_its_materials_by_view_and_by_an_expor
             assert np.abs(shown - wanted).max() < 1e-5 * np.abs(wanted).max()
             drawn = "athcodecViewer.plants[0].space"
             assert page.evaluate(f"{drawn}.isMesh && {drawn}.material.isMeshStandardMaterial")
-            page.click("#colour [data-value=distance]")
+            page.click("#colour [data-value=error]")
             assert page.evaluate(f"{drawn}.material.isMeshLambertMaterial")
             page.click("#compare [data-value=levels]")
             page.wait_for_function("() => athcodecViewer.plants.length === 2 && athcodecViewer.counters.pictures > 3")
@@ -929,8 +990,7 @@ def test_a_page_without_the_mesh_says_so(opened, hosted):
 
 
 LOAD_ABOUT = """async (numbers) => {
-  const { BufferAttribute, BufferGeometry } = await import("three");
-  const { ATHLoader } = await import("athcodec-three");
+  const { three: { BufferAttribute, BufferGeometry }, loading: { ATHLoader } } = athcodecViewer.modules;
   const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(Float32Array.from(numbers), 3));
   const loader = new ATHLoader(), url = new URLSearchParams(location.search).get("file");
   const refused = [];

@@ -646,7 +646,7 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("files", metavar="FILE.ath", nargs="+", help=f"{READ}; several with --export DIR")
+    verb.add_argument("file", metavar="FILE.ath", help=READ)
     verb.add_argument(
         "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
     )
@@ -664,10 +664,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     what.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
     what.add_argument(
         "--export",
-        metavar="PAGE.html|DIR",
+        metavar="PAGE.html",
         help="write one page with the file and the viewer inside, in place of an older HTML page alone, and serve "
-        "nothing; or a folder for a web host with a gallery of all FILEs, with still pictures where athcodec[picture] "
-        "is installed",
+        "nothing",
     )
 
 

@@ -58,7 +58,7 @@ from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.facts import facts_of
 from athcodec.errors import AthError, ClipError
 from athcodec.files.atomic import scratch_folder
-from athcodec.files.shown import counted, echo, print_table
+from athcodec.files.shown import echo, print_table
 from athcodec.motion.branches.saving import save
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
@@ -437,13 +437,9 @@ def _needs(row: dict[str, Any]) -> str:
 def view(args: argparse.Namespace) -> int:
     from athcodec.viewer import view
 
+    file = args.file
     if args.export and Path(args.export).suffix.lower() not in (".html", ".htm"):
-        if Path(args.export).suffix and not (args.export.endswith("/") or os.path.isdir(args.export)):
-            raise ClipError(f"--export: got {args.export}, expected PAGE.html, or a folder, such as {args.export}/")
-        return _export_gallery(args)
-    file, *more = args.files
-    if more:
-        raise ClipError(f"view: got {len(args.files)} files, expected one; --export DIR makes a gallery of several")
+        raise ClipError(f"--export: got {args.export}, expected PAGE.html")
     floor = dict(args.floor or [])
     with naming(file):
         if args.export:
@@ -454,23 +450,6 @@ def view(args: argparse.Namespace) -> int:
             return 0
         ready = partial(_say_where, args)
         view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
-    return 0
-
-
-def _export_gallery(args: argparse.Namespace) -> int:
-    from athcodec.viewer import gallery, picture
-
-    if args.clip or args.host_mesh or args.floor:
-        raise ClipError("--export DIR: got --clip, --host-mesh or --floor, which are of pages with one file")
-    for file in args.files:
-        with naming(file):
-            gallery.facts_of(file)
-    stills = picture.can_draw()
-    if not stills:
-        say("warning", f"no still pictures: they need Chromium and {picture.INSTALL}")
-    size = gallery.export_gallery(args.files, args.export, stills)
-    facts = {"folder": args.export, "plants": len(args.files), "bytes": size}
-    answer(args, facts, f"{args.export}: {counted(len(args.files), 'plant')}, {size:,} bytes, for any web host")
     return 0
 
 

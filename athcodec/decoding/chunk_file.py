@@ -95,6 +95,11 @@ class ChunkFile:
 
     # ---- bytes ----
 
+    def whole(self) -> bytes:
+        """Return all bytes of the file that are there."""
+        with self._lock:
+            return self._read_some(0, self.available_length)
+
     def _read_some(self, offset: int, length: int) -> bytes:
         """Return `length` bytes, or fewer at the end; a file object may give fewer at a time than it was asked for."""
         self._source.seek(offset)

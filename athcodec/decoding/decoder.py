@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property, partial
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,10 @@ from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.units import LengthLike, length_of, scene_unit
 from athcodec.options import real
 
+if TYPE_CHECKING:
+    from athcodec import Frame
+
+MOST_SHOWN_BYTES = 4_000_000  # Size of a file that a notebook plays unasked.
 WITHIN = '; level_within("5cm") returns the level for a length'
 SHOWN_TYPES = (np.dtype(np.float32), np.dtype(np.float64))  # Types that the core writes itself.
 
@@ -154,7 +158,31 @@ class Decoder(ArrayLike):
         )
 
     def _repr_html_(self) -> str:
-        return Report(parts_of(facts_of(self.file.name, self)))._repr_html_()
+        file, report = self.file, Report(parts_of(facts_of(self.file.name, self)))._repr_html_()
+        if file.missing or file.rest_is_missing or file.is_closed:
+            return report
+        if file.file_length > MOST_SHOWN_BYTES:
+            return f"{report}<p>A large file: show() plays it here.</p>"
+        return self.show()._repr_html_() + report
+
+    def show(self, height: int = 480) -> Frame:
+        """Return the plant in motion, for the last value of a notebook's cell.
+
+        It is the viewer, in a frame that reaches nothing outside of itself.
+
+        Parameters
+        ----------
+        height : int
+            Height of the frame in pixels.
+
+        Returns
+        -------
+        Frame
+            A notebook plays it, and keeps the whole file in its output. In a terminal use `athcodec view`.
+        """
+        import athcodec  # The package knows its viewer, which stands above decoders.
+
+        return athcodec.Frame(self, height)
 
     # ---- the array ----
 

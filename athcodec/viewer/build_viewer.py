@@ -16,13 +16,18 @@ import sys
 import tempfile
 from pathlib import Path
 
+import athcodec
+from athcodec.viewer.still import still_svg
+
 VIEWER = Path(__file__).resolve().parent
 WEB = VIEWER / "web"
 CACHE_VARIABLE = "ATHCODEC_VIEWER_CACHE"
 DEFAULT_CACHE = Path("~/.cache/athcodec-viewer")
 MOST_BYTES = 200_000
 """Of what is ours in the bundles, loader, worker with decoder and page, compressed by gzip as web hosts send them."""
-OURS = ("ATHLoader.js", "ath_worker.js", "viewer.js")
+MOST_PAGE_BYTES = 312_000
+"""Of all that the page takes before its first picture, compressed by gzip: its own files and three.js."""
+OURS = ("ath_worker.js", "viewer.js")
 
 
 class BuildError(Exception):
@@ -51,6 +56,8 @@ def build(folder: Path) -> None:
     if node is None:
         raise BuildError("node: got none on PATH, expected Node.js 18 or newer")
     _run([node, str(VIEWER / "build.mjs"), str(folder)], env=os.environ | {"NODE_PATH": str(modules())})
+    with athcodec.open(athcodec.sample_path("leafed")) as decoder:
+        (folder / "still.svg").write_text(still_svg(decoder), "utf-8")
 
 
 def _run(command: list[str], **options) -> None:

@@ -121,7 +121,7 @@ def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
     image = _packages()
     with open_ath(path) as decoder:
         time = _STILL_AT * decoder.clip.duration
-    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None, "?quality=full")
+    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None, "&quality=full")
     data = io.BytesIO()
     image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
     return data.getvalue()
@@ -174,7 +174,7 @@ def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[b
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         export_page(path, Path(folder) / "page.html", clip, host_mesh)
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto((Path(folder) / "page.html").as_uri() + asked)
+        page.goto((Path(folder) / "page.html").as_uri() + "?intro=off" + asked)
         page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
         page.evaluate(_ALONE)
         for at in times:

@@ -7,6 +7,7 @@ server answers on 127.0.0.1 only, and to nobody but who has the address. Remote 
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import io
 import json
@@ -20,19 +21,30 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
 
+from athcodec.decoding.decoder import Decoder
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import AthError, ClipError, MissingExtra
 from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_file
 from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
+from athcodec.viewer.still import still_svg
 
 WEB = Path(__file__).parent / "web"
 PAGE = WEB / "index.html"
 INSTALL = 'pip install "athcodec[view]"'
 Floor = Mapping[FilePath, float]
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".txt": "text/plain; charset=utf-8",
+}
+"""Of the page's files, by suffix."""
 PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
 
-_MAP = re.compile(r'<script type="importmap">(.*?)</script>', re.DOTALL)
+_BESIDE = re.compile(r'(from|import\()"\./(three|model)\.js"')
+"""Modules that the page's own names as files beside it."""
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' data:; style-src 'unsafe-inline'; "
     "img-src data: blob:; worker-src blob:; connect-src 'none'; base-uri 'none'; form-action 'none'"
@@ -78,8 +90,8 @@ def export_page(
         check_target(page, ".html")
         data = _read(path)
         is_glb = _is_glb(data)
-        mesh = _checked(path if is_glb else io.BytesIO(data), clip, host_mesh, is_glb)
-        text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor)).encode()
+        mesh, still = _checked(path if is_glb else io.BytesIO(data), clip, host_mesh, is_glb)
+        text = self_contained(data, file_name(path), clip, mesh, _read_floor(floor), still).encode()
         with new_file(page) as out:
             out.write(text)
     return len(text)
@@ -93,12 +105,24 @@ def _read_floor(floor: Floor | None) -> list[tuple[bytes, float]]:
     return files
 
 
-def _checked(path: Any, clip: str | None, host_mesh: HostMesh | None, has_mesh: bool = False) -> bytes | None:
+def _checked(
+    path: Any, clip: str | None, host_mesh: HostMesh | None, has_mesh: bool = False
+) -> tuple[bytes | None, str]:
     """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one
-    and is not in a GLB that has it. Raises AthError, OSError."""
+    and is not in a GLB that has it, and a still picture. Raises AthError, OSError."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
-        needs_none = has_mesh or decoder.file.host_checksum is None
-        return None if needs_none else decoder.level_rest(0).astype("<f4").tobytes()
+        return None if has_mesh else _mesh_of(decoder), still_svg(decoder)
+
+
+def _mesh_of(decoder: Decoder) -> bytes | None:
+    return None if decoder.file.host_checksum is None else decoder.level_rest(0).astype("<f4").tobytes()
+
+
+def page_of(decoder: Decoder) -> str:
+    """Return the page of an open file, which begins with the decoder's clip. Raises AthError, OSError."""
+    file = decoder.file
+    clip = decoder.clip.name or None
+    return self_contained(file.whole(), file_name(file.name), clip, _mesh_of(decoder), still=still_svg(decoder))
 
 
 def _is_glb(data: bytes) -> bool:
@@ -128,14 +152,14 @@ def self_contained(
     clip: str | None = None,
     mesh: bytes | None = None,
     floor: Sequence[tuple[bytes, float]] = (),
+    still: str = "",
 ) -> str:
-    """The page with everything inside: styles, modules as data URLs, the worker and the file as text."""
+    """The page with everything inside: styles, modules as data URLs, the worker and the file as text. still: an SVG
+    element, for browsers that run no scripts."""
     text = PAGE.read_text("utf-8")
-    modules = json.loads(_MAP.search(text)[1])["imports"]
-    if not _is_glb(data):
-        del modules["athcodec-three/model"]
-    inside = json.dumps({"imports": {name: _data_url(WEB / file) for name, file in modules.items()}})
-    main = _script((WEB / "viewer.js").read_text("utf-8"))
+    modules = ("three", "model") if _is_glb(data) else ("three",)
+    inside = json.dumps({"imports": {name: _data_url(_module(f"{name}.js")) for name in modules}})
+    main = _script(_module("viewer.js"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
     first = "" if clip is None else f' data-clip="{html.escape(clip)}"'
     file = (
@@ -150,8 +174,9 @@ def self_contained(
     for old, new in (
         (r'content="default-src[^"]*"', f'content="{_POLICY}"'),
         (r'<link rel="modulepreload"[^>]*>\n', ""),
+        (r'<script src="start.js"></script>\n', f'<script type="importmap">{inside}</script>\n'),
+        (r'<img src="still.svg"[^>]*>', still),
         (r'<link rel="stylesheet"[^>]*>', f"<style>{(WEB / 'viewer.css').read_text('utf-8')}</style>"),
-        (_MAP.pattern, f'<script type="importmap">{inside}</script>'),
         (r'<script type="module" src="viewer.js"></script>', ""),
         (
             r"</body>",
@@ -163,8 +188,13 @@ def self_contained(
     return text
 
 
-def _data_url(path: Path) -> str:
-    return f"data:text/javascript;base64,{base64.b64encode(path.read_bytes()).decode()}"
+def _module(file: str) -> str:
+    """A module of the page, which names others as the import map of an exported page does."""
+    return _BESIDE.sub(r'\1"\2"', (WEB / file).read_text("utf-8"))
+
+
+def _data_url(text: str) -> str:
+    return f"data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}"
 
 
 def _script(text: str) -> str:
@@ -216,7 +246,7 @@ def serve(
     is_glb = file_name(path).lower().endswith(".glb")  # The page tells it by the name, too.
     if forest and is_glb:
         raise ClipError("--forest: got a GLB, expected an .ath file")
-    mesh = _checked(path, clip, host_mesh, is_glb)
+    mesh, still = _checked(path, clip, host_mesh, is_glb)
     grown = _read_floor(floor)
     import asyncio
 
@@ -226,7 +256,7 @@ def serve(
         place = f"file/{secrets.token_urlsafe(12)}/{file_name(path)}"
         beside = {} if mesh is None else {f"{place}.mesh": mesh}
         beside |= {f"{place}.floor{i}": data for i, (data, _) in enumerate(grown)}
-        runner = web.AppRunner(application(path, place, beside), access_log=None)
+        runner = web.AppRunner(application(path, place, beside, still), access_log=None)
         await runner.setup()
         try:
             site = web.TCPSite(runner, "127.0.0.1", port)
@@ -259,13 +289,23 @@ def _refuse_other_urls(path: FilePath) -> None:
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
-def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None = None):
-    """The aiohttp application: the page, and the file at `place`, which only the page's address tells; at other such
-    places what goes with it, such as the host's mesh."""
+def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None = None, still: str | None = None):
+    """The aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which only
+    the page's address tells; at other such places what goes with it, such as the host's mesh. still: an SVG of the
+    plant, for browsers that run no scripts."""
     from aiohttp import ClientSession, web
 
-    async def page(request):
-        return web.FileResponse(PAGE)
+    def part(data, name):
+        packed = gzip.compress(data, mtime=0)
+
+        async def answer(request):
+            takes = "gzip" in request.headers.get("Accept-Encoding", "")
+            headers = {"Content-Type": TYPES[Path(name).suffix], "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
+            return web.Response(
+                body=packed if takes else data, headers=headers | ({"Content-Encoding": "gzip"} if takes else {})
+            )
+
+        return answer
 
     def at_once(data):
         async def answer(request):
@@ -293,13 +333,17 @@ def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None =
 
     session = web.AppKey("session", ClientSession)
     app = web.Application()
-    app.router.add_get("/", page)
+    for file in sorted(WEB.iterdir()):
+        if file.suffix in TYPES:
+            answer = part(still.encode() if still and file.name == "still.svg" else file.read_bytes(), file.name)
+            app.router.add_get(f"/{file.name}", answer)
+            if file == PAGE:
+                app.router.add_get("/", answer)
     if is_url(path):
         app.cleanup_ctx.append(client)
     app.router.add_get(f"/{quote(place)}", remote if is_url(path) else local)
     for name, data in (beside or {}).items():
         app.router.add_get(f"/{quote(name)}", at_once(data))
-    app.router.add_static("/", WEB)
     return app
 
 

@@ -4,7 +4,7 @@
 
   /** 3 numbers for each vertex of these attributes; `moved` is what the shader works out, `defines` what it is for. */
   globalThis.readback = async (attributes, uniforms, { moved = "athMoved(position, athPart)", defines = {} } = {}) => {
-    const three = await import("three"), { MOTION_PARS } = await import("athcodec-three"), { renderer } = athcodecViewer.stage;
+    const { three, loading: { MOTION_PARS } } = athcodecViewer.modules, { renderer } = athcodecViewer.stage;
     const { count } = attributes.position, height = Math.ceil(count / WIDTH), geometry = new three.BufferGeometry();
     for (const [name, attribute] of Object.entries(attributes)) geometry.setAttribute(name, attribute);
     geometry.setAttribute("pixel", new three.BufferAttribute(Float32Array.from({ length: 2 * count }, (_, i) =>
@@ -30,7 +30,7 @@
 
   /** Of the picture that is shown, in source order: positions, or what becomes of the normals of the rest pose. */
   globalThis.onGraphics = async (what = "positions") => {
-    const { BufferAttribute, BufferGeometry } = await import("three"), { ath, motion } = athcodecViewer.plants.at(-1), geometry = new BufferGeometry();
+    const { BufferAttribute, BufferGeometry } = athcodecViewer.modules.three, { ath, motion } = athcodecViewer.plants.at(-1), geometry = new BufferGeometry();
     geometry.setAttribute("position", new BufferAttribute(ath.rest, 3));
     if (what === "normals") geometry.setAttribute("normal", ath.geometry.getAttribute("normal"));
     geometry.userData.source = Uint32Array.from({ length: ath.rest.length / 3 }, (_, i) => i);

@@ -1,7 +1,7 @@
 // The shadow that a plant casts on the ground, in the viewer's page or, on WebGPU, the forest's: how many of its vertices are over dark pixels, and how many
 // pixels change as it moves.
 async (mode) => {
-  const three = await import("three"), { ATHLoader } = await import("athcodec-three"), onNodes = !window.athcodecViewer;
+  const onNodes = !window.athcodecViewer, { three, loading: { ATHLoader } } = (window.athcodecViewer ?? athcodecForest).modules;
   const renderer = onNodes ? new three.WebGPURenderer() : athcodecViewer.stage.renderer;
   await renderer.init?.();
   const loader = new ATHLoader().setMode(mode), url = new URLSearchParams(location.search).get("file");

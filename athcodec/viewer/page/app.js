@@ -3,6 +3,7 @@
 import { ATHLoader } from "athcodec-three";
 
 export const loader = new ATHLoader();
+if (globalThis.athcodecBegun) loader.takeOver(globalThis.athcodecBegun); // by start.js
 
 /** The controller: each view adds its commands to it, and calls those of others by it. `coming`: settles once the first file can be shown, `staged` once there is a stage; `plants`: on it, the one that is asked about
  * last; `opened`: the files, each with its `fileName` and `source`; `floor`: what grows on a forest's floor, {source, each}: a URL
@@ -10,8 +11,9 @@ export const loader = new ATHLoader();
 export const app = { stage: null, staged: null, coming: null, plants: [], opened: [], floor: [] };
 
 /** `time` is that of the clip, `turns` that of the rounds before; `loop`: null, as is usual for the file, or what was chosen;
- * `wind`: [strength, heading] where clips are blended for it. */
-export const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, wind: null, forest: null, dirty: true };
+ * `intro`: whether the
+ * story of how the file comes is told under the split; `wind`: the strength where clips are blended for it. */
+export const state = { playing: true, speed: 1, loop: null, time: 0, turns: 0, wind: null, forest: null, intro: false, dirty: true };
 
 export const counters = { frames: 0, fps: 0, frameMs: 0, since: performance.now(), pictures: 0, started: 0, firstPicture: null, firstMotion: null,
   arrived: {} };

@@ -27,7 +27,7 @@ function arrange(first = null) {
   }
   if (plants.length > 1) app.forestSwitch(false);
   stage.setPanes(plants.map((plant) => ({
-    scene: stage.scene([plant.root]), before: (width, height) => plant.prepare(width, height),
+    scene: stage.scene([plant.root]), foot: plant.foot, before: (width, height) => plant.prepare(width, height),
   })));
   place();
   app.levelControls();

@@ -12,6 +12,12 @@ function clipControls() {
   select.hidden = $("forest-mix-row").hidden = clips.length < 2;
 }
 
+/** The clip that a file opens with: the one that was asked for, else that of the strongest wind, else the first. */
+function usualClip({ isAsked, channel, metadata, motion: { clips } }) {
+  const strength = ({ name }) => metadata.clips?.[name]?.strength ?? metadata.strength ?? 0;
+  return isAsked ? clips[channel.first] : clips.reduce((most, clip) => (strength(clip) > strength(most) ? clip : most));
+}
+
 /** A second file may have no clip of that name. */
 function playIn(motion, name) {
   if (motion.clips.some((clip) => clip.name === name)) motion.play(name, { fade: state.playing && !state.forest ? FADE : 0 });
@@ -37,6 +43,6 @@ function nextClip(by) {
 }
 
 export default function begin() {
-  Object.assign(app, { clipControls, playIn, playClip, nextClip });
+  Object.assign(app, { usualClip, clipControls, playIn, playClip, nextClip });
   $("clip").addEventListener("change", () => playClip(Number($("clip").value)));
 }

@@ -9,7 +9,7 @@ const size = new Vector2();
 
 export class Easel {
   stages = new Set();
-  sky = new Sky(() => this.renderer);
+  sky = new Sky();
   #canvas;
   #renderer = null;
 
@@ -25,7 +25,6 @@ export class Easel {
     renderer.domElement.addEventListener(own ? "webglcontextrestored" : "webglcontextlost", () => {
       if (renderer !== this.#renderer) return;
       if (!own) this.#drop();
-      this.sky.forget();
       for (const stage of this.stages) stage.restore();
     });
     return this.#renderer = renderer;
@@ -55,7 +54,6 @@ export class Easel {
     this.stages.delete(stage);
     if (this.stages.size > 0) return;
     const renderer = this.#renderer;
-    this.sky.forget();
     this.#drop();
     renderer?.forceContextLoss();
   }

@@ -4,7 +4,7 @@ import { app, counters, loader, state } from "./app.js";
 import { Plant } from "./plant.js";
 import { floorOf } from "./places.js";
 import { discard } from "./sky.js";
-import { shownWithout, wordsOf } from "./trouble.js";
+import { otherKind, shownWithout, wordsOf } from "./trouble.js";
 import { $ } from "./ui.js";
 
 let first = true, asked = 0; // whether nothing has been open yet; the newest wish to open a file
@@ -36,10 +36,7 @@ const fetchMesh = async (url) => loader.setHostMesh(new Float32Array(await fetch
 
 // With one of its clips.
 function openFirst(source, name, clip = null) {
-  loader.setClip(clip);
-  const done = open(source, name);
-  loader.setClip(null);
-  return done;
+  return open(source, name, false, null, clip);
 }
 
 const nameOf = (path) => decodeURIComponent(path.split("/").pop().split("?")[0]);
@@ -56,8 +53,9 @@ function openAddress() {
 }
 
 function ask() {
-  say("No file yet", "Drop an .ath file or a GLB that holds one here, or open it. It stays on this computer.");
+  say("Plants in motion", "Look at one of these, or open an .ath file, or a GLB that holds one. A file of yours stays on this device.");
   app.loadingStory(null);
+  app.beginStart();
 }
 
 function say(title, text, technical = "", again = null) {
@@ -68,12 +66,13 @@ function say(title, text, technical = "", again = null) {
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
+  app.endStart();
   breath().then(() => app.staged).then(app.bare);
 }
 
 /** Says that nothing can be shown. */
-function refuse(error, again = null) {
-  const { title, advice, passing } = wordsOf(error.codeName);
+function refuse(error, again = null, words = wordsOf(error.codeName)) {
+  const { title, advice, passing } = words;
   say(title, advice, error.message, passing ? again : null);
   app.loadingStory(null);
 }
@@ -86,6 +85,14 @@ function complain(failure, motion, again) {
   box.querySelector("button").hidden = failure.type !== "stopped" || !again;
   box.querySelector("button").onclick = again;
   box.hidden = false;
+}
+
+const HEAD_BYTES = 16; // which tell kinds of files apart
+
+async function headOf(source) {
+  if (typeof source !== "string") return new Uint8Array(source.bytes.slice(0, HEAD_BYTES));
+  const answer = await fetch(source, { headers: { Range: `bytes=0-${HEAD_BYTES - 1}` } }).catch(() => null);
+  return answer?.status === 206 ? new Uint8Array(await answer.arrayBuffer()) : new Uint8Array(0);
 }
 
 // A URL, or {bytes}; a GLB comes whole.
@@ -105,9 +112,10 @@ function close(files) {
 }
 
 /** Opens a URL or {bytes}, in place of what is open or beside it. `again`: what is to stay as it is, of a file that is loaded anew. */
-async function open(source, name, beside = false, again = null) {
-  const wish = ++asked, retry = () => open(source, name, beside, again);
+async function open(source, name, beside = false, again = null, clip = null) {
+  const wish = ++asked, retry = () => open(source, name, beside, again, clip);
   $("message").hidden = true;
+  app.endStart();
   if (!beside) {
     Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
     $("trouble").hidden = true;
@@ -115,18 +123,22 @@ async function open(source, name, beside = false, again = null) {
   }
   let ath;
   try {
+    loader.setClip(clip);
     const loading = load(source);
+    loader.setClip(null);
     app.coming ??= loading.catch(() => {});
     ath = await loading;
   } catch (error) {
-    if (wish === asked) refuse(error, typeof source === "string" ? retry : null);
+    const words = error.codeName === "NOT_AN_ATH_FILE" ? otherKind(await headOf(source), name) : null;
+    if (wish === asked) refuse(error, typeof source === "string" ? retry : null, words ?? undefined);
     return;
   }
   if (wish !== asked) {
     ath.dispose();
     return;
   }
-  Object.assign(ath, { fileName: name, source });
+  Object.assign(ath, { fileName: name, source, isAsked: clip !== null });
+  if (!beside && !ath.isAsked) ath.motion.play(app.usualClip(ath).index, { fade: 0 });
   if (!beside) app.watchArrival(ath);
   if (beside) {
     close(app.opened.splice(1));
@@ -159,6 +171,7 @@ async function show(ath, beside, again, isWanted) {
   if (!app.stage.moved) app.frameView();
   app.tellSizes();
   if (first) app.restore();
+  if (first) app.beginIntro();
   first = false;
 }
 
@@ -171,9 +184,9 @@ async function loadAgain(bandwidth) {
   app.clear();
   close(app.opened.splice(0));
   app.replayed(bandwidth);
-  loader.setBandwidth(bandwidth).setClip(clip.name || null);
-  const done = open(source, fileName, false, { loop: state.loop });
-  loader.setBandwidth(null).setClip(null);
+  loader.setBandwidth(bandwidth);
+  const done = open(source, fileName, false, { loop: state.loop }, clip.name || null);
+  loader.setBandwidth(null);
   await done;
 }
 
@@ -190,7 +203,7 @@ function choose(beside = "") {
 }
 
 export default function begin() {
-  Object.assign(app, { openAddress, refuse, open, loadAgain, choose });
+  Object.assign(app, { nameOf, openAddress, refuse, open, loadAgain, choose });
   $("open").addEventListener("click", () => choose());
   $("message-open").addEventListener("click", () => choose());
   $("file").addEventListener("change", async () => {

@@ -1,6 +1,8 @@
 // A forest of one plant in the wind, on WebGPU. The address says what is shown: ?file=URL&count=10000, and on its floor
 // &floor=URL&each=4
 
+import * as three from "three/webgpu";
+import * as loading from "athcodec-three";
 import { ATHLoader, radii } from "athcodec-three";
 import { ATHForest } from "athcodec-three/webgpu";
 import { ACESFilmicToneMapping, DoubleSide, MeshStandardNodeMaterial, PerspectiveCamera, Scene, Vector3, WebGPURenderer } from "three/webgpu";
@@ -19,7 +21,7 @@ const COUNT = Number(asked.get("count") ?? 10000);
 const SPREAD = 0.85; // How far plants are apart: see forestReach.
 const EYES = 0.28, PACE = 0.7; // Height of a walker's eyes, and way per second, in radii.
 const SLOW_MS = 40, SLOW_FRAMES = 12; // After so many pictures as slow as this, less is drawn.
-const state = { frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
+const state = { modules: { three, loading }, frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
 window.athcodecForest = state;
 
 const tintOf = (i) => (Math.floor(200 + 55 * chance(i, 3)) << 16) | (Math.floor(215 + 40 * chance(i, 6)) << 8) | 205;

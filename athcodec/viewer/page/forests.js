@@ -21,7 +21,7 @@ function instances(count) {
   return treePlaces(ath, count, forestRadius()).map((place, i) => ({ ...place, clip: clipOf(i) }));
 }
 
-const surfaces = () => (app.colour.value === "plain" ? app.plants[0].surfaces : null);
+const surfaces = () => (app.colour.value === "plant" ? app.plants[0].surfaces : null);
 
 function forestMaterial(lines, of) {
   if (surfaces() && !lines) return surfaceMaterial(surfaces());
@@ -32,7 +32,7 @@ function forestMaterial(lines, of) {
 
 // Bark, leaves or the file's own colours; by level where nodes are told apart.
 function tintForest(material, lines, of) {
-  const plain = app.colour.value === "plain", stored = lines || app.plants[0].ath.geometry.hasAttribute("color");
+  const plain = app.colour.value === "plant", stored = lines || app.plants[0].ath.geometry.hasAttribute("color");
   if (material.vertexColors !== (plain && stored)) material.needsUpdate = true;
   material.vertexColors = plain && stored;
   material.color = plain ? new Color(stored ? 0xffffff : 0x6f8f4a) : new Color().setRGB(...nodeColour(of + 1));

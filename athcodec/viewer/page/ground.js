@@ -6,7 +6,7 @@ import { chance } from "./chance.js";
 
 const REACH = 60; // Radius of the disc, over the radius of the meadow.
 const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // Number of blades; height and width over the meadow's radius.
-const COLOURS = { day: [0x687d45, 0x90a060], dusk: [0x4a5a38, 0x66744a] };
+const COLOURS = { day: [0x5f7a44, 0x86985a], dusk: [0x3d4c38, 0x556346] };
 
 const NOISE = /* glsl */`
 varying vec2 athMeadow;
@@ -25,7 +25,7 @@ const PATCHES = /* glsl */`
   float shade = 0.0, wide = length(fwidth(athMeadow)), low = dot(normalize(vViewPosition), normalize(vNormal));
   for (int i = 0; i < 6; i++) {
     float often = exp2(1.4 * float(i)) * 1.3;
-    shade += (athNoise2(athMeadow * often + 7.0 * float(i)) - 0.5) * 0.36 * (1.0 - smoothstep(0.05, 0.3, wide * often));
+    shade += (athNoise2(athMeadow * often + 7.0 * float(i)) - 0.5) * 0.24 * (1.0 - smoothstep(0.05, 0.3, wide * often));
   }
   shade *= smoothstep(0.0, 0.3, low);
   diffuseColor.rgb = mix(diffuseColor.rgb, athOther, clamp(0.4 + shade, 0.0, 1.0)) * (0.92 + 0.3 * shade);
@@ -101,13 +101,13 @@ function grass() {
   for (let i = 0; i < BLADES; i++) {
     const far = chance(i, 1) ** 0.72 * 0.98, turn = 2 * Math.PI * chance(i, 2);
     const x = far * Math.cos(turn), y = far * Math.sin(turn), clump = 0.5 + 0.5 * Math.sin(9 * x + 3 * Math.sin(7 * y)) * Math.sin(8 * y);
-    const tall = (0.35 + 0.65 * chance(i, 3)) * (0.45 + 0.75 * clump) * Math.min(1, 3.2 * (1 - far));
+    const tall = (0.35 + 0.65 * chance(i, 3)) * (0.45 + 0.75 * clump) * Math.min(1, 2.2 * (1 - far));
     at.position.set(x, y, 0);
     at.rotation.set(0, 0, 2 * Math.PI * chance(i, 4));
     at.scale.set(0.7 + 0.6 * chance(i, 5), tall, tall);
     at.updateMatrix();
     mesh.setMatrixAt(i, matrix.copy(at.matrix));
-    const shade = 0.85 + 0.4 * chance(i, 6);
+    const shade = (0.85 + 0.4 * chance(i, 6)) * Math.min(1, 0.75 + 0.8 * (1 - far)); // at the rim as the ground is
     mesh.setColorAt(i, new Color(shade, shade, 0.9 * shade));
   }
   mesh.name = "grass";

@@ -2,7 +2,7 @@
 
 import { app, main, state } from "./app.js";
 import { heatGradient } from "./colours.js";
-import { $, Choice, detailText, lengthText, rateText, upper } from "./ui.js";
+import { $, bytesText, Choice, detailText, lengthText, shortLength, upper } from "./ui.js";
 
 const MOST_BUTTONS = 9;
 
@@ -14,11 +14,20 @@ function levelControls() {
   const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
   const deepest = app.plants.find(({ motion }) => motion.levelCount > most);
   const titles = values.slice(1).map((value) => `${upper(detailText(deepest.motion, Number(value)))}, error up to ${within(deepest, value)}`);
-  if (values.length <= MOST_BUTTONS) app.level.fill(values, ["Auto", ...values.slice(1)], ["As much detail as can be seen", ...titles]);
+  const chips = values.slice(1).map((value) => app.levelText(deepest, Number(value)).join("\n")), areFew = values.length <= MOST_BUTTONS;
+  if (areFew) app.level.fill(values, ["Auto", ...chips], ["As much detail as can be seen", ...titles]);
   else app.level.fill(["auto"], ["Auto"], ["As much detail as can be seen"]);
+  $("level").hidden = areFew;
   for (const id of ["level", "compare-level"]) $(id).max = most;
   $("compare-level").value = Math.min(1, most);
   $("level").value = most;
+}
+
+/** A level as bytes and error: the file's up to it, and the largest in the clip. */
+function levelText({ ath: { channel, metadata }, motion }, of) {
+  const { chunks, info } = channel, isLast = of >= motion.levelCount - 1; // only all of it has the arrays
+  const bytes = isLast ? info.fileLength : chunks.reduce((sum, { level, length }) => sum + (level <= of ? length : 0), info.preludeLength);
+  return [bytesText(bytes), shortLength(motion.error(of).max, metadata.unit)];
 }
 
 function setLevel(value) {
@@ -76,8 +85,9 @@ function splitLabels() {
   $("split-view").hidden = !two;
   if (!two) return;
   app.plants.forEach(({ ath, motion }, i) => {
-    const of = Math.max(motion.level, 0), name = upper(detailText(motion, of)), error = `error up to ${within(app.plants[i], of)}`;
-    const text = app.compare.value === "file" ? `${ath.fileName}: ${name}, ${error}` : `${name} · ${error} · ${rateText(motion.bitRate(of))}`;
+    const of = Math.max(motion.level, 0), [bytes, error] = app.levelText(app.plants[i], of);
+    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : state.intro ? "What has come" : "Less detail";
+    const text = `${name}: ${bytes}, ${error} off`;
     const tag = $(i === 0 ? "split-left" : "split-right");
     if (tag.textContent !== text) tag.textContent = text;
   });
@@ -86,21 +96,21 @@ function splitLabels() {
 // ---- the heat map's legend ----
 
 function tellScale() {
-  if (app.colour.value !== "distance") return;
+  if (app.colour.value !== "error") return;
   const plant = main(), { unit } = plant.ath.metadata, { motion, heatMost } = plant, none = !(heatMost > 0) || motion.level >= motion.levelCount - 1;
   const text = (length) => lengthText(length, unit), onlyRight = none && app.plants.length < 2;
-  $("scale-title").textContent = onlyRight ? "This is the full detail: choose less to see its error" : "Error against the full detail";
+  $("scale-title").textContent = onlyRight ? "This is the full detail: choose less to see its error" : "Error against the full detail: 99 % of the points, and more";
   $("scale-low").textContent = text(0);
   $("scale-middle").textContent = text(heatMost / 4);
-  $("scale-high").textContent = text(heatMost);
+  $("scale-high").textContent = `${text(heatMost)}, more`;
 }
 
 export default function begin() {
-  Object.assign(app, { within, levelControls, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
+  Object.assign(app, { within, levelControls, levelText, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
   app.level = new Choice($("level-choice"), (value) => setLevel(value));
   app.colour = new Choice($("colour"), (value) => {
     for (const plant of app.plants) plant.setColour(value);
-    $("scale").hidden = value !== "distance";
+    $("scale").hidden = value !== "error";
     app.colourForest();
     state.dirty = true;
   });
@@ -117,8 +127,8 @@ export default function begin() {
     for (const each of app.opened.splice(1)) each.dispose();
     app.arrange();
   });
-  app.colour.set("plain");
-  app.show.set("mesh");
+  app.colour.set("plant");
+  app.show.set("plant");
   app.compare.set("off");
   $("scale").querySelector("i").style.background = heatGradient;
   $("level").addEventListener("input", () => setLevel($("level").value));

@@ -10,6 +10,7 @@ import camera from "./camera.js";
 import clips from "./clips.js";
 import files from "./files.js";
 import forests from "./forests.js";
+import intro from "./intro.js";
 import keys from "./keys.js";
 import look from "./look.js";
 import panel from "./panel.js";
@@ -17,6 +18,7 @@ import { lineMaterial, meshMaterial } from "./plant.js";
 import scripts from "./scripts.js";
 import sharing from "./sharing.js";
 import { Stage } from "./stage.js";
+import start from "./samples.js";
 import story from "./story.js";
 import time from "./time.js";
 import { $ } from "./ui.js";
@@ -94,7 +96,7 @@ async function setUp() {
   }
 }
 
-for (const begin of [address, arrange, camera, clips, files, forests, look, panel, sharing, story, time, wind, scripts, keys]) begin();
+for (const begin of [address, arrange, camera, clips, files, forests, intro, look, panel, sharing, start, story, time, wind, scripts, keys]) begin();
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) app.setPlaying(false);
 app.openAddress();
 loader.preload();

@@ -19,7 +19,7 @@ function enableControls(enabled) {
 export default function begin() {
   Object.assign(app, { togglePanel, enableControls });
   enableControls(false);
-  if (matchMedia("(max-width: 680px), (max-height: 480px)").matches) togglePanel();
+  if (matchMedia("(max-width: 42.5em), (max-height: 30em)").matches) togglePanel();
   $("toggle-panel").addEventListener("click", togglePanel);
   $("more").addEventListener("click", () => {
     $("more").setAttribute("aria-expanded", String(document.body.classList.toggle("told")));

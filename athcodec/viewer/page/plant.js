@@ -1,8 +1,9 @@
 // One plant on the stage: what of it is drawn, and in which colours, for one motion of a loaded file.
 
-import { BufferAttribute, BufferGeometry, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, Group, InstancedBufferAttribute, LineBasicMaterial, LineSegments, Mesh, MeshLambertMaterial } from "three";
 import { limbDepth, limbGeometry, limbMaterial, radii, setRadii, upright } from "athcodec-three";
 
+import { flare, footOf } from "./root.js";
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
@@ -28,8 +29,8 @@ const coloured = ({ userData: { source, other } }) => [["color", source], ...(ot
 export class Plant {
   root = new Group();
   space = this.root; // what the motion's own axes are those of
-  colour = "plain";
-  show = "mesh";
+  colour = "plant";
+  show = "plant";
   heatMost = 0;
   beside = [this]; // plants on one scale of colours
   #orders;
@@ -39,19 +40,19 @@ export class Plant {
   #surface = null;
   #model = null; // what a GLB shows
   #stale = true;
+  #flared = null; // the root under a trunk
 
   constructor(ath, motion = ath.motion) {
     this.ath = ath;
     this.motion = motion;
-    this.root.rotation.order = "YXZ";
     upright(this.root, ath.metadata);
     this.root.updateMatrixWorld(true);
     const { depth } = ath.branches, branch = ath.vertexBranch;
     this.#orders = branch.map((b) => depth[b]);
     this.onArrays = () => this.#arrays();
     ath.addEventListener("arrays", this.onArrays);
-    this.onLevel = () => { if (this.colour === "node") this.#numberNodes(); };
-    this.onFrame = () => { if (this.colour === "distance") this.paint(); };
+    this.onLevel = () => { if (this.colour === "part") this.#numberNodes(); };
+    this.onFrame = () => { if (this.colour === "error") this.paint(); };
     motion.addEventListener("level", this.onLevel);
     motion.addEventListener("frame", this.onFrame);
     this.#build();
@@ -60,6 +61,7 @@ export class Plant {
   #build() {
     this.#clear();
     this.#radii = radii(this.ath);
+    this.#addRoot();
     this.setShow(this.show);
     this.setColour(this.colour);
   }
@@ -72,6 +74,9 @@ export class Plant {
       for (const part of [geometry, object.material, other, ...Object.values({ ...plain }), tinted?.material]) part?.dispose();
     }
     this.#model?.removeFromParent();
+    for (const part of [this.#flared?.geometry, this.#flared?.material]) part?.dispose();
+    this.#flared?.removeFromParent();
+    this.#flared = null;
     this.#surface?.dispose();
     this.#surface = null;
     this.#drawn = [];
@@ -84,20 +89,29 @@ export class Plant {
       return;
     }
     this.#radii = radii(this.ath);
-    for (const { kind, geometry } of this.#drawn) if (kind === "mesh" && geometry.userData.other) setRadii(geometry, this.#radii);
+    for (const { kind, geometry } of this.#drawn) if (kind === "plant" && geometry.userData.other) setRadii(geometry, this.#radii);
     this.paint();
-  }
-
-  /** Stands turned by so many degrees, clockwise from above, whole and with its motion. */
-  turn(degrees) {
-    this.root.rotation.y = -degrees * Math.PI / 180;
-    this.root.updateMatrixWorld(true);
   }
 
   /** The box of the rest pose in the world. */
   get box() {
     this.root.updateMatrixWorld(true);
     return this.ath.box.clone().applyMatrix4(this.space.matrixWorld);
+  }
+
+  /** Where it stands in the world, at rest. */
+  get foot() {
+    this.root.updateMatrixWorld(true);
+    return footOf(this.ath).foot.applyMatrix4(this.space.matrixWorld);
+  }
+
+  #addRoot() {
+    const { trunk } = this.ath.model ? {} : footOf(this.ath);
+    if (!trunk) return;
+    const material = this.surfaces ? surfaceMaterial(this.surfaces) : new MeshLambertMaterial({ color: new Color().setRGB(...barkColour(0)) });
+    const mesh = this.#flared = new Mesh(flare(trunk), material);
+    mesh.castShadow = mesh.receiveShadow = true;
+    this.root.add(mesh);
   }
 
   /** Surfaces that the file's texture coordinates tell apart, see surfacesOf; null: none. */
@@ -113,8 +127,8 @@ export class Plant {
 
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
-    for (const { object, plain, tinted } of this.#drawn) if (plain) Object.assign(object, this.colour === "plain" ? plain : tinted);
-    const drawn = this.#drawn.find(({ kind }) => kind === "mesh"), wanted = Boolean(this.colour === "plain" && this.ath.hasFaces && this.surfaces);
+    for (const { object, plain, tinted } of this.#drawn) if (plain) Object.assign(object, this.colour === "plant" ? plain : tinted);
+    const drawn = this.#drawn.find(({ kind }) => kind === "plant"), wanted = Boolean(this.colour === "plant" && this.ath.hasFaces && this.surfaces);
     if (!drawn || drawn.plain || wanted === Boolean(drawn.other)) return;
     if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial(this.surfaces));
     [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
@@ -125,11 +139,11 @@ export class Plant {
     if (this.#drawn.some((drawn) => drawn.kind === kind)) return;
     const { ath, motion } = this;
     let object;
-    if (kind === "mesh" && ath.model) {
+    if (kind === "plant" && ath.model) {
       this.#addModel();
       return;
     }
-    if (kind === "skeleton") {
+    if (kind === "lines") {
       object = new LineSegments(motion.attach(this.#lines()), motion.bind(lineMaterial()));
       object.renderOrder = 1;
     } else if (ath.hasFaces) {
@@ -141,7 +155,7 @@ export class Plant {
       object = new Mesh(motion.attach(geometry), limbMaterial(motion.uniforms));
       object.customDepthMaterial = limbDepth(motion.uniforms);
     }
-    object.castShadow = object.receiveShadow = kind === "mesh";
+    object.castShadow = object.receiveShadow = kind === "plant";
     const { geometry } = object;
     const Colours = geometry.isInstancedBufferGeometry ? InstancedBufferAttribute : BufferAttribute;
     for (const [name, list] of coloured(geometry)) geometry.setAttribute(name, new Colours(new Float32Array(3 * list.length), 3));
@@ -163,7 +177,7 @@ export class Plant {
       const { source } = geometry.userData;
       geometry.setAttribute("color", new BufferAttribute(new Float32Array(3 * source.length), 3));
       motion.bindShadows(object);
-      this.#drawn.push({ kind: "mesh", geometry, object, plain, tinted });
+      this.#drawn.push({ kind: "plant", geometry, object, plain, tinted });
       this.space = object;
     });
     this.root.add(model);
@@ -201,19 +215,25 @@ export class Plant {
 
   setShow(show) {
     this.show = show;
-    for (const kind of ["mesh", "skeleton"]) if (show === kind || show === "both") this.#need(kind);
+    for (const kind of ["plant", "lines"]) if (show === kind || show === "both") this.#need(kind);
+    this.#showRoot();
     for (const { kind, object } of this.#drawn) {
       object.visible = show === "both" || show === kind;
-      if (kind === "skeleton") object.material.depthTest = show !== "both";
+      if (kind === "lines") object.material.depthTest = show !== "both";
     }
     this.paint();
   }
 
+  #showRoot() {
+    if (this.#flared) this.#flared.visible = this.show !== "lines" && this.colour === "plant";
+  }
+
   setColour(colour) {
     this.colour = colour;
+    this.#showRoot();
     this.#dress();
-    this.motion.heat = colour === "distance";
-    if (colour === "node") this.#numberNodes();
+    this.motion.heat = colour === "error";
+    if (colour === "part") this.#numberNodes();
     this.motion.refresh();
     this.paint();
   }
@@ -227,7 +247,7 @@ export class Plant {
   /** Colour of a vertex (source order) as linear r, g, b. */
   #colours() {
     const { colour, motion } = this;
-    if (colour === "node" && this.#node) {
+    if (colour === "part" && this.#node) {
       const parts = Array.from({ length: 1 + this.#node.reduce((a, b) => Math.max(a, b), 0) }, (_, part) => nodeColour(part));
       return (vertex) => parts[this.#node[vertex]];
     }
@@ -235,9 +255,9 @@ export class Plant {
       const orders = Array.from({ length: 1 + this.#orders.reduce((a, b) => Math.max(a, b), 0) }, (_, order) => orderColour(order));
       return (vertex) => orders[this.#orders[vertex]];
     }
-    if (colour === "distance") {
+    if (colour === "error") {
       const { distances } = motion;
-      this.heatMost = Math.max(...this.beside.map((plant) => (plant.motion.level < 0 ? 0 : plant.motion.error(plant.motion.level).max)));
+      this.heatMost = Math.max(...this.beside.map(({ motion: { level }, motion }) => (level < 0 ? 0 : motion.error(level).p99 || motion.error(level).max)));
       return (vertex) => heat(distances && this.heatMost ? Math.sqrt(distances[vertex] / this.heatMost) : 0);
     }
     return this.#barks();
@@ -254,13 +274,13 @@ export class Plant {
     for (const { object } of this.#drawn) object.material.uniforms?.screen?.value.set(width, height);
     if (!this.#stale) return;
     this.#stale = false;
-    const colourOf = this.#colours(), leafy = this.colour === "plain" && this.ath.hasFaces;
+    const colourOf = this.#colours(), leafy = this.colour === "plant" && this.ath.hasFaces;
     const stored = leafy ? this.ath.geometry.getAttribute("color") : null;
-    const line = this.show === "both" && this.colour === "plain" ? OVER : null;
+    const line = this.show === "both" && this.colour === "plant" ? OVER : null;
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible || object.geometry !== geometry) continue; // a GLB in its own materials
-      const fixed = kind === "skeleton" ? line : null, own = stored && kind === "mesh";
-      const vertexColour = leafy && kind !== "skeleton" ? this.#leafColours() : colourOf;
+      const fixed = kind === "lines" ? line : null, own = stored && kind === "plant";
+      const vertexColour = leafy && kind !== "lines" ? this.#leafColours() : colourOf;
       for (const [name, source] of coloured(geometry)) {
         const colour = geometry.getAttribute(name), out = colour.array;
         for (let i = 0, at = 0; i < source.length; i++, at += 3) {

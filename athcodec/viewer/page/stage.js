@@ -5,14 +5,18 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Easel } from "./easel.js";
 import { blow, meadow, tintMeadow } from "./ground.js";
+import { layShadow, shadowDisc } from "./shadow.js";
 import { discard } from "./sky.js";
 
 const TONE = { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 }, PLAIN = { toneMapping: NoToneMapping };
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
 const SHADED = 12; // plants, across a forest
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
-const QUALITY = [{ ratio: 2, shadows: true, grass: true, around: true }, { ratio: 1.25, shadows: true, grass: true, around: true },
-  { ratio: 1, shadows: false, grass: false, around: false }];
+const QUALITY = [{ ratio: 2, shadows: true, grass: true }, { ratio: 1.25, shadows: true, grass: true }, { ratio: 1, shadows: false, grass: false }];
+const EYE = 0.14; // Height of the eye over the ground, in heights of the plant: the crown stands against the sky.
+const TALL = 0.7, WIDE = 1.02; // Size of the plant in the free part of the picture.
+const FROM = new Vector3(0.35, 0, 0.92).normalize();
+const HAZE_FROM = 0.6, HAZE_TO = 8; // Distances where the ground begins and ends to fade, in sizes of the ground.
 
 // Whether there is no graphics processor, so that each picture takes long.
 function isSoftware(gl) {
@@ -138,8 +142,8 @@ export class Stage {
     const scene = new Scene(), plain = new DirectionalLight(0xfff2dd, 2.4);
     plain.position.set(0.6, 1, 0.7);
     if (!this.scenery) return scene.add(new HemisphereLight(0xeaf2ff, 0x8a8371, 1.9), plain, ...content);
-    scene.add(meadow(), ...content);
-    scene.fog = new Fog(this.sky.horizon, 1, 2);
+    scene.add(meadow(), shadowDisc(), ...content);
+    scene.fog = new Fog(this.sky.haze, 1, 2);
     this.#tint([scene]);
     return scene;
   }
@@ -150,7 +154,7 @@ export class Stage {
     for (const scene of scenes) {
       this.sky.light(scene);
       tintMeadow(scene.getObjectByName("ground"), this.sky.dark);
-      scene.fog.color.copy(this.sky.horizon);
+      scene.fog.color.copy(this.sky.haze);
     }
     this.#draw(scenes);
   }
@@ -160,12 +164,11 @@ export class Stage {
     return QUALITY[this.less];
   }
 
-  // Shadows, blades and light from all sides, as far as there is time for them.
+  // Shadows and blades, as far as there is time for them.
   #draw(scenes = this.panes.map(({ scene }) => scene)) {
     for (const scene of scenes) {
       scene.getObjectByName("sun").castShadow = this.quality.shadows;
       scene.getObjectByName("grass").visible = this.quality.grass;
-      this.sky.surround(scene, this.quality.around);
     }
   }
 
@@ -181,7 +184,7 @@ export class Stage {
   }
 
   setPanes(panes) {
-    for (const { scene } of this.panes) for (const name of ["ground", "sky"]) discard(scene.getObjectByName(name));
+    for (const { scene } of this.panes) for (const name of ["ground", "sky", "under"]) discard(scene.getObjectByName(name));
     this.panes = panes;
     this.#tint();
     this.changed();
@@ -189,17 +192,33 @@ export class Stage {
 
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
-    const size = box.getSize(new Vector3()), across = Math.hypot(size.x, size.z), half = Math.tan(this.camera.fov * Math.PI / 360);
-    const [left, top, right, bottom] = this.room, aspect = (right - left) / (bottom - top);
-    const distance = 0.35 * across + 0.62 * Math.max(size.y, 0.84 * across / aspect, 1e-6) / half;
-    box.getCenter(this.controls.target);
-    this.camera.position.copy(this.controls.target).add(new Vector3(0.35, 0.16, 0.92).normalize().multiplyScalar(distance));
+    const distance = this.#placeEye(box);
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;
     this.controls.maxDistance = distance * 20;
     this.placeGround(ground.height, ground.size, ground.plant);
     this.controls.update();
     this.changed();
+  }
+
+  // As near as the plant has its share of the free part of the picture; the tips of a crown are in its middle, its sides at half its height.
+  #placeEye(box) {
+    const { camera, controls: { target } } = this, [left, top, right, bottom] = this.room, size = box.getSize(new Vector3());
+    const half = Math.tan(camera.fov * Math.PI / 360), across = 0.5 * Math.max(Math.hypot(size.x * FROM.z, size.z * FROM.x), 1e-6);
+    box.getCenter(target);
+    const eye = box.min.y + EYE * size.y - target.y, view = new Vector3(), seen = (distance) => {
+      view.copy(FROM).multiplyScalar(distance).setY(eye).normalize(); // towards the eye
+      const tips = [0.5, -0.5].map((part) => (part * size.y * Math.hypot(view.x, view.z)) / (Math.hypot(distance, eye) - part * size.y * view.y));
+      return Math.max((tips[0] - tips[1]) / (2 * half * TALL), across / ((distance - 0.3 * across) * half * WIDE * (right - left) / (bottom - top)));
+    };
+    let near = 0.55 * Math.max(size.y, across, 1e-6), far = 100 * near;
+    for (let i = 0; i < 40; i++) {
+      const middle = Math.sqrt(near * far);
+      if (seen(middle) > 1) near = middle;
+      else far = middle;
+    }
+    camera.position.copy(target).addScaledVector(FROM, far).setY(target.y + eye);
+    return far;
   }
 
   /** Returns the near part of a forest that reaches so far; box: the box of one plant. */
@@ -215,8 +234,9 @@ export class Stage {
   /** size: of all that stands on it; plant: of a single plant, which the blades of grass are as large as. */
   placeGround(height, size, plant = size) {
     if (!this.scenery) return;
-    for (const { scene } of this.panes) {
+    for (const { scene, foot = null } of this.panes) {
       const ground = scene.getObjectByName("ground");
+      layShadow(scene.getObjectByName("under"), size === plant ? foot : null, size, this.quality.shadows);
       ground.position.y = height;
       ground.scale.setScalar(size);
       ground.getObjectByName("grass").scale.setScalar(Math.sqrt(plant / size));
@@ -229,8 +249,8 @@ export class Stage {
   /** Haze from one distance to another; where both are 0 only the ground far off is in it. */
   fog(near, far) {
     for (const { scene } of this.panes) {
-      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [2 * size, 56 * size];
-      scene.fog = new Fog(this.sky.horizon, from, to);
+      const size = scene.getObjectByName("ground").scale.x, [from, to] = far > 0 ? [near, far] : [HAZE_FROM * size, HAZE_TO * size];
+      scene.fog = new Fog(this.sky.haze, from, to);
     }
   }
 

@@ -1,31 +1,33 @@
 // The page's account of the file: how small it is, how much of it is here, and how that looks.
 
 import { app, counters, main, state } from "./app.js";
-import { $, bytesText, countText, detailText, lengthText, paintReady, rateText, rows } from "./ui.js";
+import { $, bytesText, countText, lengthText, paintReady, rateText, rows, shortLength } from "./ui.js";
 
 const SHAPES = 0x13, REFINED_REST = 0x15, NO_LEVEL = 255; // chunks that are of no clip alone
 const SOURCE_REST = 0x21; // which nothing that is shown needs
 const FLOAT3 = 12; // bytes of a position as float32
+const JOINT = 28; // bytes of a rotation and a translation as float32, as a GLB has them for each joint and frame
 
 let bandwidth = null; // Bits per second of the loading that is played again.
 
 function describe() {
-  const [ath] = app.opened, { info, clips } = ath.motion, counts = [...new Set(clips.map((clip) => clip.frameCount))];
-  const frames = clips.length > 1 && counts.length === 1 ? `${countText(counts[0])} frames each` : `${countText(info.frameCount)} frames`;
+  const [ath] = app.opened;
   $("name").textContent = app.opened.map((each) => each.fileName).join("  ·  ");
   document.title = `${ath.fileName} – athcodec`;
-  $("summary").textContent = [`${countText(info.vertexCount)} points`, `${countText(info.branchCount)} branches`,
-    clips.length > 1 ? `${clips.length} clips, ${frames}` : frames].join(", ");
 }
 
-/** How much smaller the file is than the positions of its source. */
+/** What the file holds and how small it is, in one sentence of figures that are all of the whole file. */
 function tellSizes() {
-  const { info } = app.opened[0].motion, source = info.vertexCount * info.frameCount * FLOAT3, times = source / info.fileLength;
-  $("source-size").textContent = bytesText(source);
+  const { metadata, motion: { info, clips, levelCount }, channel } = app.opened[0], seconds = clips.reduce((sum, { duration }) => sum + duration, 0);
+  const error = Math.max(...clips.map(({ errors }) => errors[levelCount - 1].max)), isWind = [metadata, ...Object.values(metadata.clips ?? {})].some(({ strength }) => Number.isFinite(strength));
+  const points = `${countText(info.vertexCount)} ${info.vertexCount === 1 ? "point" : "points"}`;
+  $("what").textContent = `${Number(seconds.toPrecision(2))} s of ${isWind ? "wind" : "motion"} in ${points} within ${shortLength(error, metadata.unit)}:`;
   $("file-size").textContent = bytesText(info.fileLength);
-  $("times").textContent = `${times < 10 ? times.toFixed(1) : countText(Math.round(times))} times smaller`;
-  $("sizes").title = `${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes of float32, `
-    + `against the whole file of ${countText(info.fileLength)} bytes`;
+  const others = [[info.vertexCount * FLOAT3, "float32"], [info.branchCount * JOINT, "GLB"]].map(([each, name]) => [info.frameCount * each, name]);
+  $("source-size").textContent = others.filter(([bytes]) => bytes > info.fileLength).map(([bytes, name]) => `${bytesText(bytes)} (${name})`).join(" or ");
+  $("instead").hidden = $("source-size").textContent === "";
+  $("sizes").title = `The whole file: ${countText(info.fileLength)} bytes. float32: ${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes. `
+    + `GLB: a rotation and a translation of a joint for each of ${countText(info.branchCount)} branches × ${countText(info.frameCount)} frames × ${JOINT} bytes, before its meshes`;
   $("sizes").hidden = $("replay").hidden = false;
 }
 
@@ -45,7 +47,7 @@ function replayed(bits) {
 /** Returns how many bytes of the file the clip that plays can need. */
 function needed({ channel }, { clip, bytesTotal }) {
   const end = clip.firstSegment + clip.segmentCount;
-  const others = channel.chunks.filter(({ kind, level, segment }) => kind === SOURCE_REST || (!state.wind && level !== NO_LEVEL
+  const others = channel.chunks.filter(({ kind, level, segment }) => kind === SOURCE_REST || (state.wind === null && level !== NO_LEVEL
     && kind !== SHAPES && kind !== REFINED_REST && (segment < clip.firstSegment || segment >= end)));
   return others.reduce((sum, { length }) => sum - length, bytesTotal);
 }
@@ -72,14 +74,13 @@ function watchArrival({ motion, channel }) {
 const seconds = (ms) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
 
 function tellArrived() {
-  const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched, bytesTotal } = motion;
+  const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched } = motion;
   const share = Math.min(1, bytesFetched / wanted), shown = Math.max(motion.level, 0), { first, whole } = counters.arrived;
   const bar = $("progress"), settled = motion.level >= motion.target || motion.failure;
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
-  const here = bytesFetched >= bytesTotal ? "All here" : whole ? `${bytesText(bytesFetched)}, all this clip needs` : `${bytesText(bytesFetched)} here`;
-  $("arrived").textContent = `${here}: ${detailText(motion, shown)}, error up to ${app.within(main(), shown)}${settled ? "" : ", sharpening…"}`;
+  $("arrived").textContent = `${bytesText(bytesFetched)} here, ${shortLength(motion.error(shown).max, ath.metadata.unit)} off${settled ? "" : ", sharpening…"}`;
   $("timing").hidden = !bandwidth;
   $("timing").textContent = `First picture after ${seconds(first)}${whole ? `, full detail after ${seconds(whole)}` : ""}`;
 }
@@ -87,6 +88,8 @@ function tellArrived() {
 function tellFacts() {
   const { motion, ath } = main(), { unit } = ath.metadata, shown = Math.max(motion.level, 0);
   rows($("facts"), [
+    ["Points, branches", `${countText(motion.info.vertexCount)}, ${countText(motion.info.branchCount)}`],
+    ["Clips, frames", `${motion.clips.length}, ${countText(motion.info.frameCount)}`],
     ["Fetched", `${bytesText(motion.bytesFetched)} of ${bytesText(motion.bytesTotal)}`],
     ["Motion as shown", `${rateText(motion.bitRate(shown))}`],
     ["Detail", `${shown} of ${motion.levelCount - 1}: ${motion.levelName(shown)}`],

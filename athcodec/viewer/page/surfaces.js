@@ -153,18 +153,25 @@ function soften(material) {
   return material;
 }
 
-/** For geometries with texture coordinates and the surfaces of a file; not yet bound to a motion. */
-export function surfaceMaterial(surfaces) {
-  const material = soften(new MeshStandardMaterial({ side: DoubleSide, shadowSide: DoubleSide }));
-  material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
-    .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
-    .replace("#include <map_fragment>", SURFACE)
-    .replace("#include <roughnessmap_fragment>", "float roughnessFactor = athIsLeaf ? 0.62 : 0.95;")
-    .replace("#include <normal_fragment_maps>", BUMP)
-    .replace("#include <lights_fragment_end>", `#include <lights_fragment_end>\n${THROUGH}`), surfaces);
-  material.customProgramCacheKey = () => `ath surface ${surfaces}`;
-  return material;
+/** Bark and leaves as the viewer draws them, for geometries with texture coordinates and the metadata of their file; not yet bound to a
+ * motion. Where the metadata name no surfaces that are known, it is a plain material in the colour of leaves. */
+export class ATHPlantMaterial extends MeshStandardMaterial {
+  constructor(metadata = {}) {
+    const surfaces = surfacesOf(metadata);
+    super(surfaces ? { side: DoubleSide, shadowSide: DoubleSide } : { side: DoubleSide, color: 0x6f8f4a, roughness: 0.8 });
+    if (!surfaces) return;
+    this.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
+      .replace("#include <common>", `#include <common>\n${SHAPE}${LOOK}`)
+      .replace("#include <map_fragment>", SURFACE)
+      .replace("#include <roughnessmap_fragment>", "float roughnessFactor = athIsLeaf ? 0.62 : 0.95;")
+      .replace("#include <normal_fragment_maps>", BUMP)
+      .replace("#include <lights_fragment_end>", `#include <lights_fragment_end>\n${THROUGH}`), surfaces);
+    this.customProgramCacheKey = () => `ath surface ${surfaces}`;
+    soften(this);
+  }
 }
+
+export const surfaceMaterial = (surfaces) => new ATHPlantMaterial({ surfaces: surfaces.join(", ") });
 
 /** Returns the material with the leaves' outlines, in colours that tell something. */
 export function outlined(material, surfaces) {

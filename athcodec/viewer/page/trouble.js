@@ -22,6 +22,24 @@ const DAMAGED = ["The file is damaged", "Some of its bytes are not what they wer
 
 const PASSING = ["HTTP", "NETWORK", "MISSING", "TRUNCATED", "CHANGED", "WORKER"];
 
+// What other files begin with, and what they are called.
+const KINDS = [[/^Ogawa/, "Alembic"], [/^PXR-USDC|^#usda/, "USD"], [/^\x89HDF\r\n/, "HDF5"], [/^\x93NUMPY/, "NumPy"], [/^POINTCACHE2/, "a PC2 point cache"],
+  [/^FOR[48]/, "a Maya cache"], [/^\s*(<\?xml|<VTKFile|<Xdmf)/, "XML"]];
+const SUFFIXES = { abc: "Alembic", usd: "USD", usda: "USD", usdc: "USD", usdz: "USD", h5: "HDF5", hdf5: "HDF5", npz: "NumPy", gltf: "glTF", mdd: "an MDD point cache",
+  pc2: "a PC2 point cache", vtu: "VTK", vtp: "VTK", vtkhdf: "VTK HDF", xdmf: "XDMF", mtg: "MTG", obj: "OBJ", ply: "PLY" };
+
+// A name as a shell takes it.
+const quoted = (name) => (/^[\w.,+-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`);
+
+/** Describes a file of another program, from its first bytes and its name, as `wordsOf` does; null: its kind is not known. */
+export function otherKind(head, name) {
+  const text = String.fromCharCode(...head), suffix = /\.(\w+)$/.exec(name)?.[1].toLowerCase();
+  const kind = KINDS.find(([begins]) => begins.test(text))?.[1] ?? SUFFIXES[suffix];
+  if (!kind) return null;
+  const made = /\.\w+$/.test(name) ? name.replace(/\.\w+$/, ".ath") : `${name}.ath`;
+  return { title: `This is ${kind}`, advice: `Make an .ath file of it: athcodec encode ${quoted(name)} ${quoted(made)}`, passing: false };
+}
+
 /** Describes a failure: {title, advice, passing}; `passing`: whether it may be gone when it is tried again. */
 export function wordsOf(codeName) {
   const [title, advice] = WORDS[codeName] ?? DAMAGED;

@@ -4,9 +4,10 @@ export const $ = (id) => document.getElementById(id);
 
 const UNITS = { m: 1, cm: 0.01, mm: 0.001, km: 1000, in: 0.0254, ft: 0.3048 };
 
+/** In three figures; number and unit stay on one line. */
 export function bytesText(bytes) {
-  if (bytes < 1e3) return `${bytes} B`;
-  return bytes < 999500 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 2 : 1)} MB`;
+  if (bytes < 1e3) return `${bytes}\u00a0B`;
+  return bytes < 999500 ? `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)}\u00a0kB` : `${(bytes / 1e6).toFixed(bytes < 1e7 ? 2 : bytes < 1e8 ? 1 : 0)}\u00a0MB`;
 }
 
 export function rateText(bits) {
@@ -21,6 +22,13 @@ export function lengthText(length, unit) {
   if (!(unit in UNITS)) return `${Number(length.toPrecision(3))}${unit ? ` ${unit}` : ""}`;
   const metres = length * UNITS[unit];
   return metres >= 10 ? `${Number(metres.toPrecision(3))} m` : `${countText(Number((1e3 * metres).toPrecision(3)))} mm`;
+}
+
+/** As `lengthText` in two figures, in the unit that it is read in best. */
+export function shortLength(length, unit) {
+  if (!(unit in UNITS)) return lengthText(Number(length.toPrecision(2)), unit);
+  const mm = 1e3 * length * UNITS[unit], [size, name] = mm < 99.5 ? [1, "mm"] : mm < 995 ? [10, "cm"] : [1000, "m"];
+  return `${countText(Number((mm / size).toPrecision(2)))} ${name}`;
 }
 
 /** A level, for people: "detail 2 of 6". */

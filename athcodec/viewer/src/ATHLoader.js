@@ -431,6 +431,7 @@ export class ATHLoader extends Loader {
     this.clip = null;
     this.hostMesh = null;
     this.bandwidth = null;
+    this.begun = null;
   }
 
   /** Where ath_worker.js is, if not beside this module: its folder, or its URL. */
@@ -477,6 +478,14 @@ export class ATHLoader extends Loader {
     return this;
   }
 
+  /** Takes what a page has begun before this module was there: a `worker` that runs ath_worker.js and, where the `url` of a file
+   * is known, its `front`, a promise of {status, headers, bytes} of an answer to a request for its first bytes, or of null. */
+  takeOver({ worker, url = null, front = null }) {
+    this.#add(worker);
+    this.begun = { url, front };
+    return this;
+  }
+
   /** Starts to load. onLoad gets an ATH when its first picture can be shown; the rest goes on arriving. */
   load(url, onLoad, onProgress, onError) {
     const whole = this.manager.resolveURL(LoaderUtils.resolveURL(url, this.path));
@@ -487,7 +496,7 @@ export class ATHLoader extends Loader {
       call?.(value);
       this.manager.itemEnd(url);
     };
-    this.#open({ url: new URL(whole, globalThis.location?.href).href, options }, [], onProgress)
+    this.#openUrl(new URL(whole, globalThis.location?.href).href, options, onProgress)
       .then((ath) => done(onLoad, ath), (error) => {
         if (!onError) console.error(error);
         done(onError, error);
@@ -508,6 +517,13 @@ export class ATHLoader extends Loader {
   abort() {
     for (const { channels } of this.workerPool) for (const channel of [...channels.values()]) channel.abort();
     return this;
+  }
+
+  // The front that a page has begun to fetch serves the first file of that address.
+  async #openUrl(url, options, onProgress) {
+    const { clip, hostMesh, bandwidth, begun } = this, front = begun?.url === url && bandwidth === null ? await begun.front : null;
+    this.begun = null;
+    return this.#open({ url, options: { ...options, front }, clip, hostMesh, bandwidth }, front ? [front.bytes] : [], onProgress);
   }
 
   async #open(message, transfer, onProgress) {
@@ -551,7 +567,10 @@ export class ATHLoader extends Loader {
   }
 
   #start() {
-    const worker = this.#make();
+    return this.#add(this.#make());
+  }
+
+  #add(worker) {
     Object.assign(worker, { files: 0, channels: new Map() });
     worker.onmessage = ({ data }) => worker.channels.get(data.file)?.receive(data);
     worker.onerror = ({ message }) => {
@@ -566,7 +585,7 @@ export class ATHLoader extends Loader {
   #make() {
     const { href, origin } = globalThis.location ?? {};
     try {
-      const url = new URL(this.workerURL ?? new URL("./ath_worker.js", import.meta.url), href), isHere = url.origin === origin || !/^http/.test(origin);
+      const url = new URL(this.workerURL ?? new URL("./ath_worker.js", import.meta.url), href), isHere = url.protocol === "blob:" || url.origin === origin || !/^http/.test(origin);
       const script = isHere ? url : URL.createObjectURL(new Blob([`import ${JSON.stringify(url.href)};`], { type: "text/javascript" }));
       // a page from the disk may have no module as a worker from its own memory; the bundle is both
       return new Worker(script, { type: url.protocol === "blob:" ? "classic" : "module" });

@@ -50,7 +50,7 @@ class Stand extends Stage {
 
   show(plant, reach) {
     this.#reach = reach;
-    this.setPanes([{ scene: this.scene([plant.root]), before: (width, height) => plant.prepare(width, height) }]);
+    this.setPanes([{ scene: this.scene([plant.root]), foot: plant.foot, before: (width, height) => plant.prepare(width, height) }]);
     this.#box = plant.box;
     this.#fit();
   }
@@ -61,7 +61,10 @@ class Stand extends Stage {
   }
 }
 
-export class ATHViewerElement extends HTMLElement {
+// Node has no elements: there the page's modules are only read.
+export class ATHViewerElement extends (globalThis.HTMLElement ?? Object) {
+  static tag = "ath-viewer";
+
   static observedAttributes = ["src", "clip", "level", "wind", "paused", "alt", "camera-controls"];
 
   /** Whose settings hold for elements that load later. */
@@ -335,4 +338,4 @@ export class ATHViewerElement extends HTMLElement {
   }
 }
 
-if (!customElements.get("ath-viewer")) customElements.define("ath-viewer", ATHViewerElement);
+if (globalThis.customElements && !customElements.get(ATHViewerElement.tag)) customElements.define(ATHViewerElement.tag, ATHViewerElement);

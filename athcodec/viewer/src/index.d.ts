@@ -21,7 +21,7 @@
 
 import {
   Box3, BufferGeometry, Camera, ColorRepresentation, DataTexture, EventDispatcher, Group, IUniform, Loader, LoadingManager, Material,
-  Matrix4, Mesh, Object3D, Sphere,
+  Matrix4, Mesh, MeshStandardMaterial, Object3D, Sphere,
 } from "three";
 
 export class ATHLoader extends Loader<ATH> {
@@ -315,6 +315,12 @@ export class ATHForest extends Group {
   readonly culled: number;
   readonly vertices: number;
   dispose(): void;
+}
+
+/** Bark and leaves as the viewer draws them, made in the shader from texture coordinates, where the metadata of a file name its
+ * `surfaces`; else a plain material in the colour of leaves: `ath.motion.bind(new ATHPlantMaterial(ath.metadata))`. For WebGLRenderer. */
+export class ATHPlantMaterial extends MeshStandardMaterial {
+  constructor(metadata?: { surfaces?: unknown });
 }
 
 /** The branches of a file without faces as round limbs, each edge a strip that faces the camera, lit as a cylinder by a light of its own;

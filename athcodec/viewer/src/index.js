@@ -8,3 +8,4 @@ export { injectMotion, MOTION_PARS, motionUniforms } from "./shader.js";
 export { upright } from "./geometry.js";
 export { limbDepth, limbGeometry, limbMaterial, setRadii } from "./limbs.js";
 export { radii } from "./radii.js";
+export { ATHPlantMaterial } from "../page/surfaces.js";

@@ -92,10 +92,13 @@ export class HttpSource {
   total = null;  // bytes of the file, where the server says it
   #tag = null;
   #abort = new AbortController();
+  #front; // the answer to the first request, where a page has sent that already
 
-  constructor(url, { headers = {}, credentials = "same-origin" } = {}) {
+  /** front: {status, headers, bytes} of an answer that begins at the first byte; null: there is none. */
+  constructor(url, { headers = {}, credentials = "same-origin", front = null } = {}) {
     this.url = url;
     this.options = { headers, credentials };
+    this.#front = front;
   }
 
   /** Hands `take(bytes, offset)` the pieces of a range as they come. A server without ranges sends the whole
@@ -124,7 +127,9 @@ export class HttpSource {
   async #request(offset, size, forward) {
     const { headers, credentials } = this.options;
     this.requests++;
-    const answer = await fetch(this.url, {
+    const front = offset === 0 ? this.#front : null;
+    this.#front = null;
+    const answer = front ? new Response(front.bytes, front) : await fetch(this.url, {
       headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
       cache: "no-store", // browsers' caches let ranges of one file wait for each other, and ask for some twice
     });

@@ -49,3 +49,30 @@ declare global {
     "ath-viewer": ATHViewerElement;
   }
 }
+
+/** The attributes of <ath-viewer> as JSX takes them. */
+export interface ATHViewerAttributes {
+  src?: string;
+  clip?: string;
+  wind?: string;
+  level?: number | "auto" | `${number}`;
+  speed?: number | string;
+  paused?: boolean;
+  "camera-controls"?: boolean | "" | "turn";
+  alt?: string;
+  loading?: "lazy";
+  scenery?: boolean;
+  forest?: number | string;
+  floor?: string;
+}
+
+// Pages without React have no such module, which is no error of theirs.
+// @ts-ignore
+declare module "react" {
+  namespace JSX {
+    interface IntrinsicElements {
+      // @ts-ignore
+      "ath-viewer": ATHViewerAttributes & import("react").DetailedHTMLProps<import("react").HTMLAttributes<ATHViewerElement>, ATHViewerElement>;
+    }
+  }
+}

@@ -1,4 +1,188 @@
-import{ATHLoader as Ae,radii as wt}from"athcodec-three";import{ATHForest as Le}from"athcodec-three/webgpu";import{ACESFilmicToneMapping as vt,DoubleSide as yt,MeshStandardNodeMaterial as bt,PerspectiveCamera as St,Scene as Mt,Vector3 as Et,WebGPURenderer as Tt}from"three/webgpu";import{OrbitControls as At}from"three/addons/controls/OrbitControls.js";function S(o,e){let t=Math.sin(12.9898*o+78.233*e)*43758.5453;return t-Math.floor(t)}import{BufferAttribute as ee,BufferGeometry as Ie,Color as oe,Vector3 as H}from"three";var Ne=new oe(6968380),_e=[5208628,7050304,8825162].map(o=>new oe(o)),te=2600;function ne(o,e){let{rest:t,sphere:n}=o,a=[...e].sort((c,l)=>c-l)[Math.floor(.7*e.length)],s=.026*n.radius,h=c=>e[c]<=a,d=c=>new H().fromArray(t,3*c);return c=>{let{source:l}=c.userData,u=c.index.array,i={offset:[],normal:[],color:[],vertices:[],index:[]},f=(p,m,w,M)=>(i.vertices.push(p),i.offset.push(m.x,m.y,m.z),i.normal.push(w.x,w.y,w.z),i.color.push(M.r,M.g,M.b),i.vertices.length-1),y=(p,m,w,M)=>{let L=(g,b)=>f(g,w.clone().multiplyScalar(b*e[g]),M,Ne),r=[L(p,-1),L(p,1),L(m,-1),L(m,1)];i.index.push(r[0],r[1],r[2],r[2],r[1],r[3])},I=Array.from({length:u.length/2},(p,m)=>[l[u[2*m]],l[u[2*m+1]]]);for(let[p,m]of I){let w=d(m).sub(d(p)).normalize(),M=new H(w.y,-w.x,w.z*.1).cross(w).normalize(),L=new H().crossVectors(w,M);y(p,m,M,L),h(m)||y(p,m,L,M)}let T=I.map(([,p])=>p).filter(h),N=Math.min(te,2*T.length),A=s*Math.sqrt(te/Math.max(N,60));for(let p=0;p<N;p++){let m=T[Math.floor(p*T.length/N)],w=2*Math.PI*S(p,1),M=S(p,2)-.35,L=new H(Math.cos(w),M,Math.sin(w)).normalize().multiplyScalar(A),r=new H(-Math.sin(w),.6*(S(p,3)-.5),Math.cos(w)).multiplyScalar(.42*A),g=d(m).sub(n.center).normalize().add(new H(0,.7,0)).normalize(),b=_e[p%3].clone().multiplyScalar(.8+.4*S(p,4)),E=L.clone().multiplyScalar(.5),_=f(m,new H,g,b);f(m,E.clone().add(r),g,b),f(m,E.clone().sub(r),g,b),f(m,L,g,b),i.index.push(_,_+1,_+2,_+2,_+1,_+3)}let O=new Ie;for(let[p,m]of[["athOffset",i.offset],["normal",i.normal],["color",i.color]])O.setAttribute(p,new ee(Float32Array.from(m),3));return O.setIndex(new ee(Uint32Array.from(i.index),1)),O.userData.vertices=Uint32Array.from(i.vertices),O}}import{Color as He,DirectionalLight as Ce,Fog as ke,HemisphereLight as Ue,Mesh as Re,MeshStandardNodeMaterial as $e,PlaneGeometry as De,TSL as ze,Vector3 as Fe}from"three/webgpu";var{Fn:ce,clamp:Ge,color:V,dot:Be,max:We,mix:$,mx_noise_float:Ve,normalWorldGeometry:ae,positionWorld:Ke,pow:se,smoothstep:re,vec3:k}=ze,C=new Fe(-.62,.72,.32).normalize(),je=7317210,le=15002600,qe=16773334,ie=2048,Ye=9,Xe=ce(()=>{let o=Ge(ae.y,0,1),e=We(Be(ae,k(C.x,C.y,C.z)),0);return $($(V(le),V(je),se(o,.55)),V(qe),se(e,6).mul(.4))}),Ze=o=>ce(()=>{let e=Ke.xz.div(o),t=h=>Ve(k(e.x.mul(h),e.y.mul(h),h)),n=re(-.5,.6,t(.35).add(t(1.9).mul(.5))),a=t(23).mul(.5).add(t(61).mul(.5)),s=$(k(.085,.12,.03),k(.16,.19,.055),n);return $(s,k(.13,.1,.05),re(.25,.75,t(.8)).mul(.5)).mul(a.mul(.5).add(1))})(),D=class{constructor(e,t){let n=260*t,a=Ye*t;this.sun=new Ce(16773592,3.2),this.ground=new Re(new De(4*n,4*n),new $e({roughness:1})),this.ground.material.colorNode=Ze(t),this.ground.rotation.x=-Math.PI/2,this.ground.receiveShadow=!0,Object.assign(this.sun.shadow.camera,{left:-a,right:a,top:a,bottom:-a,near:.1*a,far:5*a}),Object.assign(this.sun.shadow,{bias:-5e-4,normalBias:.004*t}),this.sun.shadow.mapSize.setScalar(ie),this.reach=a,e.backgroundNode=Xe(),e.fog=new ke(new He(le),10*t,.55*n),e.add(this.ground,this.sun,this.sun.target,new Ue(14478328,9211746,1.3))}set shadows(e){this.sun.castShadow=e}around(e){let t=2*this.reach/ie*16,n=a=>Math.round(a/t)*t;this.sun.target.position.set(n(e.x),0,n(e.z)),this.sun.position.copy(this.sun.target.position).addScaledVector(C,2.5*this.reach)}};import{DoubleSide as tt,MeshStandardNodeMaterial as ot,TSL as nt}from"three/webgpu";import{DoubleSide as Bt,MeshDepthMaterial as Wt,MeshStandardMaterial as Vt,RGBADepthPacking as Kt}from"three";var Je=["bark","stalks"],Qe=["leaves","blades","pinnae"];function he({surfaces:o}){let[e,t]=typeof o=="string"?o.split(", "):[];return Je.includes(e)&&Qe.includes(t)?[e,t]:null}var et=`
+var Ks=Object.defineProperty;var Xs=(r,t)=>{for(var e in t)Ks(r,e,{get:t[e],enumerable:!0})};import*as sn from"./three.webgpu.js";var ne={};Xs(ne,{ATH:()=>ht,ATHForest:()=>Rt,ATHLimbs:()=>Dt,ATHLoader:()=>K,ATHMotion:()=>et,ATHPlantMaterial:()=>kt,MOTION_PARS:()=>St,dataTexture:()=>at,injectMotion:()=>U,limbDepth:()=>Be,limbGeometry:()=>Tt,limbMaterial:()=>Pt,motionUniforms:()=>tt,radii:()=>X,setRadii:()=>lt,upright:()=>$});import{Box3 as Mi,Group as Si,LineBasicMaterial as Ei,LineSegments as Ai,Loader as Oi,Mesh as Ti,MeshStandardMaterial as Pi,EventDispatcher as Di,DoubleSide as Ri,LoaderUtils as ki,Object3D as Ci,Vector3 as Ne}from"./three.webgpu.js";import{Box3 as te,DataTexture as di,EventDispatcher as pi,FloatType as mi,MathUtils as Re,NearestFilter as gi,RGBAFormat as wi,Sphere as Ce,Vector3 as Et}from"./three.webgpu.js";import{BufferAttribute as V,BufferGeometry as Ee,InstancedBufferAttribute as Js,ShapeUtils as Qs,Vector2 as ti,Vector3 as nt}from"./three.webgpu.js";function Kt(r,{array:t,columns:e=0,counts:s=null}){let i=new Float64Array(r.length),o=s?s.length:t.length/e,n=[0,0,0];for(let a=0,h=0;a<o;a++){let l=s?Number(s[a]):e;for(let c=1;c+1<l;c++)Zs(i,r,Number(t[h]),Number(t[h+c]),Number(t[h+c+1]));h+=l}for(let a=0;a<i.length;a++)n[a%3]+=3*r[a]/i.length;for(let a=0;a<i.length;a+=3){let h=i[a]||i[a+1]||i[a+2];for(let c=0;!h&&c<3;c++)i[a+c]=r[a+c]-n[c]||1e-9;let l=Math.hypot(i[a],i[a+1],i[a+2]);for(let c=0;c<3;c++)i[a+c]/=l}return Float32Array.from(i)}function Zs(r,t,e,s,i){e*=3,s*=3,i*=3;let o=t[s]-t[e],n=t[s+1]-t[e+1],a=t[s+2]-t[e+2],h=t[i]-t[e],l=t[i+1]-t[e+1],c=t[i+2]-t[e+2],u=n*c-a*l,f=a*h-o*c,d=o*l-n*h;for(let p of[e,s,i])r[p]+=u,r[p+1]+=f,r[p+2]+=d}function Xt(r,t){let{face_vertex_counts:e,face_vertex_indices:s}=t;return r.faces?r.faces:e&&s?{array:Uint32Array.from(s.array,Number),counts:e.array}:null}function $(r,{up_axis:t}){return t==="z"&&(r.rotation.x=-Math.PI/2),t==="x"&&(r.rotation.z=Math.PI/2),r}function xt(r,{metadata:t,origin:e}){return $(r,t).position.fromArray(e).applyEuler(r.rotation),r}function q(r,t,e,s){let i=r.getAttribute(t),o=r.isInstancedBufferGeometry?Js:V;i?.array.length!==e.length?r.setAttribute(t,new o(e,s)):Object.assign(i,{array:e,needsUpdate:!0})}function Ae(r,t){let{rest:e,statics:{metadata:s}}=r,i=s.domains??{},o=[i.uv,i.normals,i.colors].includes("corner"),n=o?t.array:Uint32Array.from({length:e.length/3},(h,l)=>l),a=Pe(e,n);return a.setIndex(new V(si(e,t,o),1)),Object.assign(a.userData,{corners:o,faces:t}),ei(a,Kt(e,t)),a}function Oe(r,t){let{rest:e}=r,s=Pe(e,Uint32Array.from({length:e.length/3},(i,o)=>o));return s.setIndex(new V(t,1)),s}function Te(r,t){let{source:e,other:s,faces:i}=r.userData,o=s?[["rest",e,t],["restOther",s,t]]:[["position",e,t]];i&&o.push(["normal",e,Kt(t,i)]);for(let[n,a,h]of o){let l=r.getAttribute(n);Y(l.array,h,a,3),l.needsUpdate=!0}}var vt=class extends V{#t;#e=()=>null;follow(t,e){return this.#t=t,this.#e=e,this}getComponent(t,e){let s=this.#e();return s?s[3*this.#t[t]+e]:super.getComponent(t,e)}getX(t){return this.getComponent(t,0)}getY(t){return this.getComponent(t,1)}getZ(t){return this.getComponent(t,2)}};function Pe(r,t){let e=new Ee,s=new Float32Array(3*t.length);return Y(s,r,t,3),e.setAttribute("position",new V(s,3)),e.userData.source=t,e}function Y(r,t,e,s){for(let i=0;i<e.length;i++)for(let o=0;o<s;o++)r[s*i+o]=Number(t[s*e[i]+o]);return r}function ei(r,t){let{source:e}=r.userData;r.setAttribute("normal",new V(Y(new Float32Array(3*e.length),t,e,3),3))}function Zt(r,t,e){let s=t.statics.metadata.domains??{};for(let[i,o,n]of[["uv","uv",[2]],["normals","normal",[3]],["colors","color",[3,4]]]){let a=e[i],h=a?.shape.at(-1);if(!a||a.shape.length!==2||!n.includes(h))continue;let{source:l,corners:c}=r.userData,u=s[i]==="corner",f=a.shape[0],d=u?l.length:t.rest.length/3;if(f!==d||u&&!c)continue;let p=a.array instanceof Uint8Array?1/255:1,m=u?Uint32Array.from({length:f},(x,y)=>y):l,b=Y(new Float32Array(h*l.length),a.array,m,h).map(x=>x*p);q(r,o,b,h),i==="normals"&&(r.userData.faces=null)}}function si(r,{array:t,columns:e=0,counts:s=null},i){let o=[],n=s?s.length:t.length/e;for(let a=0,h=0;a<n;a++){let l=s?Number(s[a]):e;for(let[c,u,f]of ii(r,t,h,l))o.push(...[c,u,f].map(d=>i?h+d:Number(t[h+d])));h+=l}return Uint32Array.from(o)}function ii(r,t,e,s){if(s<3)return[];if(s===3)return[[0,1,2]];let i=Array.from({length:s},(o,n)=>new nt().fromArray(r,3*Number(t[e+n])));return s===4?i[0].distanceToSquared(i[2])<=i[1].distanceToSquared(i[3])?[[0,1,2],[0,2,3]]:[[0,1,3],[1,2,3]]:oi(i)??Array.from({length:s-2},(o,n)=>[0,n+1,n+2])}function oi(r){let t=new nt,e=new nt,s=new nt;if(r.forEach((o,n)=>t.add(new nt().crossVectors(o,r[(n+1)%r.length]))),t.lengthSq()===0)return null;t.normalize(),e.set(Math.abs(t.x)>.9?0:1,Math.abs(t.x)>.9?1:0,0).cross(t).normalize(),s.crossVectors(t,e);let i=Qs.triangulateShape(r.map(o=>new ti(o.dot(e),o.dot(s))),[]);return i.length>0?i:null}function Q(r,t,e,s){let{source:i}=r.userData,o=r.index.array,n=!r.getAttribute("normal"),a=new Map,h=n?2:3,l=[],c=new Set,u=f=>{let d=3*i[f],p=b=>Math.floor(t[d+b]/e)&4095,m=((s[i[f]]+1&65535)*4096+p(0))*16777216+p(1)*4096+p(2);return a.has(m)||a.set(m,f),a.get(m)};for(let f=0;f<o.length;f+=h){let d=Array.from(o.subarray(f,f+h),u),[p,m,b]=d;if(p===m||!n&&(m===b||b===p))continue;let[x,y,g]=[...d].sort((M,S)=>M-S),v=n?x*2**26+y:`${x},${y},${g}`;c.has(v)||(c.add(v),l.push(...d))}return l.length===0&&l.push(...o.subarray(0,h)),ri(r,Uint32Array.from(l))}function ri(r,t){let e=Uint32Array.from(new Set(t)).sort(),s=new Map(Array.from(e,(o,n)=>[o,n])),i=new Ee;for(let[o,{array:n,itemSize:a}]of Object.entries(r.attributes))i.setAttribute(o,new V(Y(new n.constructor(a*e.length),n,e,a),a));return i.setIndex(new V(t.map(o=>s.get(o)),1)),i.userData.source=e.map(o=>r.userData.source[o]),i}import{MeshDepthMaterial as ni,MeshDistanceMaterial as ai,RGBADepthPacking as hi,Vector2 as li}from"./three.webgpu.js";var De=`
+attribute float athPart;
+uniform highp sampler2D athData;
+uniform float athStride;
+#ifdef ATH_FOREST
+uniform vec2 athForest;
+attribute vec4 athPlace;
+attribute vec4 athTurn;
+attribute vec4 athLook;
+varying vec3 athTint;
+#endif
+#ifdef ATH_FADING
+attribute float athPartBefore;
+attribute vec4 athFading;
+uniform highp sampler2D athDataBefore;
+uniform vec2 athBefore;
+bool athIsBefore=false;
+#endif
+vec4 athTexel(int at){
+ivec2 place=ivec2(at & 1023,at>>10);
+#ifdef ATH_FADING
+if (athIsBefore) return texelFetch(athDataBefore,place,0);
+#endif
+return texelFetch(athData,place,0);
+}
+#ifdef ATH_FOREST
+vec4 athAt(int at){
+vec2 frames=athTurn.zw;
+int size=int(athForest.x);
+#ifdef ATH_FADING
+if (athIsBefore){
+frames=athFading.xy;
+size=int(athBefore.x);
+}
+#endif
+return mix(athTexel(int(frames.x)*size+at),athTexel(int(frames.y)*size+at),fract(frames.x));
+}
+vec3 athSpin(vec3 p){
+return athForest.y>.5?vec3(athTurn.x*p.x - athTurn.y*p.y,athTurn.y*p.x+athTurn.x*p.y,p.z)
+:vec3(athTurn.x*p.x+athTurn.y*p.z,p.y,athTurn.x*p.z - athTurn.y*p.x);
+}
+#else
+vec4 athAt(int at){return athTexel(at);}
+#endif
+vec3 athShown(vec3 p,float part){
+int at=int(abs(part)) - 1;
+if (part<.0) return athAt(at).xyz;
+vec4 q=vec4(p,1.);
+return vec3(dot(athAt(at),q),dot(athAt(at+1),q),dot(athAt(at+2),q));
+}
+vec3 athMoved(vec3 rest,float part){
+vec3 p=athShown(rest,part);
+#ifdef ATH_FADING
+athIsBefore=true;
+p=mix(p,athShown(rest,athPartBefore),athFading.z);
+athIsBefore=false;
+#endif
+#ifdef ATH_FOREST
+p=athSpin(rest+athLook.x*(p - rest))*athPlace.w+athPlace.xyz;
+athTint=athLook.yzw;
+#endif
+return p;
+}
+vec3 athFacing(vec3 n,float part,float stride){
+int at=int(abs(part)) - 1;
+if (part>.0){
+vec3 a=athAt(at).xyz,b=athAt(at+1).xyz,c=athAt(at+2).xyz;
+n=vec3(dot(cross(b,c),n),dot(cross(c,a),n),dot(cross(a,b),n));
+}else if (stride>1.5){
+vec4 q=normalize(athAt(at+1));
+n=n+2.*cross(q.xyz,cross(q.xyz,n)+q.w*n);
+}
+return n;
+}
+vec3 athTurned(vec3 normal,float part){
+vec3 n=athFacing(normal,part,athStride);
+#ifdef ATH_FADING
+athIsBefore=true;
+n=mix(n,athFacing(normal,athPartBefore,athBefore.y),athFading.z);
+athIsBefore=false;
+#endif
+#ifdef ATH_FOREST
+n=athSpin(normal+athLook.x*(n - normal));
+#endif
+return n;
+}
+`,ci=`
+vec3 transformed=athMoved(position,athPart);
+#ifdef USE_ALPHAHASH
+vPosition=vec3(position);
+#endif
+`,ui=`
+vec3 objectNormal=athTurned(normal,athPart);
+#ifdef USE_TANGENT
+vec3 objectTangent=vec3(tangent.xyz);
+#endif
+`,fi=`
+#include <color_fragment>
+diffuseColor.rgb*=athTint;
+`,_t=new WeakMap;function U(r,t,e=!1){let s=_t.get(r);if(s===t)return r;if(_t.set(r,t),s)return r.dispose(),r;let i=[...e?["ATH_FOREST"]:[],...t.athBefore?["ATH_FADING"]:[]],{onBeforeCompile:o,customProgramCacheKey:n}=r,a=`ath ${i} ${r.customProgramCacheKey()}`;return r.onBeforeCompile=(h,l)=>{o.call(r,h,l),Object.assign(h.uniforms,_t.get(r)),h.vertexShader=`${i.map(c=>`#define ${c}
+`).join("")}${h.vertexShader}`.replace("#include <common>",`#include <common>
+${De}`).replace("#include <begin_vertex>",ci).replace("#include <beginnormal_vertex>",ui),e&&h.fragmentShader?.includes("#include <color_fragment>")&&(h.fragmentShader=`varying vec3 athTint;
+${h.fragmentShader.replace("#include <color_fragment>",fi)}`)},r.customProgramCacheKey=()=>a,r.clone=()=>{let h=Object.getPrototypeOf(r).clone.call(r);return U(Object.assign(h,{onBeforeCompile:o,customProgramCacheKey:n}),_t.get(r),e)},r.needsUpdate=!0,r}function Mt(r,t=!1){return{customDepthMaterial:U(new ni({depthPacking:hi}),r,t),customDistanceMaterial:U(new ai,r,t)}}var St=De;function tt(){return{athData:{value:null},athStride:{value:1},athForest:{value:new li}}}var Jt=1024;var Qt=new Et,yi=new Et;function at(r){let t=new di(r,Jt,r.length/4/Jt,wi,mi);return t.magFilter=t.minFilter=gi,t.needsUpdate=!0,t}function G({lastTime:r,frameCount:t}){return t>1?r+r/(t-1):0}var ke={message:"ath: got a request after dispose(), expected none",codeName:"CLOSED"},B=({message:r,codeName:t})=>Object.assign(new Error(r??"MISSING: bytes are still to come"),{codeName:t??"MISSING"}),bi=33;function At(r){return r<1?r*r*(3-2*r):1}var vi=19,xi=21,et=class extends pi{clip;time=0;start=0;wrap;frame=0;level=-1;held=!1;automatic=!0;target=0;pixels=1;measure="p99";fade=.2;fading=!1;heat=!1;distances=null;mode="matrices";milliseconds=0;uniforms=tt();#t;#e;#i=new Set;#r=null;#o=null;#s=new te;#a=null;#l=new Map;#c=null;#n=null;#d=!1;#u=!1;#m=0;#h=null;#p=null;#f=new Map;#y=1;constructor(t,e,s){super(),this.#t=t,this.#e=e,this.clip=s,this.target=t.info.levelCount-1,this.wrap=this.usualWrap,t.views.set(e,this)}get info(){return this.#t.info}get clips(){return this.#t.clips}get usualWrap(){return this.clips.some(({loop:t})=>t)?"marked":"loop"}get loops(){return this.wrap==="loop"||this.wrap==="marked"&&this.clip.loop}get duration(){return this.loops?G(this.clip):this.clip.lastTime*(this.wrap==="pingpong"?2:1)}get switching(){return this.#h&&(this.#h.begun?"fading":"waiting")}get levelCount(){return this.info.levelCount}levelName(t){return this.info.levelNames[t]}get failure(){return this.#t.failure}get bytesFetched(){return this.#t.state.fetched}get bytesTotal(){return this.info.fileLength}get requests(){return this.#t.state.requests}motionBytes(t){let{firstSegment:e,segmentCount:s}=this.clip;return this.#t.chunks.filter(o=>o.level<=t&&([vi,xi].includes(o.kind)||o.segment>=e&&o.segment<e+s)).reduce((o,{length:n})=>o+n,0)}bitRate(t=Math.max(this.level,0)){return this.clip.duration>0?8*this.motionBytes(t)/this.clip.duration:0}error(t){return this.clip.errors[t]}seamError(t){return this.clip.seams[t]}ready(t){let{times:e,segments:s}=this.#t,{firstFrame:i,frameCount:o,firstSegment:n}=this.clip,a=[],h=i+o-1,l=c=>e[Math.min(s[c],h)]-e[i];return this.readyLevels.forEach((c,u)=>{if(c<t)return;let f=l(n+u),d=l(n+u+1);a.at(-1)?.end===f?a.at(-1).end=d:a.push({start:f,end:d})}),a}get readyLevels(){let{firstSegment:t,segmentCount:e}=this.clip;return this.#t.state.ready.subarray(t,t+e)}get readyLevel(){return Math.min(...this.readyLevels)}get complete(){return this.readyLevel===this.levelCount-1}setTime(t){let e=Math.max(0,t-this.time),s=this.#h;return this.time=t,s&&(s.seconds+=e,s.begun&&(s.passed+=e),this.#S()),this.#g(),this}play(t,{fade:e=0,at:s=0}={}){let i=this.clips.find(({index:o,name:n})=>t===o||t===n);if(!i)throw new RangeError(`clip: got ${t}, expected one of ${this.clips.map(({name:o})=>o).join(", ")}`);return this.#p=null,this.level>=0&&(this.#h={...this.#b(),at:s,fade:e,passed:0,begun:!1}),Object.assign(this,{clip:i,start:this.time-s}),this.#g(),this}wind(t,e=0){if(![t,e].every(Number.isFinite))throw new RangeError(`wind: got ${t} and ${e}, expected two finite numbers`);return this.#p=[t,e],this.#h=null,this.#g(),this}#b(){let t=this.#h;return t&&(!t.begun||2*t.passed<t.fade)?t:this.#v(this.time)}#S(){this.#h.begun&&this.#h.passed>=this.#h.fade&&(this.#h=null)}setLevel(t){return this.automatic=t==="auto",this.automatic||(this.target=Re.clamp(t,0,this.levelCount-1)),this.#g(),this}setMode(t){return this.mode=t,this}levelFor(t,e,s=null,i=this.pixels){let o=this.#x(t,e,s);for(let n=0;n<this.levelCount;n++)if(this.error(n)[this.measure]*o<=i)return n;return this.levelCount-1}pixelError(t,e,s,i=null){return this.error(t)[this.measure]*this.#x(e,s,i)}#x(t,e,s){let i=this.#t.sphere;Qt.copy(i.center);let o=1;if(s&&(Qt.applyMatrix4(s),o=s.getMaxScaleOnAxis()),t.isOrthographicCamera)return o*e*t.zoom/(t.top-t.bottom);let n=Math.max(Qt.distanceTo(yi.setFromMatrixPosition(t.matrixWorld))-i.radius*o,1e-9);return o*e/(2*Math.tan(Re.degToRad(t.fov)/2)/t.zoom*n)}update(t,e,s=null){return this.automatic&&(this.target=this.levelFor(t,e,s?.matrixWorld??null)),this}show(t,e=this.target){return this.#w(t,{level:e,heat:this.heat,positions:this.mode==="positions"})}async positions(t,e=this.target){return(await this.#w(t,{level:e,positions:!0,aside:!0})).data}#w(t,e){let s=this.#y++;return new Promise((i,o)=>{if(!this.#t.views.has(this.#e))throw B(ke);this.#f.set(s,{resolve:i,reject:o,aside:e.aside}),this.#t.send({type:"picture",view:this.#e,id:s,exactly:!0,...this.#v(t),wind:this.#p,...e})})}#v(t){return{clip:this.clip.index,seconds:t-this.start,wrap:this.wrap}}#g(){let t=this.#h,e=this.switching==="waiting",{clip:s,seconds:i,wrap:o}=this.#v(e?this.start+t.at:this.time),n=t&&{clip:t.clip,seconds:t.seconds,wrap:t.wrap,begun:t.begun,share:t.fade>0?1-t.passed/t.fade:0},a=`${s} ${i} ${o} ${this.target} ${this.heat} ${JSON.stringify([n,this.#p])}`;if(this.#d){this.#u=a!==this.#n;return}if(a===this.#n&&!this.#u&&!this.fading)return;this.#n=a,this.#u=!1,this.#d=!0;let h=this.#c;this.#c=null,this.#t.send({type:"picture",view:this.#e,id:0,clip:s,seconds:i,wrap:o,old:n,wind:this.#p,level:this.target,heat:this.heat,positions:this.mode==="positions",buffer:h,now:performance.now(),fade:this.fade,coarsely:this.#t.easing},h?[h]:[])}refresh(){this.#n=null,this.#g()}picture(t){let e=this.#f.get(t.id),{shown:s,codeName:i}=t;this.#f.delete(t.id),e||(this.#d=!1),s<0?e?.reject(B(t)):e?.aside||this.#P(t),s>=0&&e?.resolve(t),!e&&t.message&&this.dispatchEvent({type:"error",message:t.message,codeName:i}),!e&&this.#u&&this.#g()}dispatchEvent(t){try{super.dispatchEvent(t)}catch(e){queueMicrotask(()=>{throw e})}}#P({shown:t,cut:e=t,frame:s,data:i,heat:o,ms:n,held:a,clip:h,exactly:l,fading:c,whole:u}){let f=t!==this.level,d=this.#t.known.get(e),p=d!==this.#r;if(Object.assign(this,{frame:s,held:a,fading:c,milliseconds:n,distances:o??null,level:t}),this.#r=d,t>0&&this.#t.endEasing(),clearTimeout(this.#m),c&&(this.#m=setTimeout(()=>this.refresh(),bi)),this.#o=u?i:null,u||this.#D(e,i),this.#A(i),this.mode==="positions"&&this.#E(this.uploaded()),p)for(let m of this.#i)this.#T(m);f&&this.dispatchEvent({type:"level",level:t}),this.switching==="waiting"&&h===this.clip.index&&this.#_(this.#h),l&&(this.#h=null),this.dispatchEvent({type:"frame",frame:s,level:t})}#_(t){t.begun=!0,this.start=this.time-t.at,this.#S(),this.dispatchEvent({type:"clip",clip:this.clip})}#D(t,e){let s=this.#l.get(t);s&&s.image.data.length===e.length?(this.#c=s.image.data.buffer,s.image.data=e,s.needsUpdate=!0):(s?.dispose(),this.#l.set(t,at(e)));let{texels:i,parts:{nodeCount:o,exactCount:n}}=this.#r;this.uniforms.athData.value=this.#l.get(t),this.uniforms.athStride.value=n>0?(i-3*o)/n:1}#E(t){for(let e of this.#i){let{source:s}=e.userData,{position:i,normal:o}=e.attributes;for(let n=0;n<s.length;n++)for(let a=0;a<3;a++)i.array[3*n+a]=t[3*s[n]+a];i.needsUpdate=!0,o&&e.computeVertexNormals()}}#A(t){let{min:e,max:s}=this.#s.makeEmpty(),{boxes:i}=this.#r,o=[...e],n=[...s],a=(l,c,u)=>{c<o[l]&&(o[l]=c),u>n[l]&&(n[l]=u)},h=(l,c,u)=>{for(let f=l;f<c;f+=u)for(let d=0;d<3;d++)a(d,t[f+d],t[f+d])};if(this.#o)h(0,t.length,3);else{let{parts:{nodeCount:l,exactCount:c}}=this.#r,u=4*this.uniforms.athStride.value;h(12*l,12*l+u*c,u);for(let[f,d,p,m,b,x,y]of i)for(let g=0;g<3;g++){let[v,M,S,D]=t.subarray(f+4*g,f+4*g+4),w=v*d+M*p+S*m+D,E=Math.abs(v)*b+Math.abs(M)*x+Math.abs(S)*y;a(g,w-E,w+E)}}e.fromArray(o),s.fromArray(n);for(let l of this.#i)this.#O(l)}#O(t){t.boundingBox=(t.boundingBox??new te).copy(this.#s),t.boundingSphere=this.#s.getBoundingSphere(t.boundingSphere??new Ce)}uploaded(){if(this.#o||!this.uniforms.athData.value)return this.#o;let{data:t}=this.uniforms.athData.value.image,{rest:e}=this.#t,{vertices:s}=this.#r,i=this.#o=new Float32Array(e.length);for(let o=0,n=0;o<s.length;o++){let a=s[o],h=e[n],l=e[n+1],c=e[n+2];for(let u=4*(Math.abs(a)-1),f=0;f<3;f++,n++,u+=a<0?1:4)i[n]=a<0?t[u]:t[u]*h+t[u+1]*l+t[u+2]*c+t[u+3]}return i}bind(t){return this.mode==="positions"?t:U(t,this.uniforms)}bindShadows(t){if(this.mode==="positions")return t;let{clone:e}=Object.getPrototypeOf(t);return Object.assign(t,this.#a??=Mt(this.uniforms),{onBeforeRender:this.#R,clone:(...s)=>this.bindShadows(e.apply(t,s))})}#R=({isWebGPURenderer:t})=>{!t||this.mode==="positions"||(this.setMode("positions"),this.level>=0&&this.#E(this.uploaded()))};attach(t){let{source:e,other:s}=t.userData,i=t.getAttribute("position");return this.mode!=="positions"&&!s&&t.setAttribute("position",new vt(i.array,3).follow(e,()=>this.uploaded())),this.level<0&&this.#s.copy(this.#t.box),this.#i.add(t),this.#O(t),this.#T(t),t}setRest(){if(this.mode==="positions")return;for(let e of this.#i)Te(e,this.#t.rest);this.#o=null;let t=this.uniforms.athData.value;t&&this.#A(t.image.data)}detach(t){this.#i.delete(t)}#T(t){if(this.mode==="positions")return;let{source:e,other:s}=t.userData;this.#M(t,"athPart",e),s&&this.#M(t,"athPartOther",s)}#M(t,e,s){let i=t.getAttribute(e)?.array??new Float32Array(s.length),o=this.#r?.vertices;if(o)for(let n=0;n<s.length;n++)i[n]=o[s[n]];q(t,e,i,1)}async nodeNumbers(t=this.level){return this.#t.nodeNumbers(await this.#t.parts(t))}clone(){return this.#t.view(this.clip)}dispose(){clearTimeout(this.#m);for(let t of this.#l.values())t.dispose();for(let t of Object.values(this.#a??{}))t.dispose();this.#l.clear(),this.#t.dropView(this.#e),this.fail(B(ke))}fail(t){for(let{reject:e}of this.#f.values())e(t);this.#f.clear()}};function ee(r){let t=[1/0,1/0,1/0],e=[-1/0,-1/0,-1/0];for(let i=0;i<r.length;i+=3)for(let o=0;o<3;o++)r[i+o]<t[o]&&(t[o]=r[i+o]),r[i+o]>e[o]&&(e[o]=r[i+o]);let s=new te(new Et(...t),new Et(...e));return{box:s,sphere:s.getBoundingSphere(new Ce)}}function _i({presence:r,part_names:t},{part_vertex_counts:e,part_copies:s}){if(!r||!Array.isArray(t)||e?.array.length!==t.length)return[];let i=[];for(let o=0,n=0;o<t.length;n+=Number(e.array[o++])){let a=Number(e.array[o]),h=Number(s?.array[o]??1),l=r[t[o]];l&&i.push({first:n,stop:n+a,runs:l});for(let c=0,u=a/h;!l&&c<h;c++){let f=r[`${t[o]}:${c}`];f&&i.push({first:n+c*u,stop:n+(c+1)*u,runs:f})}}return i}var Ot=class{#t=new Map;#e=new WeakMap;#i="";show({motion:t,metadata:e,attributes:s},i,o){let n=t.clips.findLast(({firstFrame:c})=>c<=t.frame)??t.clip;o&&this.#t.clear(),this.#t.has(n)||this.#t.set(n,_i({...e,...e.clips?.[n.name]},s));let a=Math.floor(t.frame-n.firstFrame),h=this.#t.get(n).filter(({runs:c})=>!c.some(([u,f])=>u<=a&&a<f)),l=h.map(({first:c})=>c).join();if(!(l===this.#i&&!(o&&h.length))){this.#i=l;for(let c of i)this.#r(c,h)}}#r(t,e){let{index:s,userData:{source:i}}=t,o=t.hasAttribute("normal")?3:2;this.#e.has(t)||this.#e.set(t,s.array.slice());let n=this.#e.get(t),a=new Uint8Array(Math.max(0,...e.map(({stop:h})=>h)));for(let{first:h,stop:l}of e)a.fill(1,h,l);for(let h=0;h<n.length;h++){let l=n[h-h%o];s.array[h]=a[i[l]]?l:n[h]}s.needsUpdate=!0}};var Ni=16,Ii=0;function Li(r){if(r===null||r instanceof Float32Array&&r.length%3===0)return r;let t=r?.isBufferGeometry?r.getAttribute("position"):null;if(!t)throw new TypeError("mesh: got something else, expected three numbers per vertex or a BufferGeometry");return Float32Array.from({length:3*t.count},(e,s)=>t.getComponent(Math.floor(s/3),s%3))}function Ui(r){if(ArrayBuffer.isView(r))return new Uint8Array(r.buffer,r.byteOffset,r.byteLength).slice();if(!/Buffer/.test(Object.prototype.toString.call(r)))throw new TypeError("buffer: got something else, expected an ArrayBuffer or a view of one");return new Uint8Array(r).slice()}var Ie=r=>({codeName:"WORKER",message:`ath_worker.js: got no worker (${r??"not found or not allowed"}), expected it beside the loader or where setDecoderPath() says`}),se=()=>B({message:"loading was aborted",codeName:"AbortError"}),ie=class{views=new Map;state={fetched:0,requests:0,ready:new Int8Array(1).fill(-1)};failure=null;sent=0;decodedAt=null;known=new Map;#t=new Map;#e=1;#i=1;#r=null;constructor(t,e){this.id=++Ii,this.worker=t,this.release=e,this.settle={};for(let s of["opened","whole","arrays"])this[s]=new Promise((i,o)=>{this.settle[s]={resolve:i,reject:o}}),this[s].catch(()=>{});t.channels.set(this.id,this)}#o(t){for(let{reject:e}of[this.settle.opened,this.settle.whole,...this.#t.values()])e(t);this.#t.clear()}send(t,e=[]){this.worker.postMessage({...t,file:this.id},e)}receive(t){let{type:e}=t;if(this.sent=t.sent-performance.timeOrigin,e==="opened")Object.assign(this,t,{type:void 0},ee(t.rest)),this.state.ready=new Int8Array(t.info.segmentCount).fill(-1),this.settle.opened.resolve(this);else if(e==="rest")this.#n(t.rest);else if(e==="failed"){let s=B(t);this.#o(s);for(let i of this.views.values())i.fail(s);this.#s({...t,type:"stopped"})}else if(e==="attributes")this.settle.arrays.resolve(t.attributes);else if(e==="state")this.#c(t);else if(e==="picture")this.views.get(t.view)?.picture(t);else if(e==="parts")this.#a(t);else if(e==="decoded"){this.decodedAt??=this.sent;for(let s of this.views.values())s.refresh()}else e==="baked"?this.#h(`bake ${t.id}`,t):e==="gpu"||e==="wind"?this.#h(`${e} ${t.id}`,t):(e==="stopped"&&this.settle.whole.reject(B(t)),this.#s(t))}#s({type:t,level:e=null,message:s,codeName:i}){this.failure={type:t,level:e,message:s,codeName:i},this.#u(this.failure)}#a({level:t,parts:e,texels:s}){let i={parts:e,texels:s,vertices:this.#p(e,s),boxes:this.#l(e)};this.known.set(t,i),this.#h(`parts ${t}`,i)}#l({branch:t,first:e,count:s,index:i}){let{rest:o,vertexSource:n}=this,a=new Ne,h=new Mi,l=new Ne,c=[];for(let u=0;u<t.length;u++)if(!(t[u]<0)){h.makeEmpty();for(let f=e[u];f<e[u]+s[u];f++)h.expandByPoint(a.fromArray(o,3*n[f]));c.push([12*i[u],...h.getCenter(a),...h.getSize(l).multiplyScalar(.5)])}return c}#c(t){let e=t.ready.some((s,i)=>s!==this.state.ready[i]);if(this.state=t,this.#u({type:"progress",loaded:t.fetched,total:t.total}),t.whole&&this.settle.whole.resolve(),!!e){this.#u({type:"ready"});for(let s of this.views.values())s.refresh()}}get easing(){return this.#r!==null}#n(t){let e=this.rest.slice(),s=performance.now(),i=Math.max(0,...[...this.views.values()].map(({level:n,fade:a})=>n===0?a:0)),o=()=>{let n=At((performance.now()-s)/1e3/i);n===1?this.endEasing():this.#d(t.map((a,h)=>e[h]+n*(a-e[h])))};this.#r={to:t,timer:setInterval(o,Ni)},o()}endEasing(){if(!this.easing)return;let{to:t,timer:e}=this.#r;clearInterval(e),this.#r=null,this.#d(t);for(let s of this.views.values())s.refresh()}#d(t){this.rest.set(t);let{box:e,sphere:s}=ee(t);this.box.copy(e),this.sphere.copy(s);for(let i of this.known.values())i.boxes=this.#l(i.parts);for(let i of this.views.values())i.setRest()}#u(t){for(let e of this.views.values())e.dispatchEvent({...t})}async parts(t){return this.known.get(t)??this.#m(`parts ${t}`,{type:"parts",level:t})}bake(t,e,s){let i=this.#i++;return this.#m(`bake ${i}`,{type:"bake",id:i,clip:t,level:e,step:s})}async gpu(t,e=null){let s=this.#i++,i=await this.#m(`gpu ${s}`,{type:"gpu",id:s,level:t,segment:e});if(!i.words)throw B(i);return i}windWeights(t,e){let s=this.#i++;return this.#m(`wind ${s}`,{type:"wind",id:s,strength:t,heading:e})}#m(t,e){if(!this.#t.has(t)){let s={};s.promise=new Promise((i,o)=>{Object.assign(s,{resolve:i,reject:o})}),this.#t.set(t,s),this.send(e)}return this.#t.get(t).promise}#h(t,e){this.#t.get(t)?.resolve(e),this.#t.delete(t)}fetchAll(){return this.send({type:"all"}),this.whole}abort(){this.settle.opened.reject(se()),this.settle.whole.reject(se()),this.send({type:"abort"})}#p({nodeCount:t,exactCount:e,branch:s,first:i,count:o,index:n},a){let h=new Float32Array(this.info.placeCount),l=e>0?(a-3*t)/e:1;for(let c=0;c<s.length;c++)for(let u=0;u<o[c];u++)h[i[c]+u]=s[c]>=0?1+3*n[c]:-(1+3*t+l*(n[c]+u));return this.#f(h)}#f(t){return t.constructor.from(this.vertexPlaces,e=>t[e])}nodeNumbers({parts:{branch:t,first:e,count:s}}){let i=this.#y();for(let o=0;o<t.length;o++)t[o]>=0&&i.fill(t[o],e[o],e[o]+s[o]);return this.#f(i)}get vertexBranch(){return this.#f(this.#y())}#y(){let{branches:{first:t,count:e}}=this,s=new Int32Array(this.info.placeCount);for(let i=0;i<t.length;i++)s.fill(i,t[i],t[i]+e[i]);return s}view(t=this.clips[this.first]){return new et(this,this.#e++,t)}dropView(t){this.views.delete(t)&&this.send({type:"drop",view:t})}close(){if(this.worker.channels.delete(this.id)){clearInterval(this.#r?.timer),this.send({type:"close"});for(let t of[...this.views.values()])t.dispose();this.#o(se()),this.release()}}},ht=class extends Di{attributes={};#t;#e;#i=null;#r=null;#o=null;#s=null;#a=null;#l=null;#c=new Ot;constructor(t,e){super(),this.#t=t,this.motion=t.view().setMode(e),this.motion.addEventListener("frame",()=>this.#n(!1)),this.metadata=t.statics.metadata,this.#e=Xt(t.statics,{}),this.arrays=t.arrays.then(s=>this.#u(s))}get loaded(){return this.#l??=this.#t.fetchAll().then(()=>this)}abort(){this.#t.abort()}get hasFaces(){return this.#e!==null}get geometry(){return!this.#i&&this.#e&&(this.#i=this.motion.attach(Ae(this.#t,this.#e)),Zt(this.#i,this.#t,this.attributes),this.#n(!0)),this.#i}get lines(){let{statics:t}=this.#t;return!this.#r&&(t.edges||!this.#e)&&(this.#r=this.motion.attach(Oe(this.#t,t.edges??t.skeleton)),this.#n(!0)),this.#r}get object(){return this.#o||(this.#o=xt(new Si,this),this.#o.name="ath",this.#d()),this.#o}#n(t){this.#c.show(this,[this.#i,this.#r].filter(Boolean),t)}#d(){let{geometry:t,motion:e}=this,s=this.#s;if(!s||t&&!s.isMesh){let o=t?new Pi({color:9083499,roughness:.8,side:Ri}):new Ei({color:7035717});this.#a=e.bind(o),this.#s=t?new Ti(t,o):new Ai(this.lines,o),s?Ci.prototype.copy.call(this.#s,s):this.#s.castShadow=this.#s.receiveShadow=!0,this.#o.add(e.bindShadows(this.#s)),s?.removeFromParent(),s?.material.dispose()}let{vertexColors:i}=this.#a;!t?.hasAttribute("color")||i||(this.#a.color.set(16777215),Object.assign(this.#a,{vertexColors:!0,needsUpdate:!0}))}get skeleton(){return this.#t.statics.skeleton}get origin(){return this.#t.origin}get rest(){return this.#t.rest}get branches(){return this.#t.branches}get vertexBranch(){return this.#t.vertexBranch}get sphere(){return this.#t.sphere}get box(){return this.#t.box}get channel(){return this.#t}#u(t){return this.attributes=t,this.#e??=Xt(this.#t.statics,t),this.#i&&Zt(this.#i,this.#t,t),this.#o&&this.#e&&this.#d(),this.#n(!0),this.dispatchEvent({type:"arrays"}),t}dispose(){for(let t of[this.#i,this.#r])t?.dispose();this.#a?.dispose(),this.#t.close()}},K=class extends Oi{constructor(t){super(t),this.workerLimit=4,this.workerPool=[],this.workerURL=null,this.mode="matrices",this.clip=null,this.hostMesh=null,this.bandwidth=null,this.begun=null}setDecoderPath(t){return this.workerURL=/\/$/.test(t)?`${t}ath_worker.js`:t,this}setWorkerLimit(t){return this.workerLimit=t,this}setMode(t){return this.mode=t,this}setClip(t){return this.clip=t,this}setHostMesh(t){return this.hostMesh=Li(t),this}setBandwidth(t){return this.bandwidth=t,this}preload(){return this.workerPool.length===0&&this.#o(),this}takeOver({worker:t,url:e=null,front:s=null}){return this.#s(t),this.begun={url:e,front:s},this}load(t,e,s,i){let o=this.manager.resolveURL(ki.resolveURL(t,this.path)),n={headers:this.requestHeader,credentials:this.withCredentials?"include":"same-origin"};this.manager.itemStart(t);let a=(h,l)=>{h===i&&this.manager.itemError(t),h?.(l),this.manager.itemEnd(t)};this.#t(new URL(o,globalThis.location?.href).href,n,s).then(h=>a(e,h),h=>{i||console.error(h),a(i,h)})}parse(t,e,s=i=>console.error(i)){this.parseAsync(t).then(e,s)}async parseAsync(t){let{buffer:e}=Ui(t);return this.#e({bytes:e},[e])}abort(){for(let{channels:t}of this.workerPool)for(let e of[...t.values()])e.abort();return this}async#t(t,e,s){let{clip:i,hostMesh:o,bandwidth:n,begun:a}=this,h=a?.url===t&&n===null?await a.front:null;return this.begun=null,this.#e({url:t,options:{...e,front:h},clip:i,hostMesh:o,bandwidth:n},h?[h.bytes]:[],s)}async#e(t,e,s){let i=this.#r(),o=this.manager.abortController?.signal,n=()=>a.abort(),a=new ie(i,()=>{i.files--,o?.removeEventListener("abort",n)});o?.addEventListener("abort",n),i.files++;try{a.send({type:"open",clip:this.clip,hostMesh:this.hostMesh,bandwidth:this.bandwidth,...t},e),await a.opened;let h=new ht(a,this.mode);return s&&h.motion.addEventListener("progress",({loaded:l,total:c})=>s({loaded:l,total:c,lengthComputable:!0})),await this.#i(h.motion),h}catch(h){throw a.close(),h}}#i(t){return new Promise((e,s)=>{let i=o=>{t.level<0&&t.show(0,0).catch(()=>s(B(o)))};t.addEventListener("frame",e),t.addEventListener("stopped",i),t.addEventListener("damaged",i),t.setTime(0)})}#r(){let t=this.workerPool.find(e=>e.files===0);return t||(this.workerPool.length<this.workerLimit?this.#o():this.workerPool.reduce((e,s)=>s.files<e.files?s:e))}#o(){return this.#s(this.#a())}#s(t){return Object.assign(t,{files:0,channels:new Map}),t.onmessage=({data:e})=>t.channels.get(e.file)?.receive(e),t.onerror=({message:e})=>{this.workerPool.splice(this.workerPool.indexOf(t),1);for(let s of t.channels.values())s.receive({type:"failed",...Ie(e)})},this.workerPool.push(t),t}#a(){let{href:t,origin:e}=globalThis.location??{};try{let s=new URL(this.workerURL??new URL("./ath_worker.js",import.meta.url),t),o=s.protocol==="blob:"||s.origin===e||!/^http/.test(e)?s:URL.createObjectURL(new Blob([`import ${JSON.stringify(s.href)};`],{type:"text/javascript"}));return new Worker(o,{type:s.protocol==="blob:"?"classic":"module"})}catch({message:s}){throw B(Ie(s))}}dispose(){for(let t of this.workerPool)t.terminate();return this.workerPool.length=0,this}};import{Color as Hi,Mesh as Wi,Vector4 as Vi}from"./three.webgpu.js";import{BufferAttribute as zi,InstancedBufferAttribute as Fi,InstancedBufferGeometry as Bi,ShaderMaterial as Ue,Vector2 as ze}from"./three.webgpu.js";var Fe=`
+attribute vec3 rest,restOther,color,colorOther;
+attribute float athPartOther,radius,radiusOther;
+uniform vec2 screen;
+varying vec3 vColor;
+varying float vSide;
+varying vec3 vAcross;
+${St}
+void main(){
+bool far=position.x>.5;
+vec4 p=modelViewMatrix*vec4(athMoved(rest,athPart),1.);
+vec4 q=modelViewMatrix*vec4(athMoved(restOther,athPartOther),1.);
+vec2 along=isOrthographic?p.xy - q.xy:p.xy/-p.z - q.xy/-q.z;
+vec2 across=length(along)>1e-9?normalize(vec2(-along.y,along.x)):vec2(1.,.0);
+if (far) p=q;
+float pixel=(isOrthographic?1.:-p.z)*2./(projectionMatrix[1][1]*screen.y);
+float wide=max(far?radiusOther:radius,.55*pixel);
+p.xy+=wide*(across*position.y+vec2(across.y,-across.x)*(far?-.6:.6));
+gl_Position=projectionMatrix*p;
+vColor=far?colorOther:color;
+vSide=position.y;
+vAcross=vec3(across,.0);
+}`,ji=`
+uniform float shade;
+varying vec3 vColor;
+varying float vSide;
+varying vec3 vAcross;
+void main(){
+float s=clamp(vSide,-1.,1.);
+vec3 n=normalize(vAcross*s+vec3(.0,.0,sqrt(max(1. - s*s,.0))));
+float light=.55+.55*max(dot(n,normalize(vec3(.45,.65,.6))),.0)+.1*n.y;
+gl_FragColor=vec4(vColor*mix(1.,light,shade),1.);
+#include <colorspace_fragment>
+}`;function Tt(r,t){let e=r.skeleton,s=e.length/2,i=new Uint32Array(s),o=new Uint32Array(s);for(let a=0;a<s;a++)i[a]=e[2*a],o[a]=e[2*a+1];let n=new Bi;return n.setAttribute("position",new zi(Float32Array.of(0,1,0,0,-1,0,1,1,0,1,-1,0),3)),n.setIndex([0,1,2,2,1,3]),n.setAttribute("rest",Le(r.rest,i)),n.setAttribute("restOther",Le(r.rest,o)),n.instanceCount=s,n.userData={source:i,other:o},lt(n,t),n}function Le(r,t){let e=new Float32Array(3*t.length);for(let s=0,i=0;s<t.length;s++){let o=3*t[s];e[i++]=r[o],e[i++]=r[o+1],e[i++]=r[o+2]}return new Fi(e,3)}function lt(r,t){for(let[e,s]of[["radius",r.userData.source],["radiusOther",r.userData.other]]){let i=new Float32Array(s.length);for(let o=0;o<s.length;o++)i[o]=t[s[o]];q(r,e,i,1)}}function Be(r){let t=`#include <packing>
+void main() { gl_FragColor = packDepthToRGBA(gl_FragCoord.z); }`;return new Ue({vertexShader:Fe,fragmentShader:t,side:2,uniforms:{...r,screen:{value:new ze(2048,2048)}}})}function Pt(r){return new Ue({vertexShader:Fe,fragmentShader:ji,side:2,uniforms:{...r,screen:{value:new ze(1,1)},shade:{value:1}}})}function X(r){let t=r.attributes.radius,e=r.rest.length/3;if(t?.array.length===e)return Float32Array.from(t.array,Number);let{branches:{first:s,count:i,attach:o},channel:{info:n,vertexPlaces:a}}=r,h=new Float32Array(n.placeCount).fill(1);for(let u=s.length-1;u>=0;u--){for(let f=s[u]+i[u]-2;f>=s[u];f--)h[f]+=h[f+1];o[u]>=0&&(h[o[u]]+=h[s[u]])}let l=h.reduce((u,f)=>Math.max(u,f),1),c=r.sphere.radius/50;return Float32Array.from(a,u=>c*Math.sqrt(h[u]/l))}var Gi=8020552,$i=new Vi,Dt=class extends Wi{#t;#e;#i;constructor(t,{motion:e=t.motion,color:s=Gi}={}){let i=Tt(t,X(t));super(e.attach(i),Pt(e.uniforms)),this.#t=t,this.#e=e,this.#i=()=>lt(i,X(t)),t.addEventListener("arrays",this.#i),xt(this,t),this.frustumCulled=!1,this.setColor(s)}setColor(t){let e=typeof t=="function"?null:new Hi(t).toArray(),{source:s,other:i}=this.geometry.userData;for(let[o,n]of[["color",s],["colorOther",i]]){let a=Float32Array.from({length:3*n.length});n.forEach((h,l)=>a.set(e??t(h),3*l)),q(this.geometry,o,a,3)}return this}onBeforeRender=t=>{let{z:e,w:s}=t.getCurrentViewport($i);this.material.uniforms.screen.value.set(e,s),this.material.uniformsNeedUpdate=!0};dispose(){this.#t.removeEventListener("arrays",this.#i),this.#e.detach(this.geometry),this.geometry.dispose(),this.material.dispose(),this.removeFromParent()}};import{DynamicDrawUsage as qi,Frustum as Yi,Group as Ki,InstancedBufferAttribute as Xi,InstancedBufferGeometry as je,LineBasicMaterial as Zi,LineSegments as Ji,Matrix4 as He,Mesh as Qi,MeshStandardMaterial as to,Sphere as eo,Vector3 as so,BufferAttribute as io,DoubleSide as oo}from"./three.webgpu.js";var ro=4<<20,no=4096,We=1.5,Ve=2,ao=.85,ho=-1,lo=r=>r?new Zi({color:7035717}):new to({color:9083499,roughness:.8,side:oo}),co=()=>new Promise(r=>{setTimeout(r)}),Rt=class extends Ki{levelOfDetail=!0;pixels=1;measure="p99";fade=.2;fading=!1;counts=[];vertices=0;culled=0;#t;#e=new Map;#i=[];#r=new Set;#o=new Map;#s=new Map;#a=new Float32Array(0);#l=new Float32Array(0);#c=new Float32Array(0);#n=0;#d=[];#u;#m;#h;#p=0;constructor(t,{geometry:e=t.geometry??t.lines,material:s=lo,depthMaterial:i=null}={}){super(),this.#t=t,this.#h=e,this.#u=s,this.#m=i,this.name="ath forest",$(this,t.metadata)}get count(){return this.#a.length/4}get baked(){return this.#o.get(this.#t.motion.clip.index)??[]}setInstances(t){let{motion:e}=this.#t;for(let{clip:i}of t)i!==void 0&&!this.#s.has(i)&&this.#s.set(i,e.clone().play(i).setLevel(e.levelCount-1));let s=i=>this.#s.get(i)?.clip.index??ho;this.#a=Float32Array.from(t.flatMap(({x:i,y:o,z:n,size:a})=>[i,o,n,a])),this.#l=Float32Array.from(t.flatMap(({angle:i,seconds:o,clip:n})=>[Math.cos(i),Math.sin(i),o,s(n)])),this.#c=Float32Array.from(t.flatMap(({amplitude:i=1,tint:o=16777215})=>[i,...[16,8,0].map(n=>(o>>n&255)/255)])),this.#d=[];for(let i of this.#f())this.#v(i)}#f(){return[...this.#e.values()].flat().flatMap(t=>[t,...t.fades.values()])}bakeReady(){for(let t of[this.#t.motion,...this.#s.values()])for(let e=0;e<=t.readyLevel;e++)this.#y(e,t.clip)}bake(t){return this.#y(t,this.#t.motion.clip)}async#y(t,e){let s=`${e.index}/${t}`;if(this.#r.has(s))return;this.#r.add(s);let{channel:i,metadata:o}=this.#t,n=await i.parts(t),a=Math.max(1,Math.ceil(e.frameCount*n.texels/Math.min(ro,1024*no))),h=await i.bake(e.index,t,a);if(!h.data||h.texels!==n.texels||!this.#t){this.#r.delete(s);return}let l=tt(),{nodeCount:c,exactCount:u}=n.parts;l.athData.value=at(h.data),l.athForest.value.set(h.texels,o.up_axis==="z"?1:0),l.athStride.value=u>0?(n.texels-3*c)/u:1,this.#n=Math.max(this.#n,uo(h,n,l.athStride.value)),await this.#b(t,e,n,{uniforms:l,rows:h.rows,perRow:G(e)/h.rows||1}),this.#o.set(e.index,[...this.#o.get(e.index)??[],t]),this.dispatchEvent({type:"level",level:t})}async#b(t,e,s,i){let{channel:o,motion:n,rest:a,sphere:h}=this.#t,l=t===n.levelCount-1,c=y=>e.errors[y][this.measure],u=c(t),f=t>0?c(t-1):h.radius/4,d=o.nodeNumbers(s),p=s.vertices;d.forEach((y,g)=>{p[g]<0&&(d[g]=-1)});let m=U(this.#u(!this.#h.hasAttribute("normal"),t),i.uniforms,!0),b=(y,g)=>this.#S(e,y,m,{...i,texel:p,level:t,tolerance:g}),x=l?this.#h:Q(this.#h,a,We*u,d);b(x,u);for(let y=Math.max(Ve*u,h.radius/2e3);y<f;y*=Ve){if(await co(),!this.#t)return;let g=Q(this.#h,a,We*y,d);g.userData.source.length>ao*x.userData.source.length||(b(g,y),x=g)}}#S(t,e,s,i){let o=this.#x(t.index,e,s,{...i,base:e,fades:new Map});this.#e.set(t.index,[...this.#e.get(t.index)??[],o].sort((n,a)=>n.tolerance-a.tolerance))}#x(t,e,s,i){let o=new je,{source:n}=e.userData,a=!e.hasAttribute("normal"),h=({texel:u})=>new io(Y(new Float32Array(n.length),u,n,1),1);o.setIndex(e.index);for(let[u,f]of Object.entries(e.attributes))u!=="athPart"&&o.setAttribute(u,f);o.setAttribute("athPart",h(i)),i.from&&o.setAttribute("athPartBefore",h(i.from));let l=a?new Ji(o,s):new Qi(o,s);Object.assign(l,Mt(i.uniforms,!0),{castShadow:this.castShadow,receiveShadow:this.receiveShadow}),this.#m&&(l.customDepthMaterial=U(this.#m(),i.uniforms,!0)),Object.assign(l.userData,{level:i.level,clip:t}),l.frustumCulled=!1;let c={...i,drawn:l,size:n.length,filled:0};return this.#v(c),this.add(l),c}#w(t,e,s){if(!e.fades.has(s.level)){let{athData:i,athForest:o,athStride:n}=s.uniforms,a=!e.base.hasAttribute("normal"),h={...e.uniforms,athDataBefore:i,athBefore:{value:o.value.clone().setY(n.value)}},l=U(this.#u(a,e.level),h,!0);e.fades.set(s.level,this.#x(t,e.base,l,{...e,uniforms:h,from:s,fades:new Map}))}return e.fades.get(s.level)}#v(t){let e=t.drawn.geometry,s=new je;s.setIndex(e.index);for(let[i,o]of Object.entries(e.attributes))s.setAttribute(i,o);for(let[i,o]of[["place","athPlace"],["turn","athTurn"],["look","athLook"],...t.from?[["share","athFading"]]:[]])t[i]=new Xi(new Float32Array(Math.max(4,this.#a.length)),4),s.setAttribute(o,t[i].setUsage(qi));s.instanceCount=0,t.drawn.geometry=s,e.dispose()}update(t,e,s){let i=this.#f(),o=new eo,n=new Yi,a=o.center,h=this.#O();this.updateWorldMatrix(!0,!1);let l=new so().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new He().copy(this.matrixWorld).invert());n.setFromProjectionMatrix(new He().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld));let c=2*Math.tan(t.fov*Math.PI/360)/e;this.#p=performance.now(),this.culled=0,this.fading=!1;for(let u of i)u.filled=0;this.#i=this.#e.get(this.#t.motion.clip.index)??this.#i;for(let u=0;u<this.#a.length&&i.length>0;u+=4){let f=this.#a[u+3],d=this.#O(this.#c[u]);if(a.fromArray(this.#a,u),o.radius=d*f,!n.intersectsSphere(o)){this.culled++,this.#d[u/4]=null;continue}let p=Math.max(l.distanceTo(a)-.5*h*f,1e-6),m=this.#e.get(this.#l[u+3])??this.#i,b=this.pixels*c*p/f;m.length>0&&this.#g(u,m,this.levelOfDetail?b:0,s)}this.counts=new Array(this.#t.motion.levelCount).fill(0),this.vertices=0;for(let u of this.#f())this.#T(u)}#g(t,e,s,i){let o=e[this.#R(e,s)],{clip:n}=o.drawn.userData,a=this.#_(t/4,n,o.level),h=a.level===o.level?o:this.#P(e,a.level,s),l=a.from<0?null:e.find(({level:c})=>c===a.from);if(!l){this.#E(t,h,i);return}this.fading=!0,this.#E(t,this.#w(n,h,l),i,1-At(this.#D(a)))}#P(t,e,s){let i=t.filter(o=>o.level===e);return i[this.#R(i,s)]}#_(t,e,s){let i=this.#d[t];return(!i||i.clip!==e)&&(i=this.#d[t]={clip:e,level:s,from:-1,since:0}),i.from>=0&&this.#D(i)>=1&&(i.from=-1),i.from<0&&i.level!==s&&Object.assign(i,{level:s,from:this.fade>0?i.level:-1,since:this.#p}),i}#D({since:t}){return(this.#p-t)/1e3/this.fade}#E(t,e,s,i=0){let{place:o,turn:n,look:a}=e,h=4*e.filled++;for(let l=0;l<4;l++)o.array[h+l]=this.#a[t+l];for(let l=0;l<4;l++)a.array[h+l]=this.#c[t+l];n.array[h]=this.#l[t],n.array[h+1]=this.#l[t+1],this.#A(n.array,h+2,e,s+this.#l[t+2]),e.from&&(this.#A(e.share.array,h,e.from,s+this.#l[t+2]),e.share.array[h+2]=i)}#A(t,e,{rows:s,perRow:i},o){let n=Math.fround(o/i%s),a=n<0?n+s:n;t[e]=a<s?a:0,t[e+1]=(Math.floor(t[e])+1)%s}#O(t=1){let{center:e,radius:s}=this.#t.sphere,i=e.length()+s,o=Math.max(Math.abs(t-.5)-.5,0);return Math.max(i,this.#n)+o*(i+this.#n)}#R(t,e){let s=0;for(;s+1<t.length&&t[s+1].tolerance<=e;)s++;return s}#T(t){let{filled:e,drawn:s}=t;s.geometry.instanceCount=e,s.visible=e>0,this.counts[t.level]+=e,this.vertices+=e*t.size;for(let i of[t.place,t.turn,t.look,t.share].filter(Boolean))i.clearUpdateRanges(),i.addUpdateRange(0,4*e),i.needsUpdate=e>0}dispose(){for(let t of this.#s.values())t.dispose();for(let{uniforms:t,drawn:e}of this.#f()){t.athData.value.dispose(),e.geometry.dispose();for(let s of[e.material,e.customDepthMaterial,e.customDistanceMaterial])s.dispose()}this.#e.clear(),this.#t=null}};function uo({data:r,rows:t,texels:e},{parts:{nodeCount:s,exactCount:i},boxes:o},n){let a=0;for(let h=0;h<t;h++){let l=4*h*e;for(let[c,u,f,d,p,m,b]of o){let x=0;for(let y=l+c,g=0;g<3;g++,y+=4){let v=r[y]*u+r[y+1]*f+r[y+2]*d+r[y+3];x+=(Math.abs(v)+Math.abs(r[y])*p+Math.abs(r[y+1])*m+Math.abs(r[y+2])*b)**2}a=Math.max(a,x)}for(let c=0,u=l+12*s;c<i;c++,u+=4*n)a=Math.max(a,r[u]**2+r[u+1]**2+r[u+2]**2)}return Math.sqrt(a)}import{DoubleSide as oe,MeshDepthMaterial as ea,MeshStandardMaterial as fo,RGBADepthPacking as sa}from"./three.webgpu.js";var Ge=["bark","stalks"],$e=["leaves","blades","pinnae"];function re({surfaces:r}){let[t,e]=typeof r=="string"?r.split(", "):[];return Ge.includes(t)&&$e.includes(e)?[t,e]:null}var po=`
+varying vec2 athUv;
+varying vec3 athGrown;
+float athHalf(float v){
+#if ATH_LEAF == 1
+return 2.;
+#elif ATH_LEAF == 2
+float lobes=1. - smoothstep(.02,.06,fwidth(v));
+return .97 - .55*lobes*pow(abs(cos(3.14159*13.*v)),3.)*(1. - .6*v);
+#endif
+float along=clamp((v - .1)/.9,.0,1.),teeth=1. - smoothstep(.02,.06,fwidth(v));
+float outline=pow(sin(3.14159*pow(along,.8)),.8)*(.95 - .06*teeth*abs(sin(34.*along)));
+return max(outline,v<.2?.04:.0);
+}
+float athInside(){
+if (athUv.x<1.) return 1.;
+float across=abs(4.*fract(.5*(athUv.x - 1.)) - 1.);
+return min(athHalf(athUv.y) - across,.995 - athUv.y);
+}
+`,mo=`
+float athHash(vec3 p){
+p=fract(p*.3183099+vec3(.71,.113,.419));
+p*=17.;
+return fract(p.x*p.y*p.z*(p.x+p.y+p.z));
+}
+float athNoise(vec3 x){
+vec3 i=floor(x),f=fract(x);
+f=f*f*(3. - 2.*f);
+return mix(mix(mix(athHash(i),athHash(i+vec3(1,0,0)),f.x),mix(athHash(i+vec3(0,1,0)),athHash(i+vec3(1,1,0)),f.x),f.y),
+mix(mix(athHash(i+vec3(0,0,1)),athHash(i+vec3(1,0,1)),f.x),mix(athHash(i+vec3(0,1,1)),athHash(i+vec3(1,1,1)),f.x),f.y),f.z);
+}
+float athBark(vec2 uv){
+vec3 p=vec3(uv.x*9.,uv.y*5.,1.7);
+float warp=athNoise(p*vec3(.8,1.4,1.)) - .5;
+float ridge=1. - abs(2.*athNoise(vec3(p.x*1.3+1.6*warp,p.y*.55,4.)) - 1.);
+float cracks=athNoise(vec3(p.x*2.,p.y*3.2,9.));
+float near=1. - smoothstep(.06,.3,length(fwidth(uv)));
+return mix(.45,ridge*ridge*.75+.25*cracks,near);
+}
+float athVeins(vec2 leaf){
+#if ATH_LEAF == 1
+return (1. - smoothstep(.1,.5,fwidth(leaf.x)))*max(.8*(1. - smoothstep(.0,.14,abs(leaf.x))),.3+.3*sin(28.*leaf.x));
+#endif
+float across=abs(leaf.x),rib=1. - smoothstep(.0,.05,across);
+float side=abs(fract(8.*(leaf.y - .42*across)) - .5);
+float near=1. - smoothstep(.03,.12,fwidth(leaf.y));
+return near*max(rib,(1. - smoothstep(.0,.12,side))*.55*(1. - across));
+}
+`,go=`
 float athIn=athInside();
 diffuseColor.a=clamp(athIn/max(fwidth(athIn),1e-4)+.5,.0,1.);
 #ifdef ALPHA_TO_COVERAGE
@@ -6,8 +190,8 @@ if (diffuseColor.a<.02) discard;
 #else
 if (diffuseColor.a<.5) discard;
 #endif
-`,jt=`
-${et}
+`,wo=`
+${go}
 bool athIsLeaf=athUv.x>=1.;
 float athThin=.0,athBump=.0;
 if (athIsLeaf){
@@ -37,4 +221,795 @@ bark=mix(bark,bark*vec3(.85,.92,.8),age);
 diffuseColor.rgb=mix(bark,vec3(.17,.19,.12),.35*lichen*athBump);
 #endif
 }
-`;var{Fn:K,abs:Y,attribute:at,clamp:X,dot:st,float:U,floor:rt,fract:it,fwidth:de,max:Z,mix:z,mx_noise_float:fe,normalWorld:ct,pow:j,select:F,sin:me,smoothstep:q,vec3:P}=nt;function lt(o,e){if(o==="blades")return U(2);if(o==="pinnae")return U(.97).sub(j(Y(me(e.mul(40.84).add(1.5708))),3).mul(.55).mul(e.mul(-.6).add(1)));let t=X(e.sub(.1).div(.9),0,1);return Z(j(me(j(t,.8).mul(Math.PI)),.8).mul(.92),F(e.lessThan(.2),U(.04),U(0)))}function J(o,e){let t=he(o),n=new ot({color:t?16777215:8362581,roughness:.8,side:tt});if(!t)return n;let[a,s]=t,h=at("uv","vec2"),d=h.x,c=h.y,l=d.greaterThanEqual(1),u=rt(d.sub(1).mul(.5)).div(7),i=it(d.sub(1).mul(.5)).mul(4).sub(1),f=K(()=>{let A=z(P(.062,.155,.018),P(.145,.255,.03),u).toVar();s==="blades"&&A.mulAssign(q(0,.45,c).mul(.6).add(.5));let O=q(.08,0,Y(i)).mul(q(.12,.03,de(c)));return z(A,A.mul(1.5).add(.015),O.mul(.5))}),y=K(()=>{if(a==="stalks")return z(P(.1,.075,.03),P(.12,.17,.04),X(c.mul(.02),0,1));let A=fe(P(d.mul(11),c.mul(2.6),4)).mul(.6).add(fe(P(d.mul(18),c.mul(16),9)).mul(.3)).add(.45);return z(P(.05,.037,.027),P(.27,.215,.165),X(A,0,1))}),I=F(l,f(),y());n.colorNode=I;let T=K(()=>{let A=lt(s,c).sub(Y(i)),O=Z(de(A),1e-4);return F(l,A.div(O).add(.5),U(1))});n.opacityNode=T(),n.alphaTest=.5;let N=Z(st(ct,P(e.x,e.y,e.z)).negate(),0);return n.emissiveNode=F(l,I.mul(P(1.5,1.45,.45)).mul(N).mul(.8),P(0)),n}var ht=12e3,dt=Math.PI*(3-Math.sqrt(5)),ue=({sphere:o},e,t=1)=>1.1*o.radius*t*Math.sqrt(e);function pe({metadata:o,motion:e,rest:t},n,a){let s=e.duration||1,h=o.up_axis==="z";return Array.from({length:n},(d,c)=>{let l=a*Math.sqrt((c+.3)/n),u=c*dt+.5*Math.sin(c*12.9898),i=.75+.5*(Math.sin(c*78.233)*.5+.5),f=l*Math.cos(u),y=l*Math.sin(u);return{...h?{x:f,y,z:t[2]*(1-i)}:{x:f,y:t[1]*(1-i),z:y},size:i,angle:c*2.4,seconds:c*.7548776662%1*s}})}var ge=(o,{metadata:e})=>o.map(({x:t,y:n,z:a})=>e.up_axis==="z"?[t,-n]:[t,a]);function xe(o,e,t,n){return Array.from({length:Math.min(ht,Math.round(e*o.length))},(a,s)=>{let[h,d]=o[Math.floor(s/e)],c=Math.floor(s%e/3),l=20*n,u=2*Math.PI*S(Math.floor(s/e)*7+c+1,l),i=t*(.12+.88*S(Math.floor(s/e)*5+c+1,l+1)),f=.16*t*Math.sqrt(S(s+1,l+2)),y=2*Math.PI*S(s+1,l+3);return{x:h+i*Math.cos(u)+f*Math.cos(y),z:d+i*Math.sin(u)+f*Math.sin(y),size:.8+.8*S(s+1,l+4),angle:2*Math.PI*S(s+1,l+5),seconds:100*S(s+1,l+6)}})}function we(o,{metadata:e,rest:t}){return e.up_axis==="z"?o.map(({x:n,z:a,size:s,...h})=>({...h,size:s,x:n,y:-a,z:t[2]*(1-s)})):o.map(({size:n,...a})=>({...a,size:n,y:t[1]*(1-n)}))}var ft=4;function ve(o){let e=o.getAll("each").map(Number);return o.getAll("floor").map((t,n)=>({source:t,each:e[n]>0?e[n]:ft}))}var ye=["The file cannot be fetched","The server did not answer, or it has no such file. Check the address, and whether you are online."],be=["The file is cut off too early","Its end is missing, as after a download that was interrupted. Get it again."],mt={NOT_AN_ATH_FILE:["This is not an .ath file","It begins as another kind of file. If it came from the web, its address may lead to a page about the file and not to the file."],NO_MOTION:["This GLB holds no plant that moves","athcodec encode FILE.glb --into OUT.glb puts the motion of its animation into it."],UNSUPPORTED_VERSION:["This file is of another version of the format","A newer viewer may show it, or the file can be made again from its source."],HTTP:ye,NETWORK:ye,MISSING:be,TRUNCATED:be,NEEDS_HOST_MESH:["This file needs the mesh that it was made for","It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],UNSUPPORTED_FEATURE:["This file uses something newer than this viewer","A newer viewer may show it."],WRONG_HOST_MESH:["The mesh is not the one that this file was made for","The file fits one mesh alone, point for point."],CLIP:["The file has no such clip","The address names a clip that is not in the file."],CHANGED:["The file has changed","While it was loading, another one took its place. Load it again."],WORKER:["The decoder cannot be started","The page is not complete: ath_worker.js belongs beside it."],GRAPHICS:["This browser cannot draw in 3D","The page needs WebGL 2. It may be turned off in the browser's settings."]},ut=["The file is damaged","Some of its bytes are not what they were when it was made. Get it again."],pt=["HTTP","NETWORK","MISSING","TRUNCATED","CHANGED","WORKER"];function Se(o){let[e,t]=mt[o]??ut;return{title:e,advice:t,passing:pt.includes(o)}}import{Euler as Me,Vector3 as Q}from"three/webgpu";var G={KeyW:[0,1],ArrowUp:[0,1],KeyS:[0,-1],ArrowDown:[0,-1],KeyA:[-1,0],ArrowLeft:[-1,0],KeyD:[1,0],ArrowRight:[1,0]},gt=2.6,Ee=.0035,Te=1.3,xt=.12,B=class{on=!1;#e=new Set;#o=[0,0];#n=new Q;#t=new Me(0,0,0,"YXZ");constructor(e,t,n,{height:a,speed:s,changed:h}){Object.assign(this,{camera:e,canvas:t,height:a,speed:s,changed:h}),addEventListener("keydown",d=>this.#a(d)),addEventListener("keyup",({code:d})=>this.#e.delete(d)),addEventListener("blur",()=>this.#e.clear()),t.addEventListener("pointermove",d=>this.#s(d)),this.#r(n)}begin(){if(this.on)return;let{camera:e}=this,t=e.getWorldDirection(new Q);this.on=!0,this.#t.set(Math.max(-.3,Math.min(Math.asin(t.y),.1)),Math.atan2(-t.x,-t.z),0),this.changed(!0)}end(){this.on&&(this.on=!1,this.#e.clear(),this.changed(!1))}#a(e){let{code:t,target:n}=e;e.ctrlKey||e.metaKey||e.altKey||n.closest?.("input, button")||(t==="Escape"&&this.end(),!(!(t in G)&&!t.startsWith("Shift"))&&(this.#e.add(t),t in G&&(e.preventDefault(),this.begin())))}#s({buttons:e,movementX:t,movementY:n}){!this.on||!(e&1)||(this.#t.y+=Ee*t,this.#t.x=Math.max(-Te,Math.min(this.#t.x+Ee*n,Te)))}#r(e){let t=a=>{let{left:s,top:h,width:d,height:c}=e.getBoundingClientRect(),l=(a.clientX-s)/d*2-1,u=1-(a.clientY-h)/c*2,i=Math.max(1,Math.hypot(l,u));this.#o=[l/i,u/i],e.style.setProperty("--x",l/i),e.style.setProperty("--y",-u/i)},n=()=>{this.#o=[0,0],e.style.setProperty("--x",0),e.style.setProperty("--y",0)};e.addEventListener("pointerdown",a=>{e.setPointerCapture(a.pointerId),this.begin(),t(a)}),e.addEventListener("pointermove",a=>{e.hasPointerCapture(a.pointerId)&&t(a)});for(let a of["pointerup","pointercancel"])e.addEventListener(a,n)}update(e){if(!this.on)return;let t=[...this.#e].reduce(([c,l],u)=>[c+(G[u]?.[0]??0),l+(G[u]?.[1]??0)],this.#o),n=Math.max(1,Math.hypot(...t)),a=this.speed*([...this.#e].some(c=>c.startsWith("Shift"))?gt:1),s=new Q(t[0]/n,0,-t[1]/n).multiplyScalar(a).applyEuler(new Me(0,this.#t.y,0)),h=1-Math.exp(-e/xt),{position:d}=this.camera;this.#n.lerp(s,h),d.addScaledVector(this.#n,e),d.y+=(this.height-d.y)*(1-Math.exp(-3*e)),this.camera.quaternion.setFromEuler(this.#t)}};var v=o=>document.getElementById(o),R=new URLSearchParams(location.search),W=Number(R.get("count")??1e4),Lt=.85,Ot=.28,Pt=.7,It=40,Nt=12,x={frames:0,milliseconds:0,forest:null,ath:null,error:null};window.athcodecForest=x;var _t=o=>Math.floor(200+55*S(o,3))<<16|Math.floor(215+40*S(o,6))<<8|205;function Oe({motion:{clips:o},metadata:e}){let t=o.map(({name:s})=>e.clips?.[s]?.strength).filter(Number.isFinite),[n,a]=[Math.min(...t),Math.max(...t)];return a>n?{calm:n,wild:a}:null}function Ht(o,e,t){return Promise.all(ve(R).map(async({source:n,each:a},s)=>{let h=await new Ae().loadAsync(n),d=Oe(h),{clips:c}=h.motion,l=()=>J(h.metadata,C),u=new Le(o,h,{material:l}),i=f=>c[d?0:f%c.length].name;return u.setInstances(we(xe(e,a,t,s),h).map((f,y)=>({...f,clip:i(y)}))),{forest:u,winds:d}}))}async function Ct(){if(!await navigator.gpu?.requestAdapter())return null;let o=new Tt({canvas:v("canvas"),antialias:!0});return o.init().then(()=>o.backend.isWebGPUBackend?o:null,()=>null)}async function kt(){let o=await Ct();if(!o){location.replace(`index.html${location.search}#forest=${W}`);return}let e=await new Ae().loadAsync(R.get("file")),t=e.hasFaces,{radius:n}=e.sphere,a=new Le(o,e,{shape:t?void 0:ne(e,wt(e)),material:()=>t?J(e.metadata,C):new bt({roughness:.85,side:yt})}),s=Oe(e),{clips:h}=e.motion,d=s?1:h.length,c=pe(e,W,ue(e,W,Lt)).map((r,g)=>({...r,clip:h[g%d].name,tint:_t(g)}));a.setInstances(c);let l=await Ht(o,ge(c,e),.9*n),u=new Mt,i=new St(40,1,.02*n,400*n),f=new At(i,v("canvas")),y=new D(u,n),I=/swiftshader|llvmpipe/i.test(o.backend.device.adapterInfo?.architecture??""),T=new B(i,v("canvas"),v("stick"),{height:Ot*n,speed:Pt*n,changed:r=>A(r)});o.toneMapping=vt,o.shadowMap.enabled=!0,y.shadows=R.get("quality")==="full"||!I,u.add(a,...l.map(r=>r.forest)),i.position.set(3*n,2.4*n,8*n),f.target.set(0,.9*n,0),f.maxPolarAngle=.49*Math.PI,f.maxDistance=150*n,f.enableDamping=!0,Object.assign(x,{ath:e,forest:a,floor:l.map(r=>r.forest),renderer:o,camera:i,controls:f,scene:u,walk:T,time:null,seconds:0,playing:!0});let N=r=>{x.moves=r,v("play").textContent=r?"Pause":"Play"};N(!matchMedia("(prefers-reduced-motion: reduce)").matches),v("play").addEventListener("click",()=>N(!x.moves));let A=r=>{v("walk").setAttribute("aria-pressed",r),f.enabled=!r,r||f.target.copy(i.position).add(i.getWorldDirection(new Et).multiplyScalar(4*n)).setY(.9*n)};v("walk").addEventListener("click",()=>T.on?T.end():T.begin()),s&&Object.assign(v("strength"),{min:s.calm,max:s.wild,step:(s.wild-s.calm)/100,value:s.wild});let O=()=>{let r=Number(v("strength").value),g=Number(v("heading").value);v("strength-value").textContent=r.toFixed(1),v("heading-value").textContent=`${g}°`;for(let{forest:b,winds:E}of[{forest:a,winds:s},...l])E&&b.wind(s?r:E.calm+.5*r*(E.wild-E.calm)),b.sway(E||s?1:r,g*Math.PI/180)};for(let r of["strength","heading"])v(r).addEventListener("input",O);O();let p=null,m=0,w=r=>{m=r>It?m+1:0,!(m<Nt||R.get("quality")==="full")&&(m=0,y.sun.castShadow?y.shadows=!1:o.setPixelRatio(1))},M=r=>{let g=p===null?0:r-p;p=r,w(g),T.update(Math.min(g,1e3)/1e3),y.around(T.on?i.position:f.target);let{clientWidth:b,clientHeight:E}=v("canvas");(b!==x.width||E!==x.height)&&(Object.assign(x,{width:b,height:E}),o.setPixelRatio(Math.min(devicePixelRatio,2)),o.setSize(b,E,!1),i.aspect=b/E,i.updateProjectionMatrix()),T.on||f.update();let _=performance.now();x.moves&&(x.seconds+=g/1e3);for(let Pe of[a,...x.floor])Pe.update(i,E,x.time??x.seconds);x.milliseconds=performance.now()-_,o.render(u,i),x.frames++},L=()=>{let r=[a,...x.floor].reduce((g,{bytesOfMotion:b})=>g+b,0)/1e3;v("status").textContent=`${W.toLocaleString("en")} plants, ${Math.round(r).toLocaleString("en")} kB of motion on the graphics card`};for(let r of[a,...x.floor])r.addEventListener("level",L);o.setAnimationLoop(r=>{x.playing&&M(r)}),x.draw=M}kt().catch(o=>{let{title:e,advice:t}=Se(o.codeName);x.error=o.message,Object.assign(v("status"),{textContent:o.codeName?`${e}. ${t}`:o.message,title:o.message,className:"wrong"}),v("controls").hidden=!0});
+`,yo=`
+if (athIsLeaf && dot(normal,normalize(vViewPosition))<.0) normal=-normal;
+{
+vec3 dx=dFdx(vViewPosition),dy=dFdy(vViewPosition);
+float hx=dFdx(athBump),hy=dFdy(athBump),strength=athIsLeaf?.004:.03;
+vec3 r1=cross(dy,normal),r2=cross(normal,dx);
+float det=dot(dx,r1);
+vec3 slope=sign(det)*(hx*r1+hy*r2)*strength;
+float rough=length(vec2(hx,hy));
+normal=normalize(abs(det)*normal - slope*(1. - smoothstep(.06,.3,rough)));
+}
+`,bo=`
+#if NUM_DIR_LIGHTS > 0
+if (athIsLeaf){
+vec3 sun=directionalLights[0].direction;
+float behind=max(dot(-normal,sun),.0),toward=pow(max(dot(-normalize(vViewPosition),-sun)*-1.,.0),4.);
+float lit=1.;
+#if defined(USE_SHADOWMAP) && NUM_DIR_LIGHT_SHADOWS > 0
+lit=receiveShadow?getShadow(directionalShadowMap[0],directionalLightShadows[0].shadowMapSize,directionalLightShadows[0].shadowIntensity,
+directionalLightShadows[0].shadowBias,directionalLightShadows[0].shadowRadius,vDirectionalShadowCoord[0]):1.;
+#endif
+vec3 through=diffuseColor.rgb*vec3(1.5,1.45,.45);
+reflectedLight.directDiffuse+=athThin*(.55*behind+.25*toward)*lit*directionalLights[0].color*through;
+}
+#endif
+`;function vo(r,t,[e,s]){r.vertexShader=r.vertexShader.replace("#include <common>",`#include <common>
+varying vec2 athUv;
+varying vec3 athGrown;`).replace("#include <uv_vertex>",`#include <uv_vertex>
+athUv = uv;
+athGrown = position;`),r.fragmentShader=`#define ATH_STEM ${Ge.indexOf(e)}
+#define ATH_LEAF ${$e.indexOf(s)}
+${t}`}function xo(r){return r.onBeforeRender=(t,e)=>{r.alphaToCoverage=e.fog!==null,r.onBeforeRender=()=>{}},r}var kt=class extends fo{constructor(t={}){let e=re(t);super(e?{side:oe,shadowSide:oe}:{side:oe,color:7311178,roughness:.8}),e&&(this.onBeforeCompile=s=>vo(s,s.fragmentShader.replace("#include <common>",`#include <common>
+${po}${mo}`).replace("#include <map_fragment>",wo).replace("#include <roughnessmap_fragment>","float roughnessFactor = athIsLeaf ? 0.62 : 0.95;").replace("#include <normal_fragment_maps>",yo).replace("#include <lights_fragment_end>",`#include <lights_fragment_end>
+${bo}`),e),this.customProgramCacheKey=()=>`ath surface ${e}`,xo(this))}};import{Box3 as Fo,BufferAttribute as is,DoubleSide as Bo,Group as jo,IndirectStorageBufferAttribute as Ho,LineBasicNodeMaterial as Wo,LineSegments as Vo,Mesh as Go,MeshStandardNodeMaterial as $o,Frustum as qo,Matrix4 as os,StorageBufferAttribute as Yo,TSL as Ut,Vector3 as le,WebGPUCoordinateSystem as Ko}from"./three.webgpu.js";var qe=`// The blocks of a level and of a segment, as core/include/ath_gpu.h lays them out. This text stands in front of time, hierarchy and finish.
+
+@group(0) @binding(0) var<storage, read> level: array<u32>;
+@group(0) @binding(1) var<storage, read> segments: array<u32>; // blocks one behind the other
+
+// A place is a blend of its sources. A dispatch computes several, one for each y of its workgroups.
+struct Place {
+    sources: u32, // word of \`places\` that they begin at
+    source_count: u32,
+    positions: u32, // number before those of this place; so are the others
+    matrices: u32,
+    modes: u32,
+    bodies: u32,
+    strength: f32, // Factor of the motion.
+}
+// A frame that a place shows, alone or blended with others.
+struct Source {
+    segment: u32, // word that the block of its segment begins at
+    frame: u32,
+    amplitudes: u32, // number before its own
+    weight: f32,     // The weights of a place add up to 1.
+}
+@group(0) @binding(2) var<storage, read> places: array<u32>; // all of a dispatch, then all their sources
+var<private> run: Place;
+var<private> source: Source;
+const PLACE_WORDS = 8u;
+const SOURCE_WORDS = 4u;
+
+// Words of the header of a level.
+const VERTEX_COUNT = 2u;
+const BODY_COUNT = 3u;
+const POSITION_COUNT = 4u;
+const MATRIX_COUNT = 5u;
+const VERTICES = 7u;
+const BODIES = 8u;
+const ORDER = 9u;
+const DEPTHS = 10u;
+const BASES = 11u;
+
+// Words of the header of a segment.
+const FRAMES = 3u;
+const JOIN_FRAMES = 4u;
+const ROW_COUNT = 5u;
+const CORRECTED_COUNT = 6u;
+const CORRECTION_PART = 7u;
+const MOVES = 8u;
+const ROWS = 9u;
+const VALUES = 10u;
+const SHAPES = 11u;
+const TURNS = 12u;
+const JOIN_CURVE = 13u;
+const JOIN_STEPS = 14u;
+const JOINS = 15u;
+const MATRIX_JOINS = 16u;
+const CORRECTED = 17u;
+const CORRECTIONS = 18u;
+const BAKED = 19u;
+const WAVE_SETS = 20u;
+
+// Flags of bodies.
+const NODE = 1u;
+const FOLLOWS = 2u;
+const FITTED = 4u;
+
+// Words of records.
+const BODY_WORDS = 16u;
+const ROW_WORDS = 3u;
+const MOVE_WORDS = 4u;
+const VERTEX_WORDS = 4u;
+
+struct Body {
+    flags: u32,
+    parent: i32,
+    attach: i32,
+    way: u32,
+    modes: u32,
+    first: u32,
+    count: u32,
+    vertex: u32,
+    basis: u32,
+    shape_modes: u32,
+    rest_point: vec3<f32>,
+    tangent: vec3<f32>,
+}
+
+struct Row {
+    values: u32,
+    count: u32,
+    slot: u32,
+    waves: u32,
+    step: f32,
+}
+
+struct Move {
+    row: u32,
+    rows: u32,
+    shape_count: u32,
+    shapes: u32,
+    turn: u32,
+}
+
+fn place_at(y: u32) -> Place {
+    let at = PLACE_WORDS * y;
+    return Place(places[at], places[at + 1u], places[at + 2u], places[at + 3u], places[at + 4u], places[at + 5u],
+        bitcast<f32>(places[at + 6u]));
+}
+
+// The place that this invocation computes. Functions of segments read the source that is set.
+fn source_at(s: u32) -> Source {
+    let at = run.sources + SOURCE_WORDS * s;
+    return Source(places[at], places[at + 1u], places[at + 2u], bitcast<f32>(places[at + 3u]));
+}
+
+fn segment(at: u32) -> u32 {
+    return segments[source.segment + at];
+}
+
+fn level_float(at: u32) -> f32 {
+    return bitcast<f32>(level[at]);
+}
+
+fn segment_float(at: u32) -> f32 {
+    return bitcast<f32>(segment(at));
+}
+
+fn level_vector(at: u32) -> vec3<f32> {
+    return vec3<f32>(level_float(at), level_float(at + 1u), level_float(at + 2u));
+}
+
+fn body_at(b: u32) -> Body {
+    let at = level[BODIES] + BODY_WORDS * b;
+    return Body(
+        level[at],
+        bitcast<i32>(level[at + 1u]),
+        bitcast<i32>(level[at + 2u]),
+        level[at + 3u],
+        level[at + 4u],
+        level[at + 5u],
+        level[at + 6u],
+        level[at + 7u],
+        level[at + 8u],
+        level[at + 9u],
+        level_vector(at + 10u),
+        level_vector(at + 13u),
+    );
+}
+
+fn move_at(b: u32) -> Move {
+    let at = segment(MOVES) + MOVE_WORDS * b;
+    let counts = segment(at + 1u);
+    return Move(segment(at), counts & 0xffffu, counts >> 16u, segment(at + 2u), segment(at + 3u));
+}
+
+fn row_at(r: u32) -> Row {
+    let at = segment(ROWS) + ROW_WORDS * r;
+    let packed = segment(at + 1u);
+    return Row(segment(at), packed & 0xffffu, (packed >> 16u) & 0xffu, packed >> 24u, segment_float(at + 2u));
+}
+
+fn rest_of(vertex: u32) -> vec3<f32> {
+    return level_vector(level[VERTICES] + VERTEX_WORDS * vertex);
+}
+
+// One of two 16-bit integers of a word.
+fn half(word: u32, index: u32) -> i32 {
+    return bitcast<i32>(word << (16u - 16u * index)) >> 16u;
+}
+`;var Ye=`// Chooses what instances are drawn with: each that is in view is appended to the list of the coarsest shape whose error its distance
+// hides. One invocation per instance.
+
+struct Instance {
+    place: vec4<f32>, // x, y, z, size
+    turn: vec4<f32>,  // cosine and sine of its angle, the plant that it shows, tint
+    look: vec4<f32>,  // Amplitude: how many times as far from the rest pose everything is.
+}
+
+struct View {
+    planes: array<vec4<f32>, 6>, // The planes of the view: normal, distance.
+    eye: vec3<f32>,
+    pixel: f32, // the error that is allowed at distance 1
+    count: u32,
+    shapes: u32,
+    reach: f32, // how far from its place an instance of size 1 can be seen
+    room: u32,  // Instances that a list has room for.
+}
+
+struct Shape {
+    tolerance: f32,
+    list: u32,
+}
+
+@group(0) @binding(0) var<storage, read> instances: array<Instance>;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var<storage, read> shapes: array<Shape>; // the finest first
+@group(0) @binding(3) var<storage, read_write> draws: array<atomic<u32>>; // five numbers of each list: of an indexed indirect draw
+@group(0) @binding(4) var<storage, read_write> lists: array<u32>;
+
+fn is_seen(centre: vec3<f32>, radius: f32) -> bool {
+    for (var k = 0u; k < 6u; k++) {
+        if (dot(view.planes[k].xyz, centre) + view.planes[k].w < -radius) {
+            return false;
+        }
+    }
+    return true;
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    if (id.x >= view.count || view.shapes == 0u) {
+        return;
+    }
+    let place = instances[id.x].place;
+    let radius = view.reach * place.w;
+    if (!is_seen(place.xyz, radius * max(1.0, 2.0 * abs(instances[id.x].look.x - 0.5)))) {
+        return;
+    }
+    let hidden = view.pixel * max(distance(view.eye, place.xyz) - 0.5 * radius, 1e-6) / place.w;
+    var chosen = 0u;
+    while (chosen + 1u < view.shapes && shapes[chosen + 1u].tolerance <= hidden) {
+        chosen++;
+    }
+    let list = shapes[chosen].list;
+    lists[list * view.room + atomicAdd(&draws[5u * list + 1u], 1u)] = id.x;
+}
+`;var Ke=`// The end of pass 2, when all depths have been placed: joins, matrices, corrections, and motion that is baked.
+
+@group(0) @binding(3) var<storage, read_write> positions: array<f32>;
+@group(0) @binding(4) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(5) var<uniform> which: u32; // The source of each place whose corrections are added.
+
+const FOOTPRINTS = array<array<f32, 4>, 3>(
+    array<f32, 4>(32.0, 0.0, 0.0, 0.0), array<f32, 4>(32.0, 16.0, 0.0, 0.0), array<f32, 4>(32.0, 27.0, 16.0, 5.0),
+);
+
+fn is_joined() -> bool {
+    return source.frame < segment(JOIN_FRAMES);
+}
+
+// The shares of jumps and of slopes that remain at the frame.
+fn curve() -> vec2<f32> {
+    let at = segment(JOIN_CURVE) + 2u * source.frame;
+    return run.strength * source.weight * vec2<f32>(segment_float(at), segment_float(at + 1u));
+}
+
+fn join_position(b: u32, index: u32) {
+    let steps = segment(JOIN_STEPS) + 2u * b;
+    let step = curve() * vec2<f32>(segment_float(steps), segment_float(steps + 1u));
+    for (var axis = 0u; axis < 3u; axis++) {
+        let word = segment(segment(JOINS) + 3u * index + axis);
+        positions[run.positions + 3u * index + axis] += f32(half(word, 0u)) * step.x + f32(half(word, 1u)) * step.y;
+    }
+}
+
+// Numbers of R, row by row, then of c, as a matrix has them: R and c side by side.
+fn join_matrix(index: u32) {
+    for (var k = 0u; k < 12u; k++) {
+        let at = segment(MATRIX_JOINS) + 2u * (12u * index + k);
+        let place = select(4u * (k - 9u) + 3u, 4u * (k / 3u) + k % 3u, k < 9u);
+        matrices[run.matrices + 12u * index + place] += segment_float(at) * curve().x + segment_float(at + 1u) * curve().y;
+    }
+}
+
+// From c + R (x0 - a) to R x0 and a sum.
+fn finish_matrix(index: u32, a: vec3<f32>) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        let at = run.matrices + 12u * index + 4u * axis;
+        matrices[at + 3u] -= dot(vec3<f32>(matrices[at], matrices[at + 1u], matrices[at + 2u]), a);
+    }
+}
+
+// One workgroup per body.
+@compute @workgroup_size(64)
+fn bodies(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+          @builtin(local_invocation_index) i: u32) {
+    run = place_at(group.y);
+    let b = group.x + groups.x * group.z;
+    if (b >= level[BODY_COUNT]) {
+        return;
+    }
+    let body = body_at(b);
+    let is_node = (body.flags & NODE) != 0u;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (is_joined() && !is_node && i < body.count) {
+            join_position(b, body.first + i);
+        } else if (is_joined() && is_node && i == 0u) {
+            join_matrix(body.first);
+        }
+    }
+    if (is_node && i == 0u) {
+        finish_matrix(body.first, body.rest_point);
+    }
+}
+
+// One invocation per corrected position of a source.
+@compute @workgroup_size(64)
+fn corrections(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    if (which >= run.source_count) {
+        return;
+    }
+    source = source_at(which);
+    if (i >= segment(CORRECTED_COUNT)) {
+        return;
+    }
+    let own = segment(CORRECTED) + 2u * i;
+    var sum = vec3<f32>(0.0);
+    for (var c = segment(own + 1u); c < segment(own + 3u); c++) {
+        let at = segment(CORRECTIONS) + 2u * c;
+        let low = segment(at);
+        let high = segment(at + 1u);
+        let away = abs(i32(source.frame) - i32((high >> 16u) & 0xffu));
+        if (away < 4) {
+            let width = high >> 24u;
+            let part = FOOTPRINTS[width & 15u][away] * exp2(f32(width >> 4u));
+            sum += part * vec3<f32>(f32(half(low, 0u)), f32(half(low, 1u)), f32(half(high, 0u)));
+        }
+    }
+    for (var axis = 0u; axis < 3u; axis++) {
+        positions[run.positions + 3u * segment(own) + axis] +=
+            sum[axis] * run.strength * source.weight * segment_float(CORRECTION_PART);
+    }
+}
+
+// One invocation per number of a position, in place of all passes before.
+@compute @workgroup_size(64)
+fn baked(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    let count = 3u * level[POSITION_COUNT];
+    if (i >= count) {
+        return;
+    }
+    var sum = 0.0;
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        sum += source.weight * segment_float(segment(BAKED) + source.frame * count + i);
+    }
+    positions[run.positions + i] = sum;
+}
+`;var Xe=`// Pass 2: bodies of one depth, each placed from the one that it hangs on; amplitudes of all sources of a place add up. One
+// workgroup per body, one invocation per position.
+
+@group(0) @binding(8) var<uniform> depth: u32; // Depth of the bodies that this pass places.
+@group(0) @binding(3) var<storage, read> amplitudes: array<f32>;
+@group(0) @binding(4) var<storage, read_write> positions: array<f32>;
+@group(0) @binding(5) var<storage, read_write> matrices: array<f32>;
+@group(0) @binding(6) var<storage, read_write> parent_modes: array<f32>; // The modes of a body begin at its first position.
+@group(0) @binding(7) var<storage, read_write> frames: array<f32>; // For each body: rotation, point.
+
+const SHIFT = 64u;
+const ROTATION = 65u;
+const POLAR_ITERATIONS = 4;
+const IDENTITY = mat3x3<f32>(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+
+var<workgroup> modes: array<vec3<f32>, 64>;
+var<workgroup> placed: array<vec3<f32>, 64>; // before: what modes of the parent add to its tangent
+
+struct Frame {
+    point: vec3<f32>,
+    rotation: mat3x3<f32>,
+}
+
+fn amplitude(row: u32) -> vec3<f32> {
+    let at = source.amplitudes + 3u * row;
+    return vec3<f32>(amplitudes[at], amplitudes[at + 1u], amplitudes[at + 2u]);
+}
+
+fn position_at(index: u32) -> vec3<f32> {
+    let at = run.positions + 3u * index;
+    return vec3<f32>(positions[at], positions[at + 1u], positions[at + 2u]);
+}
+
+// Returns what mode m of its parent adds to the tangent that a body follows.
+fn way_by_mode(body: Body, m: u32) -> vec3<f32> {
+    let parent = level[BODIES] + BODY_WORDS * u32(max(body.parent, 0));
+    if ((body.flags & FOLLOWS) == 0u || m >= level[parent + 4u]) {
+        return vec3<f32>(0.0);
+    }
+    let at = run.modes + 3u * (level[parent + 5u] + m);
+    let mode = vec3<f32>(parent_modes[at], parent_modes[at + 1u], parent_modes[at + 2u]);
+    return level_float(level[BASES] + body.way + m) * mode;
+}
+
+// The rotation of the quaternion normalize(1, q) squared.
+fn squared(q: vec3<f32>) -> mat3x3<f32> {
+    let n2 = dot(q, q);
+    let scale = 1.0 / (1.0 + n2);
+    let w = (1.0 - n2) * scale;
+    let v = 2.0 * q * scale;
+    let x = v.x;
+    let y = v.y;
+    let z = v.z;
+    return mat3x3<f32>( // columns
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+        2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+        2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y),
+    );
+}
+
+fn unit(v: vec3<f32>) -> vec3<f32> {
+    let n2 = dot(v, v);
+    return select(v, v / sqrt(n2), n2 > 1e-30);
+}
+
+// The rotation by the least angle from u to v, which have length 1; beyond a right angle by less and less.
+fn between(u: vec3<f32>, v: vec3<f32>) -> mat3x3<f32> {
+    let axis = cross(u, v);
+    let w = 1.0 + max(dot(u, v), 0.0);
+    let sine2 = dot(axis, axis);
+    let h = 2.0 / (w * w + sine2);
+    let g = w * h * axis;
+    let c = 1.0 - h * sine2;
+    return mat3x3<f32>(
+        h * axis * axis.x + vec3<f32>(c, g.z, -g.y),
+        h * axis * axis.y + vec3<f32>(-g.z, c, g.x),
+        h * axis * axis.z + vec3<f32>(g.y, -g.x, c),
+    );
+}
+
+fn hung(body: Body) -> Frame {
+    if (body.parent < 0) {
+        return Frame(body.rest_point, IDENTITY);
+    }
+    let at = run.bodies + 12u * u32(body.parent);
+    var rotation = mat3x3<f32>(
+        frames[at], frames[at + 1u], frames[at + 2u],
+        frames[at + 3u], frames[at + 4u], frames[at + 5u],
+        frames[at + 6u], frames[at + 7u], frames[at + 8u],
+    );
+    if ((body.flags & FOLLOWS) != 0u) {
+        var way = vec3<f32>(0.0);
+        for (var m = 0u; m < 64u; m++) {
+            way += placed[m];
+        }
+        rotation = rotation * between(unit(body.tangent), unit(body.tangent + way));
+    }
+    return Frame(position_at(u32(body.attach)), rotation);
+}
+
+// Returns the rotation that a row stands for.
+fn turn_of(own: Move, row: u32) -> vec3<f32> {
+    let at = segment(TURNS) + own.turn;
+    let q = amplitude(row);
+    var omega = vec3<f32>(0.0);
+    for (var k = 0u; k < 3u; k++) {
+        let turn = vec3<f32>(segment_float(at + 3u * k), segment_float(at + 3u * k + 1u), segment_float(at + 3u * k + 2u));
+        omega[k] = dot(turn, q);
+    }
+    return omega;
+}
+
+// The rows of a shift and of a rotation, where there are any, are the first of a body.
+fn turned(b: u32, body: Body) -> Frame {
+    var frame = hung(body);
+    var omega = vec3<f32>(0.0);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        let own = move_at(b);
+        for (var r = own.row; r < own.row + min(own.rows, 2u); r++) {
+            let slot = row_at(r).slot;
+            if (slot == SHIFT) {
+                frame.point += amplitude(r);
+            } else if (slot == ROTATION) {
+                omega += turn_of(own, r);
+            }
+        }
+    }
+    frame.rotation = frame.rotation * squared(0.25 * omega);
+    return frame;
+}
+
+// Mode m of a body with shapes: what they add up to.
+fn unshaped(body: Body, own: Move, m: u32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var r = own.row; r < own.row + own.rows; r++) {
+        let slot = row_at(r).slot;
+        let tracks = amplitude(r);
+        for (var axis = 0u; axis < 3u; axis++) {
+            let shape = 3u * slot + axis;
+            if (slot < body.shape_modes && shape < own.shape_count) {
+                let at = segment(SHAPES) + own.shapes + 3u * (shape * body.shape_modes + m);
+                sum += tracks[axis] * vec3<f32>(segment_float(at), segment_float(at + 1u), segment_float(at + 2u));
+            }
+        }
+    }
+    return sum;
+}
+
+// How far modes move position i of a body, or column i of a node's map.
+fn moved_by_modes(body: Body, top: u32, i: u32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var m = 0u; m < top; m++) {
+        sum += level_float(level[BASES] + body.basis + m * body.count + i) * modes[m];
+    }
+    return sum;
+}
+
+// A step of Newton's method from R to the rotation nearest to H.
+fn turned_towards(H: mat3x3<f32>, R: mat3x3<f32>) -> mat3x3<f32> {
+    let C = H * transpose(R);
+    let axial = vec3<f32>(C[1].z - C[2].y, C[2].x - C[0].z, C[0].y - C[1].x);
+    let spare = max(1.0 - (C[0].x + C[1].y + C[2].z), 0.0) + 1e-6;
+    let a = C[1].y + C[2].z + spare; // Differences from the trace would lose precision.
+    let b = C[0].x + C[2].z + spare;
+    let c = C[0].x + C[1].y + spare;
+    let d = -0.5 * (C[1].x + C[0].y);
+    let e = -0.5 * (C[2].x + C[0].z);
+    let f = -0.5 * (C[2].y + C[1].z);
+    let x = vec3<f32>(b * c - f * f, e * f - d * c, d * f - e * b);
+    let y = vec3<f32>(e * f - d * c, a * c - e * e, d * e - a * f);
+    let z = vec3<f32>(d * f - e * b, d * e - a * f, a * b - d * d);
+    let determinant = a * x.x + d * x.y + e * x.z;
+    return squared(vec3<f32>(dot(x, axial), dot(y, axial), dot(z, axial)) * (0.25 / determinant)) * R;
+}
+
+// How a sheet has turned in its own frame: by the rotation nearest to what took its rest pose to \`placed\`.
+fn fitted(body: Body) -> mat3x3<f32> {
+    var H = mat3x3<f32>();
+    var size2 = 0.0;
+    for (var i = 0u; i < body.count; i++) {
+        let offset = rest_of(body.vertex + i) - body.rest_point;
+        size2 += dot(offset, offset);
+        H += mat3x3<f32>(placed[i] * offset.x, placed[i] * offset.y, placed[i] * offset.z);
+    }
+    H += 0.01 * size2 * IDENTITY;
+    let norm2 = dot(H[0], H[0]) + dot(H[1], H[1]) + dot(H[2], H[2]);
+    var R = IDENTITY;
+    if (norm2 > 1e-30) {
+        H = H * (1.0 / sqrt(norm2));
+        for (var step = 0; step < POLAR_ITERATIONS; step++) {
+            R = turned_towards(H, R);
+        }
+    }
+    return R;
+}
+
+fn write_column(node: u32, column: u32, v: vec3<f32>) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        matrices[run.matrices + 12u * node + 4u * axis + column] = v[axis];
+    }
+}
+
+fn write_frame(b: u32, frame: Frame) {
+    for (var axis = 0u; axis < 3u; axis++) {
+        for (var column = 0u; column < 3u; column++) {
+            frames[run.bodies + 12u * b + 3u * column + axis] = frame.rotation[column][axis];
+        }
+        frames[run.bodies + 12u * b + 9u + axis] = frame.point[axis];
+    }
+}
+
+// Adds the modes of a body in the source that is set, and returns the least that those above are nothing of.
+fn add_modes(b: u32, body: Body, i: u32) -> u32 {
+    let own = move_at(b);
+    let from_shapes = select(0u, body.shape_modes, own.shape_count > 0u);
+    for (var r = i; r < own.rows; r += 64u) {
+        let slot = row_at(own.row + r).slot;
+        if (slot >= from_shapes && slot < SHIFT) {
+            modes[slot] += amplitude(own.row + r);
+        }
+    }
+    if (i < from_shapes) {
+        modes[i] += unshaped(body, own, i);
+    }
+    if (own.rows == 0u) {
+        return from_shapes;
+    }
+    let last = row_at(own.row + own.rows - 1u).slot;
+    return max(from_shapes, select(0u, last + 1u, last < SHIFT));
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+        @builtin(local_invocation_index) i: u32) {
+    run = place_at(group.y);
+    let at = level[level[DEPTHS] + depth] + group.x + groups.x * group.z;
+    if (at >= level[level[DEPTHS] + depth + 1u]) {
+        return;
+    }
+    let b = level[level[ORDER] + at];
+    let body = body_at(b);
+    modes[i] = vec3<f32>(0.0);
+    placed[i] = way_by_mode(body, i);
+    workgroupBarrier();
+    var top = 0u;
+    for (var s = 0u; s < places[PLACE_WORDS * group.y + 1u]; s++) { // The count is uniform over the workgroup.
+        source = source_at(s);
+        top = max(top, add_modes(b, body, i));
+        workgroupBarrier();
+    }
+    var frame = turned(b, body);
+    workgroupBarrier();
+    let is_node = (body.flags & NODE) != 0u;
+    if (i < body.count) {
+        let by_modes = moved_by_modes(body, top, i);
+        if (is_node) {
+            write_column(body.first, i, frame.rotation * (IDENTITY[i] + by_modes));
+        } else {
+            placed[i] = rest_of(body.vertex + i) - body.rest_point + by_modes;
+            let x = frame.point + frame.rotation * placed[i];
+            for (var axis = 0u; axis < 3u; axis++) {
+                positions[run.positions + 3u * (body.first + i) + axis] = x[axis];
+                parent_modes[run.modes + 3u * (body.first + i) + axis] = modes[i][axis];
+            }
+        }
+    }
+    workgroupBarrier();
+    if (i == 0u && is_node) {
+        write_column(body.first, 3u, frame.point);
+    }
+    if (i == 0u && !is_node) {
+        if ((body.flags & FITTED) != 0u) {
+            frame.rotation = frame.rotation * fitted(body);
+        }
+        write_frame(b, frame);
+    }
+}
+`;var Ze=`// Pass 1: what each row is at the frame of each source. One invocation per row.
+
+@group(0) @binding(3) var<storage, read_write> amplitudes: array<f32>;
+
+const WIDE = 128u;
+
+fn value(row: Row, index: u32) -> f32 {
+    let at = segment(VALUES) + row.values;
+    if ((row.waves & WIDE) != 0u) {
+        return f32(bitcast<i32>(segment(at + index)));
+    }
+    return f32(half(segment(at + index / 2u), index % 2u));
+}
+
+fn evaluate(r: u32) {
+    let row = row_at(r);
+    let frames = segment(FRAMES);
+    let waves = segment(WAVE_SETS + (row.waves & 127u)) + source.frame;
+    var sum = vec3<f32>(0.0);
+    for (var k = 0u; k < row.count; k++) {
+        let integers = vec3<f32>(value(row, k), value(row, row.count + k), value(row, 2u * row.count + k));
+        sum += integers * segment_float(waves + k * frames);
+    }
+    for (var axis = 0u; axis < 3u; axis++) {
+        amplitudes[source.amplitudes + 3u * r + axis] = run.strength * source.weight * row.step * sum[axis];
+    }
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = place_at(id.y);
+    for (var s = 0u; s < run.source_count; s++) {
+        source = source_at(s);
+        if (i < segment(ROW_COUNT)) {
+            evaluate(i);
+        }
+    }
+}
+`;var Je=`// Pass 3: vertices at a time, between two frames that the passes before have placed. \`vertex_at\` is what a vertex stage calls;
+// here it writes all of them, for tests and for engines that compute once what several views draw. One invocation per vertex.
+
+struct Run {
+    positions: vec4<u32>, // numbers before those of the two frames now, and of the two that the time drawn before lies between
+    matrices: vec4<u32>,
+    weights: vec2<f32>, // Weights of the second of each pair.
+    with_normals: u32,
+    vertices: u32, // number before those that are written
+}
+
+struct Vertex {
+    position: vec3<f32>,
+    normal: vec3<f32>,
+    previous: vec3<f32>,
+}
+
+@group(0) @binding(1) var<storage, read> corners: array<u32>; // see \`normal_at\`
+@group(0) @binding(2) var<storage, read> shows: array<Run>; // one for each y of the workgroups
+var<private> run: Run;
+@group(0) @binding(3) var<storage, read> positions: array<f32>;
+@group(0) @binding(4) var<storage, read> matrices: array<f32>;
+@group(0) @binding(5) var<storage, read_write> vertices: array<f32>; // position, normal, previous position of each
+
+const MOVED = 0x80000000u;
+const VERTEX_COUNT = 2u;
+const VERTICES = 7u;
+
+@group(0) @binding(0) var<storage, read> level: array<u32>;
+
+fn mixed_position(index: u32, now: u32) -> vec3<f32> {
+    let a = run.positions[2u * now] + 3u * index;
+    let b = run.positions[2u * now + 1u] + 3u * index;
+    return mix(
+        vec3<f32>(positions[a], positions[a + 1u], positions[a + 2u]),
+        vec3<f32>(positions[b], positions[b + 1u], positions[b + 2u]),
+        run.weights[now],
+    );
+}
+
+// The row of a matrix at the time.
+fn mixed_row(index: u32, row: u32, now: u32) -> vec4<f32> {
+    let a = run.matrices[2u * now] + 12u * index + 4u * row;
+    let b = run.matrices[2u * now + 1u] + 12u * index + 4u * row;
+    return mix(
+        vec4<f32>(matrices[a], matrices[a + 1u], matrices[a + 2u], matrices[a + 3u]),
+        vec4<f32>(matrices[b], matrices[b + 1u], matrices[b + 2u], matrices[b + 3u]),
+        run.weights[now],
+    );
+}
+
+// now: 0; 1: at the time drawn before.
+fn position_at(v: u32, now: u32) -> vec3<f32> {
+    let at = level[VERTICES] + 4u * v;
+    let binding = level[at + 3u];
+    let index = binding & ~MOVED;
+    if ((binding & MOVED) == 0u) {
+        return mixed_position(index, now);
+    }
+    let rest = vec4<f32>(bitcast<f32>(level[at]), bitcast<f32>(level[at + 1u]), bitcast<f32>(level[at + 2u]), 1.0);
+    return vec3<f32>(
+        dot(mixed_row(index, 0u, now), rest), dot(mixed_row(index, 1u, now), rest), dot(mixed_row(index, 2u, now), rest),
+    );
+}
+
+// The mean normal of the triangles at a vertex, by their area. corners: where those of each vertex begin, and one behind the last;
+// then of each triangle at a vertex its two other corners.
+fn normal_at(v: u32, x: vec3<f32>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var c = corners[v]; c < corners[v + 1u]; c += 2u) {
+        sum += cross(position_at(corners[c], 0u) - x, position_at(corners[c + 1u], 0u) - x);
+    }
+    let n2 = dot(sum, sum);
+    return select(vec3<f32>(0.0), sum / sqrt(n2), n2 > 0.0);
+}
+
+fn vertex_at(v: u32) -> Vertex {
+    let x = position_at(v, 0u);
+    var normal = vec3<f32>(0.0);
+    if (run.with_normals != 0u) {
+        normal = normal_at(v, x);
+    }
+    return Vertex(x, normal, position_at(v, 1u));
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = id.x + 64u * groups.x * id.z;
+    run = shows[id.y];
+    if (i >= level[VERTEX_COUNT]) {
+        return;
+    }
+    let vertex = vertex_at(i);
+    for (var axis = 0u; axis < 3u; axis++) {
+        vertices[run.vertices + 9u * i + axis] = vertex.position[axis];
+        vertices[run.vertices + 9u * i + 3u + axis] = vertex.normal[axis];
+        vertices[run.vertices + 9u * i + 6u + axis] = vertex.previous[axis];
+    }
+}
+`;var[Qe,ts,To,Po,Do,Ro]=[2,3,4,5,6,10],[ko,Co,No]=[5,6,19],Io=64,ct=8,ae=4,he=12,Lo=9,Ct=r=>Math.ceil(r/Io),Nt=class{constructor(t,{blocks:e,time:s,hierarchy:i,finish:o,vertices:n}){let a=(...c)=>t.createShaderModule({code:c.join(`
+`)}),h=(c,u="main")=>t.createComputePipeline({layout:"auto",compute:{module:c,entryPoint:u}}),l=a(e,o);this.time=h(a(e,s)),this.hierarchy=h(a(e,i)),this.bodies=h(l,"bodies"),this.corrections=h(l,"corrections"),this.baked=h(l,"baked"),this.vertices=h(a(n))}},It=class{uploaded=0;#t=new Map;#e=0;#i=0;#r=0;constructor(t,e,s,{slots:i=2,shown:o=1,vertices:n=null,across:a=t.limits.maxComputeWorkgroupsPerDimension}={}){Object.assign(this,{device:t,kernels:e,words:s,slots:i,shown:o,across:a}),this.size={positions:3*s[To],matrices:12*s[Po],bodies:12*s[ts],vertices:Lo*s[Qe]},this.baked=!1;let{positions:h,matrices:l,bodies:c}=this.size;this.buffers={level:this.#s(s),segments:this.#o(1),places:this.#o((ct+ae)*i),shows:this.#o(he*o),amplitudes:this.#o(1),positions:this.#o(i*h),matrices:this.#o(i*l),modes:this.#o(i*h),bodies:this.#o(i*c),corners:this.#o(1),vertices:n??this.#o(o*this.size.vertices)},this.ownsVertices=!n,this.depths=Array.from({length:s[Do]},(u,f)=>{let[d,p]=s.subarray(s[Ro]+f);return{count:p-d,uniform:this.#a(f)}}),this.ordinals=[],this.hasCorners=!1}get bytes(){return Object.values(this.buffers).reduce((t,{size:e})=>t+e,0)}#o(t,e=140){return this.device.createBuffer({size:Math.max(16,4*t),usage:e})}#s(t,e=140){let s=this.#o(t.length,e);return this.#l(s,t),s}#a(t){return this.#s(new Uint32Array([t,0,0,0]),72)}#l(t,e,s=0,i=e.length){this.uploaded+=4*i,this.device.queue.writeBuffer(t,4*s,e.buffer,e.byteOffset,4*i)}#c(t,e,s=0){let i=this.buffers[t],{device:o}=this;if(4*e<=i.size)return;let n=this.#o(e);if(s>0){let a=o.createCommandEncoder();a.copyBufferToBuffer(i,0,n,0,4*s),o.queue.submit([a.finish()])}i.destroy(),this.buffers[t]=n,this.#t.clear()}segment(t){let e=this.#r;return e+t.length>this.buffers.segments.size/4&&this.#c("segments",2*(e+t.length),e),this.#l(this.buffers.segments,t,e),this.#r+=t.length,this.#e=Math.max(this.#e,t[ko]),this.#i=Math.max(this.#i,t[Co]),this.baked||=t[No]!==0,e}setCorners(t){this.buffers.corners.destroy(),this.buffers.corners=this.#s(t),this.hasCorners=!0,this.#t.clear()}#n(t,e,[s,i],o,n=null){if(s===0||i===0)return;let a=n??e;if(!this.#t.has(a)){let l=o.flatMap((u,f)=>u?[{binding:f,resource:{buffer:this.buffers[u]}}]:[]);n&&l.push({binding:o.length,resource:{buffer:n}});let c=this.kernels[e].getBindGroupLayout(0);this.#t.set(a,this.device.createBindGroup({layout:c,entries:l}))}t.setPipeline(this.kernels[e]),t.setBindGroup(0,this.#t.get(a));let h=Math.min(s,this.across);t.dispatchWorkgroups(h,i,Math.ceil(s/h))}run(t,e){let s=this.device.createCommandEncoder(),i=s.beginComputePass();t.length>0&&this.#d(i,t),e.length>0&&this.#m(i,e),i.end(),this.device.queue.submit([s.finish()])}#d(t,e){let{positions:s,bodies:i}=this.size,o=e.length;if(this.#u(e),this.baked){this.#n(t,"baked",[Ct(s),o],["level","segments","places","positions"]);return}this.#n(t,"time",[Ct(this.#e),o],[null,"segments","places","amplitudes"]);let n=["amplitudes","positions","matrices","modes","bodies"];for(let h of this.depths)this.#n(t,"hierarchy",[h.count,o],["level","segments","places",...n],h.uniform);this.#n(t,"bodies",[this.words[ts],o],["level","segments","places","positions","matrices"]);let a=Math.max(...e.map(({sources:h})=>h.length));for(;this.ordinals.length<a;)this.ordinals.push(this.#a(this.ordinals.length));for(let h of this.ordinals.slice(0,a))this.#n(t,"corrections",[Ct(this.#i),o],[null,"segments","places","positions",null],h)}#u(t){let{positions:e,matrices:s,bodies:i}=this.size,o=t.reduce((c,{sources:u})=>c+u.length,0),n=new Uint32Array(ct*t.length+ae*o),a=new Float32Array(n.buffer),h=ct*t.length,l=0;t.forEach(({sources:c,slot:u,strength:f=1},d)=>{n.set([h,c.length,u*e,u*s,d*e,d*i],ct*d),a[ct*d+6]=f;for(let{segment:p,frame:m,weight:b=1}of c)n.set([p,m,3*this.#e*l++],h),a[h+3]=b,h+=ae}),this.#c("places",n.length),this.#c("amplitudes",3*this.#e*o),this.#l(this.buffers.places,n)}#m(t,e){let{positions:s,matrices:i,vertices:o}=this.size,n=new Uint32Array(he*e.length),a=new Float32Array(n.buffer);e.forEach(({slots:h,weight:l,previous:c=h,previousWeight:u=l,at:f=null},d)=>{let p=he*d;[...h,...c].forEach((m,b)=>{n[p+b]=m*s,n[p+4+b]=m*i}),a[p+8]=l,a[p+9]=u,n[p+10]=this.hasCorners?1:0,n[p+11]=(f??d)*o}),this.#l(this.buffers.shows,n),this.#n(t,"vertices",[Ct(this.words[Qe]),e.length],["level","corners","shows","positions","matrices","vertices"])}async read(t){this.run([],t);let e=this.device.createCommandEncoder(),s=4*this.size.vertices*t.length,i=this.device.createBuffer({size:s,usage:9});e.copyBufferToBuffer(this.buffers.vertices,0,i,0,s),this.device.queue.submit([e.finish()]),await i.mapAsync(1);let o=new Float32Array(i.getMappedRange().slice(0));return i.destroy(),o}dispose(){for(let t of[...this.depths.map(e=>e.uniform),...this.ordinals])t.destroy();for(let[t,e]of Object.entries(this.buffers))(t!=="vertices"||this.ownsVertices)&&e.destroy()}};var ut=null,Uo=.001,Lt=class{#t=new Map([[ut,1]]);#e=new Map([[ut,1]]);set(t){let e=t?[...t.values()].reduce((s,i)=>s+i,0):0;this.#t=e>0?new Map([...t].map(([s,i])=>[s,i/e])):new Map([[ut,1]])}get clips(){return[...this.#t.keys()].filter(t=>t!==ut)}advance(t,e){let s=[...this.#t].filter(([l,c])=>c>0&&(l===ut||e(l))),i=s.reduce((l,[,c])=>l+c,0),o=new Map(s.map(([l,c])=>[l,c/i]));if(o.size===0)return;let a=[...new Set([...this.#e.keys(),...o.keys()])].map(l=>[l,(this.#e.get(l)??0)*(1-t)+(o.get(l)??0)*t]).filter(([l,c])=>c>Uo||o.has(l)),h=a.reduce((l,[,c])=>l+c,0);this.#e=new Map(a.map(([l,c])=>[l,c/h]))}of(t){let e=new Map;for(let[s,i]of this.#e)e.set(s??t,(e.get(s??t)??0)+i);return e}};function es(r,t,e){let{firstFrame:s,frameCount:i,lastTime:o}=t,n=G(t);if(i===1||!(n>0))return[{frame:s,weight:1}];let a=(e%n+n)%n;return a<o?zo(r,t,a):ss(s+i-1,s,Math.min((a-o)/(n-o),1))}function zo(r,{firstFrame:t,frameCount:e},s){let i=r[t]+s,o=t,n=t+e-1;for(;n-o>1;){let a=o+n>>1;r[a]<=i?o=a:n=a}return n===o?[{frame:o,weight:1}]:ss(o,n,Math.min(Math.max((i-r[o])/(r[n]-r[o]),0),1))}var ss=(r,t,e)=>[{frame:r,weight:1-e},{frame:t,weight:e}];var ft=32,dt=12,pt=4,rs=1.5,ns=2,Xo=.85,as=32,hs=9,Zo=16777215,Jo=r=>r?new Wo({color:7035717}):new $o({color:9083499,roughness:.8,side:Bo}),st=class extends jo{pixels=1;measure="p99";phases=8;ease=.2;bytesOfMotion=0;bytesOfParameters=0;levels=[];#t;#e;#i;#r;#o;#s;#a;#l;#c=new Map;#n=[];#d=[];#u=new Lt;#m=0;#h=null;#p=null;#f=null;#y=null;#b=[];#S=new Fo;#x=1;#w=0;#v=!1;#g=0;#P=new Float32Array(as);#_=null;#D=null;#E=1;#A=Ut.uniform(new le(1,0,0));constructor(t,e,{geometry:s=e.geometry??e.lines,material:i=Jo,shape:o=n=>n}={}){if(super(),this.name="ath forest",this.#s=t.backend.device,!this.#s)throw new Error("ATHForest: got a renderer without WebGPU, expected one after init(); ATHForest of athcodec-three is for WebGL");this.#t=t,this.#e=e,$(this,e.metadata),this.#i=s,this.#r=i,this.#o=o,this.#a=new Nt(this.#s,{blocks:qe,time:Ze,hierarchy:Xe,finish:Ke,vertices:Je}),this.#l=this.#s.createComputePipeline({layout:"auto",compute:{module:this.#s.createShaderModule({code:Ye}),entryPoint:"main"}}),this.view=this.#s.createBuffer({size:4*as,usage:GPUBufferUsage.UNIFORM|GPUBufferUsage.COPY_DST}),this.tolerances=this.#s.createBuffer({size:8*ft,usage:GPUBufferUsage.STORAGE|GPUBufferUsage.COPY_DST})}get count(){return this.#w}get plantCount(){return this.#n.length}get plants(){return this.#n.map(({clip:t,phase:e})=>[t.name,e])}get clips(){return Array.from(this.#c.keys(),({name:t})=>t)}get bytes(){return this.levels.reduce((t,{passes:e})=>t+e.bytes,0)}setInstances(t){let{motion:e,channel:s}=this.#e,{limits:i}=this.#s,o=new Float32Array(dt*Math.max(1,t.length));this.#U();let n=f=>this.#O(f)??e.clip,a=new Set(t.map(({clip:f})=>n(f))),h=Math.floor(i.maxStorageBufferBindingSize/(12*pt*s.info.placeCount)/Math.max(1,a.size)),l=Math.max(1,Math.min(this.phases,h)),c=new Map,u=(f,d=0)=>{let p=G(f)||1,m=Math.floor((d/p%1+1)%1*l),b=f.index*l+m;return c.has(b)||c.set(b,{index:c.size,clip:f,phase:m/l}),c.get(b).index};t.forEach(({x:f,y:d,z:p,size:m=1,angle:b=0,seconds:x,clip:y,tint:g=Zo,amplitude:v=1},M)=>{o.set([f,d,p,m,Math.cos(b),Math.sin(b),u(n(y),x),g,v],dt*M),this.#S.expandByPoint(new le(f,d,p)),this.#x=Math.max(this.#x,m)}),this.#n=[...c.values()],this.#w=t.length;for(let f of[...a,...this.#u.clips])this.#R(f);return this.#h=this.#T(o,4),this.#p=new Ho(new Uint32Array(5*ft),5),this.#t.backend.createIndirectStorageAttribute(this.#p),this.#f=this.#T(new Uint32Array(ft*Math.max(1,this.#w)),1),this.#_=new Uint32Array(5*ft),this.#y=this.#s.createBindGroup({layout:this.#l.getBindGroupLayout(0),entries:[this.#M(this.#h),this.view,this.tolerances,this.#M(this.#p),this.#M(this.#f)].map((f,d)=>({binding:d,resource:{buffer:f}}))}),this}#O(t){return this.#e.motion.clips.find(({index:e,name:s})=>t===e||t===s)}#R(t){this.#c.has(t)||this.#c.set(t,this.#e.motion.clone().play(t.index).setLevel(Math.max(0,this.levels.length-1)).setTime(0))}#T(t,e){let s=new Yo(t,e);return this.#t.backend.createStorageAttribute(s),s}#M(t){return this.#t.backend.get(t).buffer}blend(t){let e=Object.entries(t??{}).map(([i,o])=>[this.#O(i),o]);if(e.findIndex(([i,o])=>!i||!(o>=0&&o<1/0))>=0||t&&!e.some(([,i])=>i>0))throw new RangeError(`blend: got ${JSON.stringify(t)}, expected weights of clips, ${this.#e.motion.clips.map(({name:i})=>i).join(", ")}`);for(let[i,o]of e)o>0&&this.#R(i);return this.#u.set(t&&new Map(e)),this}async wind(t,e=0){if(![t,e].every(Number.isFinite))throw new RangeError(`wind: got ${t} and ${e}, expected two finite numbers`);let s=this.#D={},{weights:i}=await this.#e.channel.windWeights(t,e),{clips:o}=this.#e.motion;return s===this.#D&&this.blend(Object.fromEntries(o.map(({name:n},a)=>[n,i[a]]))),this}sway(t,e=null){return this.#E=t,this.#A.value.set(Math.cos(e??0),Math.sin(e??0),e===null?0:1),this}#z(t){let e=this.levels.length,{motion:s}=this.#e;if(!this.#v){for(let i of this.levels)for(let[o,{readyLevel:n}]of this.#c)if(!i.clips.has(o)&&n>=i.level)return this.#C(()=>this.#B(i,o));if(!(e>=s.levelCount||e>0&&this.#k(e-1)<=t)){for(let i of this.#c.values())i.target<e&&i.setLevel(e);[...this.#c.values()].every(({readyLevel:i})=>i>=e)&&this.#C(()=>this.#F(e))}}}#C(t){this.#v=!0,t().catch(({message:e,codeName:s})=>this.#e.motion.dispatchEvent({type:"error",message:e,codeName:s}))}#k(t){return Math.max(...Array.from(this.#c.keys(),({errors:e})=>e[t][this.measure]))}async#F(t){let{channel:e}=this.#e,s=this.#g,i=()=>s===this.#g,[o,{words:n}]=[await e.parts(t),await e.gpu(t)];if(!i())return;let a=this.#n.length,h=this.#T(new Float32Array(hs*n[2]*a),1),l=new It(this.#s,this.#a,n,{slots:pt*a,shown:a,vertices:this.#M(h)}),c={level:t,passes:l,shared:h,clips:new Set,places:new Map,uploaded:0,bytesOfMotion:0,bytesOfParameters:0,strength:NaN,slots:this.#n.map(()=>new Array(pt).fill(-1)),before:this.#n.map(()=>null)};this.#e.hasFaces&&l.setCorners(Qo(this.#e.geometry,e));for(let u of this.#c.keys())if(!await this.#N(c,u,i)){l.dispose();return}this.levels.push(c),this.#j(c,o),this.#v=!1,this.dispatchEvent({type:"level",level:t})}async#B(t,e){let s=this.#g;await this.#N(t,e,()=>s===this.#g)&&(this.#v=!1)}async#N(t,e,s){let{channel:i}=this.#e,{passes:o,level:n,places:a}=t;for(let h=e.firstSegment;h<e.firstSegment+e.segmentCount;h++){let{words:l,coded:c}=await i.gpu(n,h);if(!s())return!1;let u=o.segment(l);this.#I(t,"bytesOfMotion"),c.forEach((f,d)=>a.set(i.segments[h]+d,{segment:u,frame:f}))}return t.clips.add(e),!0}#I(t,e){this[e]+=t.passes.uploaded-t.uploaded,t[e]+=t.passes.uploaded-t.uploaded,t.uploaded=t.passes.uploaded}#j(t,e){let{channel:s,motion:i,rest:o,sphere:n}=this.#e,{level:a}=t,h=this.#k(a),l=a>0?this.#k(a-1):n.radius/4,c=s.nodeNumbers(e);e.vertices.forEach((p,m)=>{p<0&&(c[m]=-1)});let u=a===i.levelCount-1?this.#i:Q(this.#i,o,rs*h,c);this.#L(t,u,h);for(let p=Math.max(ns*h,n.radius/2e3);p<l;p*=ns){let m=Q(this.#i,o,rs*p,c);m.userData.source.length>Xo*u.userData.source.length||(this.#L(t,m,p),u=m)}let f=Float32Array.from({length:2*this.#b.length}),d=new Uint32Array(f.buffer);this.#b.sort((p,m)=>p.tolerance-m.tolerance).forEach((p,m)=>{f[2*m]=p.tolerance,d[2*m+1]=p.list}),this.#s.queue.writeBuffer(this.tolerances,0,f)}#L(t,e,s){let i=this.#b.length;if(i===ft)return;let o=this.#o(e,s).clone(),{source:n}=e.userData,a=!o.hasAttribute("normal"),h=this.#e.channel.vertexPlaces,l=o.userData.vertices??n;o.setAttribute("athVertex",new is(Uint32Array.from(l,f=>h[f]),1)),o.setAttribute("position",new is(Float32Array.from({length:3*l.length},(f,d)=>this.#e.rest[3*l[Math.floor(d/3)]+d%3]),3)),o.setIndirect(this.#p,20*i),this.#_[5*i]=o.index.count;let c=this.#r(a,t.level),u=a?new Vo(o,c):new Go(o,c);this.#H(c,o,t,i),u.frustumCulled=!1,u.castShadow=u.receiveShadow=!a,this.#b.push({level:t.level,tolerance:s,list:i,drawn:u,size:o.index.count}),this.add(u)}#H(t,e,{passes:s,shared:i},o){let{Fn:n,storage:a,uint:h,float:l,vec3:c,attribute:u,instanceIndex:f,positionGeometry:d,positionPrevious:p,normalLocal:m,normalGeometry:b,select:x}=Ut,{metadata:y,channel:{info:g},origin:v}=this.#e,M=y.up_axis==="z",S=this.#A,D=c(...g.origin.map((C,L)=>C-v[L])),w=h(s.words[2]),E=a(i,"float",i.count).toReadOnly(),A=a(this.#h,"vec4",dt/4*Math.max(1,this.#w)).toReadOnly(),R=a(this.#f,"uint",this.#f.count).toReadOnly(),I=(C,L,W)=>M?c(L.mul(C.x).sub(W.mul(C.y)),W.mul(C.x).add(L.mul(C.y)),C.z):c(L.mul(C.x).add(W.mul(C.z)),C.y,L.mul(C.z).sub(W.mul(C.x))),yt=()=>R.element(h(o*Math.max(1,this.#w)).add(f)),Bs=e.hasAttribute("athOffset"),js=s.hasCorners&&!e.userData.vertices;t.positionNode=n((C,L)=>{let W=yt().toVar(),qt=rt=>A.element(W.mul(dt/4).add(rt)).toVar(),xe=qt(0),H=qt(1),_e=qt(2).x,Ws=h(H.z).mul(w).add(u("athVertex","uint")).mul(hs).toVar(),Yt=rt=>c(...[0,1,2].map(bt=>E.element(Ws.add(rt+bt)))),Me=rt=>{let bt=rt.add(D).sub(d).mul(_e).toVar(),Gs=S.x.mul(H.x).add(S.y.mul(H.y)),$s=S.y.mul(H.x).sub(S.x.mul(H.y)),qs=d.add(I(bt,Gs,$s)),Se=x(S.z.greaterThan(.5),qs,d.add(bt)).toVar(),Ys=Bs?Se.add(u("athOffset","vec3")):Se;return I(Ys,H.x,H.y).mul(xe.w).add(xe.xyz)},Vs=()=>js?b.add(Yt(3).sub(b).mul(_e)):b;return e.hasAttribute("normal")&&m.assign(I(Vs(),H.x,H.y)),L.needsPreviousData?.()&&p.assign(Me(Yt(6))),Me(Yt(0))})();let Hs=n(()=>{let C=h(A.element(yt().mul(dt/4).add(1)).w),L=W=>l(C.shiftRight(h(W)).bitAnd(h(255))).div(255);return c(L(16),L(8),L(0))})();t.colorNode=Ut.varying(Hs).mul(t.colorNode??(e.hasAttribute("color")?u("color","vec3"):Ut.materialColor))}update(t,e,s){if(!this.#y)return;let i=this.#W(t,e);this.#z(i),this.#V(s);for(let o of this.levels)o.level===0||this.#k(o.level-1)>i?this.#G(o):o.before.fill(null);this.#Y()}#W(t,e){this.updateWorldMatrix(!0,!1),t.updateMatrixWorld();let{sphere:s}=this.#e,i=s.center.length()+1.2*s.radius,o=this.#P,n=new le().setFromMatrixPosition(t.matrixWorld).applyMatrix4(new os().copy(this.matrixWorld).invert());new qo().setFromProjectionMatrix(new os().multiplyMatrices(t.projectionMatrix,t.matrixWorldInverse).multiply(this.matrixWorld),t.coordinateSystem??Ko).planes.forEach(({normal:c,constant:u},f)=>o.set([c.x,c.y,c.z,u],4*f));let h=this.pixels*2*Math.tan(t.fov*Math.PI/360)/e,l=this.#S.distanceToPoint(n);return o.set([n.x,n.y,n.z,h],24),new Uint32Array(o.buffer).set([this.#w,this.#b.length],28),o[30]=i,new Uint32Array(o.buffer)[31]=Math.max(1,this.#w),h*Math.max(l-.5*i*this.#x,1e-6)/this.#x}#V(t){let e=performance.now(),s=this.ease>0?1-Math.exp((this.#m-e)/(1e3*this.ease)):1;this.#m=e,this.#u.advance(s,o=>this.levels.every(n=>n.clips.has(o)));let{times:i}=this.#e.channel;this.#d=this.#n.map(({clip:o,phase:n})=>[...this.#u.of(o)].flatMap(([a,h])=>es(i,a,t+n*G(a)).map(({frame:l,weight:c})=>({frame:l,weight:h*c}))))}#G(t){let e=[],s=[],i=this.#E,o=t.strength!==i;t.strength=i,this.#d.forEach((n,a)=>{let h=t.before[a];o&&t.slots[a].fill(-1);let l=n.length>2?this.#q(t,a,n,e):this.#$(t,a,n,e);s.push({...l,previous:h?.slots??l.slots,previousWeight:h?.weight??l.weight}),t.before[a]=l}),t.passes.run(e,s),this.#I(t,"bytesOfParameters")}#$(t,e,s,i){let o=t.slots[e],n=pt*e,a=s.map(({frame:l})=>l),h=a.map(l=>{let c=o.indexOf(l);return c<0&&(c=o.findIndex((u,f)=>!a.includes(u)&&!t.before[e]?.slots.includes(n+f)),o[c]=l,i.push({sources:[t.places.get(l)],slot:n+c,strength:t.strength})),n+c});return{slots:[h[0],h.at(-1)],weight:s.length>1?s[1].weight:0}}#q(t,e,s,i){let o=t.slots[e],n=pt*e,a=o.findIndex((l,c)=>!t.before[e]?.slots.includes(n+c));o[a]=-1;let h=s.filter(({weight:l})=>l>0).map(({frame:l,weight:c})=>({...t.places.get(l),weight:c}));return i.push({sources:h,slot:n+a,strength:t.strength}),{slots:[n+a,n+a],weight:0}}#Y(){let{queue:t}=this.#s,e=this.#s.createCommandEncoder();t.writeBuffer(this.view,0,this.#P),t.writeBuffer(this.#M(this.#p),0,this.#_),this.bytesOfParameters+=this.#P.byteLength+this.#_.byteLength;let s=e.beginComputePass();s.setPipeline(this.#l),s.setBindGroup(0,this.#y),s.dispatchWorkgroups(Math.ceil(Math.max(1,this.#w)/64)),s.end(),t.submit([e.finish()])}async drawn(){let t=this.#_.byteLength,e=this.#s.createBuffer({size:t,usage:GPUBufferUsage.COPY_DST|GPUBufferUsage.MAP_READ}),s=this.#s.createCommandEncoder(),i=new Array(this.#e.motion.levelCount).fill(0);s.copyBufferToBuffer(this.#M(this.#p),0,e,0,t),this.#s.queue.submit([s.finish()]),await e.mapAsync(GPUMapMode.READ);let o=new Uint32Array(e.getMappedRange().slice(0));e.destroy();for(let{level:n,list:a}of this.#b)i[n]+=o[5*a+1];return i}async vertices(t){let{shared:e}=this.levels[t];return new Float32Array(await this.#t.getArrayBufferAsync(e))}#U(){this.#g++,this.#v=!1;for(let{drawn:t}of this.#b)t.removeFromParent(),t.geometry.dispose(),t.material.dispose();for(let{passes:t,shared:e}of this.levels)t.dispose(),this.#t.backend.destroyAttribute(e);for(let t of[this.#h,this.#p,this.#f].filter(Boolean))this.#t.backend.destroyAttribute(t);for(let t of this.#c.values())t.dispose();this.#c.clear(),this.levels=[],this.#b=[],this.#y=null,this.#S.makeEmpty(),this.#x=1e-9}dispose(){this.#U(),this.view.destroy(),this.tolerances.destroy()}};function Qo(r,{vertexPlaces:t,info:{placeCount:e}}){let s=Uint32Array.from(r.index.array,n=>t[r.userData.source[n]]),i=new Uint32Array(e+1),o=new Uint32Array(e+1+2*s.length);for(let n of s)i[n+1]++;for(let n=0;n<e;n++)i[n+1]+=i[n];for(let n=0;n<=e;n++)o[n]=e+1+2*i[n];for(let n=0;n<s.length;n++){let a=n-n%3,h=e+1+2*i[s[n]]++;o[h]=s[a+(n+1)%3],o[h+1]=s[a+(n+2)%3]}return o}import{ACESFilmicToneMapping as on,DoubleSide as rn,MeshStandardNodeMaterial as nn,PerspectiveCamera as an,Scene as hn,Vector3 as ln,WebGPURenderer as cn}from"./three.webgpu.js";import{Controls as tr,MOUSE as ot,Quaternion as ls,Spherical as cs,TOUCH as it,Vector2 as z,Vector3 as j,Plane as er,Ray as sr,MathUtils as ir}from"./three.webgpu.js";var us={type:"change"},ue={type:"start"},ds={type:"end"},zt=new sr,fs=new er,or=Math.cos(70*ir.DEG2RAD),O=new j,N=2*Math.PI,_={NONE:-1,ROTATE:0,DOLLY:1,PAN:2,TOUCH_ROTATE:3,TOUCH_PAN:4,TOUCH_DOLLY_PAN:5,TOUCH_DOLLY_ROTATE:6},ce=1e-6,Ft=class extends tr{constructor(t,e=null){super(t,e),this.state=_.NONE,this.target=new j,this.cursor=new j,this.minDistance=0,this.maxDistance=1/0,this.minZoom=0,this.maxZoom=1/0,this.minTargetRadius=0,this.maxTargetRadius=1/0,this.minPolarAngle=0,this.maxPolarAngle=Math.PI,this.minAzimuthAngle=-1/0,this.maxAzimuthAngle=1/0,this.enableDamping=!1,this.dampingFactor=.05,this.enableZoom=!0,this.zoomSpeed=1,this.enableRotate=!0,this.rotateSpeed=1,this.keyRotateSpeed=1,this.enablePan=!0,this.panSpeed=1,this.screenSpacePanning=!0,this.keyPanSpeed=7,this.zoomToCursor=!1,this.autoRotate=!1,this.autoRotateSpeed=2,this.keys={LEFT:"ArrowLeft",UP:"ArrowUp",RIGHT:"ArrowRight",BOTTOM:"ArrowDown"},this.mouseButtons={LEFT:ot.ROTATE,MIDDLE:ot.DOLLY,RIGHT:ot.PAN},this.touches={ONE:it.ROTATE,TWO:it.DOLLY_PAN},this.target0=this.target.clone(),this.position0=this.object.position.clone(),this.zoom0=this.object.zoom,this._cursorStyle="auto",this._domElementKeyEvents=null,this._lastPosition=new j,this._lastQuaternion=new ls,this._lastTargetPosition=new j,this._quat=new ls().setFromUnitVectors(t.up,new j(0,1,0)),this._quatInverse=this._quat.clone().invert(),this._spherical=new cs,this._sphericalDelta=new cs,this._scale=1,this._panOffset=new j,this._rotateStart=new z,this._rotateEnd=new z,this._rotateDelta=new z,this._panStart=new z,this._panEnd=new z,this._panDelta=new z,this._dollyStart=new z,this._dollyEnd=new z,this._dollyDelta=new z,this._dollyDirection=new j,this._mouse=new z,this._performCursorZoom=!1,this._pointers=[],this._pointerPositions={},this._controlActive=!1,this._onPointerMove=nr.bind(this),this._onPointerDown=rr.bind(this),this._onPointerUp=ar.bind(this),this._onContextMenu=pr.bind(this),this._onMouseWheel=cr.bind(this),this._onKeyDown=ur.bind(this),this._onTouchStart=fr.bind(this),this._onTouchMove=dr.bind(this),this._onMouseDown=hr.bind(this),this._onMouseMove=lr.bind(this),this._interceptControlDown=mr.bind(this),this._interceptControlUp=gr.bind(this),this.domElement!==null&&this.connect(this.domElement),this.update()}set cursorStyle(t){this._cursorStyle=t,t==="grab"?this.domElement.style.cursor="grab":this.domElement.style.cursor="auto"}get cursorStyle(){return this._cursorStyle}connect(t){super.connect(t),this.domElement.addEventListener("pointerdown",this._onPointerDown),this.domElement.addEventListener("pointercancel",this._onPointerUp),this.domElement.addEventListener("contextmenu",this._onContextMenu),this.domElement.addEventListener("wheel",this._onMouseWheel,{passive:!1}),this.domElement.ownerDocument.addEventListener("keydown",this._interceptControlDown,{passive:!0,capture:!0}),this.domElement.style.touchAction="none"}disconnect(){this.state=_.NONE,this.domElement.removeEventListener("pointerdown",this._onPointerDown),this.domElement.ownerDocument.removeEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.removeEventListener("pointerup",this._onPointerUp),this.domElement.removeEventListener("pointercancel",this._onPointerUp),this.domElement.removeEventListener("wheel",this._onMouseWheel),this.domElement.removeEventListener("contextmenu",this._onContextMenu),this.stopListenToKeyEvents(),this.domElement.ownerDocument.removeEventListener("keydown",this._interceptControlDown,{capture:!0}),this.domElement.ownerDocument.removeEventListener("keyup",this._interceptControlUp,{capture:!0}),this._controlActive=!1,this._pointers.length=0,this._pointerPositions={},this.domElement.style.touchAction="",this.domElement.style.cursor="auto"}dispose(){this.disconnect()}getPolarAngle(){return this._spherical.phi}getAzimuthalAngle(){return this._spherical.theta}getDistance(){return this.object.position.distanceTo(this.target)}listenToKeyEvents(t){t.addEventListener("keydown",this._onKeyDown),this._domElementKeyEvents=t}stopListenToKeyEvents(){this._domElementKeyEvents!==null&&(this._domElementKeyEvents.removeEventListener("keydown",this._onKeyDown),this._domElementKeyEvents=null)}saveState(){this.target0.copy(this.target),this.position0.copy(this.object.position),this.zoom0=this.object.zoom}reset(){this.target.copy(this.target0),this.object.position.copy(this.position0),this.object.zoom=this.zoom0,this.object.updateProjectionMatrix(),this.dispatchEvent(us),this.update(),this.state=_.NONE}pan(t,e){this._pan(t,e),this.update()}dollyIn(t){this._dollyIn(t),this.update()}dollyOut(t){this._dollyOut(t),this.update()}rotateLeft(t){this._rotateLeft(t),this.update()}rotateUp(t){this._rotateUp(t),this.update()}update(t=null){let e=this.object.position;O.copy(e).sub(this.target),O.applyQuaternion(this._quat),this._spherical.setFromVector3(O),this.autoRotate&&this.state===_.NONE&&this._rotateLeft(this._getAutoRotationAngle(t)),this.enableDamping?(this._spherical.theta+=this._sphericalDelta.theta*this.dampingFactor,this._spherical.phi+=this._sphericalDelta.phi*this.dampingFactor):(this._spherical.theta+=this._sphericalDelta.theta,this._spherical.phi+=this._sphericalDelta.phi);let s=this.minAzimuthAngle,i=this.maxAzimuthAngle;isFinite(s)&&isFinite(i)&&(s<-Math.PI?s+=N:s>Math.PI&&(s-=N),i<-Math.PI?i+=N:i>Math.PI&&(i-=N),s<=i?this._spherical.theta=Math.max(s,Math.min(i,this._spherical.theta)):this._spherical.theta=this._spherical.theta>(s+i)/2?Math.max(s,this._spherical.theta):Math.min(i,this._spherical.theta)),this._spherical.phi=Math.max(this.minPolarAngle,Math.min(this.maxPolarAngle,this._spherical.phi)),this._spherical.makeSafe(),this.enableDamping===!0?this.target.addScaledVector(this._panOffset,this.dampingFactor):this.target.add(this._panOffset),this.target.sub(this.cursor),this.target.clampLength(this.minTargetRadius,this.maxTargetRadius),this.target.add(this.cursor);let o=!1;if(this.zoomToCursor&&this._performCursorZoom||this.object.isOrthographicCamera)this._spherical.radius=this._clampDistance(this._spherical.radius);else{let n=this._spherical.radius;this._spherical.radius=this._clampDistance(this._spherical.radius*this._scale),o=n!=this._spherical.radius}if(O.setFromSpherical(this._spherical),O.applyQuaternion(this._quatInverse),e.copy(this.target).add(O),this.object.lookAt(this.target),this.enableDamping===!0?(this._sphericalDelta.theta*=1-this.dampingFactor,this._sphericalDelta.phi*=1-this.dampingFactor,this._panOffset.multiplyScalar(1-this.dampingFactor)):(this._sphericalDelta.set(0,0,0),this._panOffset.set(0,0,0)),this.zoomToCursor&&this._performCursorZoom){let n=null;if(this.object.isPerspectiveCamera){let a=O.length();n=this._clampDistance(a*this._scale);let h=a-n;this.object.position.addScaledVector(this._dollyDirection,h),this.object.updateMatrixWorld(),o=!!h}else if(this.object.isOrthographicCamera){let a=new j(this._mouse.x,this._mouse.y,0);a.unproject(this.object);let h=this.object.zoom;this.object.zoom=Math.max(this.minZoom,Math.min(this.maxZoom,this.object.zoom/this._scale)),this.object.updateProjectionMatrix(),o=h!==this.object.zoom;let l=new j(this._mouse.x,this._mouse.y,0);l.unproject(this.object),this.object.position.sub(l).add(a),this.object.updateMatrixWorld(),n=O.length()}else console.warn("WARNING: OrbitControls.js encountered an unknown camera type - zoom to cursor disabled."),this.zoomToCursor=!1;n!==null&&(this.screenSpacePanning?this.target.set(0,0,-1).transformDirection(this.object.matrix).multiplyScalar(n).add(this.object.position):(zt.origin.copy(this.object.position),zt.direction.set(0,0,-1).transformDirection(this.object.matrix),Math.abs(this.object.up.dot(zt.direction))<or?this.object.lookAt(this.target):(fs.setFromNormalAndCoplanarPoint(this.object.up,this.target),zt.intersectPlane(fs,this.target))))}else if(this.object.isOrthographicCamera){let n=this.object.zoom;this.object.zoom=Math.max(this.minZoom,Math.min(this.maxZoom,this.object.zoom/this._scale)),n!==this.object.zoom&&(this.object.updateProjectionMatrix(),o=!0)}return this._scale=1,this._performCursorZoom=!1,o||this._lastPosition.distanceToSquared(this.object.position)>ce||8*(1-this._lastQuaternion.dot(this.object.quaternion))>ce||this._lastTargetPosition.distanceToSquared(this.target)>ce?(this.dispatchEvent(us),this._lastPosition.copy(this.object.position),this._lastQuaternion.copy(this.object.quaternion),this._lastTargetPosition.copy(this.target),!0):!1}_getAutoRotationAngle(t){return t!==null?N/60*this.autoRotateSpeed*t:N/60/60*this.autoRotateSpeed}_getZoomScale(t){let e=Math.abs(t*.01);return Math.pow(.95,this.zoomSpeed*e)}_rotateLeft(t){this._sphericalDelta.theta-=t}_rotateUp(t){this._sphericalDelta.phi-=t}_panLeft(t,e){O.setFromMatrixColumn(e,0),O.multiplyScalar(-t),this._panOffset.add(O)}_panUp(t,e){this.screenSpacePanning===!0?O.setFromMatrixColumn(e,1):(O.setFromMatrixColumn(e,0),O.crossVectors(this.object.up,O)),O.multiplyScalar(t),this._panOffset.add(O)}_pan(t,e){let s=this.domElement;if(this.object.isPerspectiveCamera){let i=this.object.position;O.copy(i).sub(this.target);let o=O.length();o*=Math.tan(this.object.fov/2*Math.PI/180),this._panLeft(2*t*o/s.clientHeight,this.object.matrix),this._panUp(2*e*o/s.clientHeight,this.object.matrix)}else this.object.isOrthographicCamera?(this._panLeft(t*(this.object.right-this.object.left)/this.object.zoom/s.clientWidth,this.object.matrix),this._panUp(e*(this.object.top-this.object.bottom)/this.object.zoom/s.clientHeight,this.object.matrix)):(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - pan disabled."),this.enablePan=!1)}_dollyOut(t){this.object.isPerspectiveCamera||this.object.isOrthographicCamera?this._scale/=t:(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - dolly/zoom disabled."),this.enableZoom=!1)}_dollyIn(t){this.object.isPerspectiveCamera||this.object.isOrthographicCamera?this._scale*=t:(console.warn("WARNING: OrbitControls.js encountered an unknown camera type - dolly/zoom disabled."),this.enableZoom=!1)}_updateZoomParameters(t,e){if(!this.zoomToCursor)return;this._performCursorZoom=!0;let s=this.domElement.getBoundingClientRect(),i=t-s.left,o=e-s.top,n=s.width,a=s.height;this._mouse.x=i/n*2-1,this._mouse.y=-(o/a)*2+1,this._dollyDirection.set(this._mouse.x,this._mouse.y,1).unproject(this.object).sub(this.object.position).normalize()}_clampDistance(t){return Math.max(this.minDistance,Math.min(this.maxDistance,t))}_handleMouseDownRotate(t){this._rotateStart.set(t.clientX,t.clientY)}_handleMouseDownDolly(t){this._updateZoomParameters(t.clientX,t.clientY),this._dollyStart.set(t.clientX,t.clientY)}_handleMouseDownPan(t){this._panStart.set(t.clientX,t.clientY)}_handleMouseMoveRotate(t){this._rotateEnd.set(t.clientX,t.clientY),this._rotateDelta.subVectors(this._rotateEnd,this._rotateStart).multiplyScalar(this.rotateSpeed);let e=this.domElement;this._rotateLeft(N*this._rotateDelta.x/e.clientHeight),this._rotateUp(N*this._rotateDelta.y/e.clientHeight),this._rotateStart.copy(this._rotateEnd),this.update()}_handleMouseMoveDolly(t){this._dollyEnd.set(t.clientX,t.clientY),this._dollyDelta.subVectors(this._dollyEnd,this._dollyStart),this._dollyDelta.y>0?this._dollyOut(this._getZoomScale(this._dollyDelta.y)):this._dollyDelta.y<0&&this._dollyIn(this._getZoomScale(this._dollyDelta.y)),this._dollyStart.copy(this._dollyEnd),this.zoomToCursor&&(this._performCursorZoom=!0,this._dollyDirection.set(this._mouse.x,this._mouse.y,1).unproject(this.object).sub(this.object.position).normalize()),this.update()}_handleMouseMovePan(t){this._panEnd.set(t.clientX,t.clientY),this._panDelta.subVectors(this._panEnd,this._panStart).multiplyScalar(this.panSpeed),this._pan(this._panDelta.x,this._panDelta.y),this._panStart.copy(this._panEnd),this.update()}_handleMouseWheel(t){this._updateZoomParameters(t.clientX,t.clientY),t.deltaY<0?this._dollyIn(this._getZoomScale(t.deltaY)):t.deltaY>0&&this._dollyOut(this._getZoomScale(t.deltaY)),this.update()}_handleKeyDown(t){let e=!1;switch(t.code){case this.keys.UP:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateUp(N*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(0,this.keyPanSpeed),e=!0;break;case this.keys.BOTTOM:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateUp(-N*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(0,-this.keyPanSpeed),e=!0;break;case this.keys.LEFT:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateLeft(N*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(this.keyPanSpeed,0),e=!0;break;case this.keys.RIGHT:t.ctrlKey||t.metaKey||t.shiftKey?this.enableRotate&&this._rotateLeft(-N*this.keyRotateSpeed/this.domElement.clientHeight):this.enablePan&&this._pan(-this.keyPanSpeed,0),e=!0;break}e&&(t.preventDefault(),this.update())}_handleTouchStartRotate(t){if(this._pointers.length===1)this._rotateStart.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._rotateStart.set(s,i)}}_handleTouchStartPan(t){if(this._pointers.length===1)this._panStart.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._panStart.set(s,i)}}_handleTouchStartDolly(t){let e=this._getSecondPointerPosition(t),s=t.pageX-e.x,i=t.pageY-e.y,o=Math.sqrt(s*s+i*i);this._dollyStart.set(0,o)}_handleTouchStartDollyPan(t){this.enableZoom&&this._handleTouchStartDolly(t),this.enablePan&&this._handleTouchStartPan(t)}_handleTouchStartDollyRotate(t){this.enableZoom&&this._handleTouchStartDolly(t),this.enableRotate&&this._handleTouchStartRotate(t)}_handleTouchMoveRotate(t){if(this._pointers.length==1)this._rotateEnd.set(t.pageX,t.pageY);else{let s=this._getSecondPointerPosition(t),i=.5*(t.pageX+s.x),o=.5*(t.pageY+s.y);this._rotateEnd.set(i,o)}this._rotateDelta.subVectors(this._rotateEnd,this._rotateStart).multiplyScalar(this.rotateSpeed);let e=this.domElement;this._rotateLeft(N*this._rotateDelta.x/e.clientHeight),this._rotateUp(N*this._rotateDelta.y/e.clientHeight),this._rotateStart.copy(this._rotateEnd)}_handleTouchMovePan(t){if(this._pointers.length===1)this._panEnd.set(t.pageX,t.pageY);else{let e=this._getSecondPointerPosition(t),s=.5*(t.pageX+e.x),i=.5*(t.pageY+e.y);this._panEnd.set(s,i)}this._panDelta.subVectors(this._panEnd,this._panStart).multiplyScalar(this.panSpeed),this._pan(this._panDelta.x,this._panDelta.y),this._panStart.copy(this._panEnd)}_handleTouchMoveDolly(t){let e=this._getSecondPointerPosition(t),s=t.pageX-e.x,i=t.pageY-e.y,o=Math.sqrt(s*s+i*i);this._dollyEnd.set(0,o),this._dollyDelta.set(0,Math.pow(this._dollyEnd.y/this._dollyStart.y,this.zoomSpeed)),this._dollyOut(this._dollyDelta.y),this._dollyStart.copy(this._dollyEnd);let n=(t.pageX+e.x)*.5,a=(t.pageY+e.y)*.5;this._updateZoomParameters(n,a)}_handleTouchMoveDollyPan(t){this.enableZoom&&this._handleTouchMoveDolly(t),this.enablePan&&this._handleTouchMovePan(t)}_handleTouchMoveDollyRotate(t){this.enableZoom&&this._handleTouchMoveDolly(t),this.enableRotate&&this._handleTouchMoveRotate(t)}_addPointer(t){this._pointers.push(t.pointerId)}_removePointer(t){delete this._pointerPositions[t.pointerId];for(let e=0;e<this._pointers.length;e++)if(this._pointers[e]==t.pointerId){this._pointers.splice(e,1);return}}_isTrackingPointer(t){for(let e=0;e<this._pointers.length;e++)if(this._pointers[e]==t.pointerId)return!0;return!1}_trackPointer(t){let e=this._pointerPositions[t.pointerId];e===void 0&&(e=new z,this._pointerPositions[t.pointerId]=e),e.set(t.pageX,t.pageY)}_getSecondPointerPosition(t){let e=t.pointerId===this._pointers[0]?this._pointers[1]:this._pointers[0];return this._pointerPositions[e]}_customWheelEvent(t){let e=t.deltaMode,s={clientX:t.clientX,clientY:t.clientY,deltaY:t.deltaY};switch(e){case 1:s.deltaY*=16;break;case 2:s.deltaY*=100;break}return t.ctrlKey&&!this._controlActive&&(s.deltaY*=10),s}};function rr(r){this.enabled!==!1&&(this._pointers.length===0&&(this.domElement.setPointerCapture(r.pointerId),this.domElement.ownerDocument.addEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.addEventListener("pointerup",this._onPointerUp)),!this._isTrackingPointer(r)&&(this._addPointer(r),r.pointerType==="touch"?this._onTouchStart(r):this._onMouseDown(r),this._cursorStyle==="grab"&&(this.domElement.style.cursor="grabbing")))}function nr(r){this.enabled!==!1&&(r.pointerType==="touch"?this._onTouchMove(r):this._onMouseMove(r))}function ar(r){switch(this._removePointer(r),this._pointers.length){case 0:this.domElement.releasePointerCapture(r.pointerId),this.domElement.ownerDocument.removeEventListener("pointermove",this._onPointerMove),this.domElement.ownerDocument.removeEventListener("pointerup",this._onPointerUp),this.dispatchEvent(ds),this.state=_.NONE,this._cursorStyle==="grab"&&(this.domElement.style.cursor="grab");break;case 1:let t=this._pointers[0],e=this._pointerPositions[t];this._onTouchStart({pointerId:t,pageX:e.x,pageY:e.y});break}}function hr(r){let t;switch(r.button){case 0:t=this.mouseButtons.LEFT;break;case 1:t=this.mouseButtons.MIDDLE;break;case 2:t=this.mouseButtons.RIGHT;break;default:t=-1}switch(t){case ot.DOLLY:if(this.enableZoom===!1)return;this._handleMouseDownDolly(r),this.state=_.DOLLY;break;case ot.ROTATE:if(r.ctrlKey||r.metaKey||r.shiftKey){if(this.enablePan===!1)return;this._handleMouseDownPan(r),this.state=_.PAN}else{if(this.enableRotate===!1)return;this._handleMouseDownRotate(r),this.state=_.ROTATE}break;case ot.PAN:if(r.ctrlKey||r.metaKey||r.shiftKey){if(this.enableRotate===!1)return;this._handleMouseDownRotate(r),this.state=_.ROTATE}else{if(this.enablePan===!1)return;this._handleMouseDownPan(r),this.state=_.PAN}break;default:this.state=_.NONE}this.state!==_.NONE&&this.dispatchEvent(ue)}function lr(r){switch(this.state){case _.ROTATE:if(this.enableRotate===!1)return;this._handleMouseMoveRotate(r);break;case _.DOLLY:if(this.enableZoom===!1)return;this._handleMouseMoveDolly(r);break;case _.PAN:if(this.enablePan===!1)return;this._handleMouseMovePan(r);break}}function cr(r){this.enabled===!1||this.enableZoom===!1||this.state!==_.NONE||(r.preventDefault(),this.dispatchEvent(ue),this._handleMouseWheel(this._customWheelEvent(r)),this.dispatchEvent(ds))}function ur(r){this.enabled!==!1&&this._handleKeyDown(r)}function fr(r){switch(this._trackPointer(r),this._pointers.length){case 1:switch(this.touches.ONE){case it.ROTATE:if(this.enableRotate===!1){this.state=_.NONE;break}this._handleTouchStartRotate(r),this.state=_.TOUCH_ROTATE;break;case it.PAN:if(this.enablePan===!1){this.state=_.NONE;break}this._handleTouchStartPan(r),this.state=_.TOUCH_PAN;break;default:this.state=_.NONE}break;case 2:switch(this.touches.TWO){case it.DOLLY_PAN:if(this.enableZoom===!1&&this.enablePan===!1)return;this._handleTouchStartDollyPan(r),this.state=_.TOUCH_DOLLY_PAN;break;case it.DOLLY_ROTATE:if(this.enableZoom===!1&&this.enableRotate===!1)return;this._handleTouchStartDollyRotate(r),this.state=_.TOUCH_DOLLY_ROTATE;break;default:this.state=_.NONE}break;default:this.state=_.NONE}this.state!==_.NONE&&this.dispatchEvent(ue)}function dr(r){switch(this._trackPointer(r),this.state){case _.TOUCH_ROTATE:if(this.enableRotate===!1)return;this._handleTouchMoveRotate(r),this.update();break;case _.TOUCH_PAN:if(this.enablePan===!1)return;this._handleTouchMovePan(r),this.update();break;case _.TOUCH_DOLLY_PAN:if(this.enableZoom===!1&&this.enablePan===!1)return;this._handleTouchMoveDollyPan(r),this.update();break;case _.TOUCH_DOLLY_ROTATE:if(this.enableZoom===!1&&this.enableRotate===!1)return;this._handleTouchMoveDollyRotate(r),this.update();break;default:this.state=_.NONE}}function pr(r){this.enabled!==!1&&r.preventDefault()}function mr(r){r.key==="Control"&&(this._controlActive=!0,this.domElement.ownerDocument.addEventListener("keyup",this._interceptControlUp,{passive:!0,capture:!0}))}function gr(r){r.key==="Control"&&(this._controlActive=!1,this.domElement.ownerDocument.removeEventListener("keyup",this._interceptControlUp,{passive:!0,capture:!0}))}function k(r,t){let e=Math.sin(12.9898*r+78.233*t)*43758.5453;return e-Math.floor(e)}import{BufferAttribute as ps,BufferGeometry as wr,Color as gs,Vector3 as Z}from"./three.webgpu.js";var yr=new gs(6968380),br=[5208628,7050304,8825162].map(r=>new gs(r)),ms=2600;function ws(r,t){let{rest:e,sphere:s}=r,i=[...t].sort((h,l)=>h-l)[Math.floor(.7*t.length)],o=.026*s.radius,n=h=>t[h]<=i,a=h=>new Z().fromArray(e,3*h);return h=>{let{source:l}=h.userData,c=h.index.array,u={offset:[],normal:[],color:[],vertices:[],index:[]},f=(g,v,M,S)=>(u.vertices.push(g),u.offset.push(v.x,v.y,v.z),u.normal.push(M.x,M.y,M.z),u.color.push(S.r,S.g,S.b),u.vertices.length-1),d=(g,v,M,S)=>{let D=(E,A)=>f(E,M.clone().multiplyScalar(A*t[E]),S,yr),w=[D(g,-1),D(g,1),D(v,-1),D(v,1)];u.index.push(w[0],w[1],w[2],w[2],w[1],w[3])},p=Array.from({length:c.length/2},(g,v)=>[l[c[2*v]],l[c[2*v+1]]]);for(let[g,v]of p){let M=a(v).sub(a(g)).normalize(),S=new Z(M.y,-M.x,M.z*.1).cross(M).normalize(),D=new Z().crossVectors(M,S);d(g,v,S,D),n(v)||d(g,v,D,S)}let m=p.map(([,g])=>g).filter(n),b=Math.min(ms,2*m.length),x=o*Math.sqrt(ms/Math.max(b,60));for(let g=0;g<b;g++){let v=m[Math.floor(g*m.length/b)],M=2*Math.PI*k(g,1),S=k(g,2)-.35,D=new Z(Math.cos(M),S,Math.sin(M)).normalize().multiplyScalar(x),w=new Z(-Math.sin(M),.6*(k(g,3)-.5),Math.cos(M)).multiplyScalar(.42*x),E=a(v).sub(s.center).normalize().add(new Z(0,.7,0)).normalize(),A=br[g%3].clone().multiplyScalar(.8+.4*k(g,4)),R=D.clone().multiplyScalar(.5),I=f(v,new Z,E,A);f(v,R.clone().add(w),E,A),f(v,R.clone().sub(w),E,A),f(v,D,E,A),u.index.push(I,I+1,I+2,I+2,I+1,I+3)}let y=new wr;for(let[g,v]of[["athOffset",u.offset],["normal",u.normal],["color",u.color]])y.setAttribute(g,new ps(Float32Array.from(v),3));return y.setIndex(new ps(Uint32Array.from(u.index),1)),y.userData.vertices=Uint32Array.from(u.vertices),y}}import{Color as vr,DirectionalLight as xr,Fog as _r,HemisphereLight as Mr,Mesh as Sr,MeshStandardNodeMaterial as Er,PlaneGeometry as Ar,TSL as Or,Vector3 as Tr}from"./three.webgpu.js";var{Fn:_s,clamp:Pr,color:fe,dot:Dr,max:Rr,mix:Bt,mx_noise_float:kr,normalWorldGeometry:ys,positionWorld:Cr,pow:bs,smoothstep:vs,vec3:mt}=Or,J=new Tr(-.62,.72,.32).normalize(),Nr=7317210,Ms=15002600,Ir=16773334,xs=2048,Lr=9,Ur=_s(()=>{let r=Pr(ys.y,0,1),t=Rr(Dr(ys,mt(J.x,J.y,J.z)),0);return Bt(Bt(fe(Ms),fe(Nr),bs(r,.55)),fe(Ir),bs(t,6).mul(.4))}),zr=r=>_s(()=>{let t=Cr.xz.div(r),e=n=>kr(mt(t.x.mul(n),t.y.mul(n),n)),s=vs(-.5,.6,e(.35).add(e(1.9).mul(.5))),i=e(23).mul(.5).add(e(61).mul(.5)),o=Bt(mt(.085,.12,.03),mt(.16,.19,.055),s);return Bt(o,mt(.13,.1,.05),vs(.25,.75,e(.8)).mul(.5)).mul(i.mul(.5).add(1))})(),jt=class{constructor(t,e){let s=260*e,i=Lr*e;this.sun=new xr(16773592,3.2),this.ground=new Sr(new Ar(4*s,4*s),new Er({roughness:1})),this.ground.material.colorNode=zr(e),this.ground.rotation.x=-Math.PI/2,this.ground.receiveShadow=!0,Object.assign(this.sun.shadow.camera,{left:-i,right:i,top:i,bottom:-i,near:.1*i,far:5*i}),Object.assign(this.sun.shadow,{bias:-5e-4,normalBias:.004*e}),this.sun.shadow.mapSize.setScalar(xs),this.reach=i,t.backgroundNode=Ur(),t.fog=new _r(new vr(Ms),10*e,.55*s),t.add(this.ground,this.sun,this.sun.target,new Mr(14478328,9211746,1.3))}set shadows(t){this.sun.castShadow=t}around(t){let e=2*this.reach/xs*16,s=i=>Math.round(i/e)*e;this.sun.target.position.set(s(t.x),0,s(t.z)),this.sun.position.copy(this.sun.target.position).addScaledVector(J,2.5*this.reach)}};import{DoubleSide as Fr,MeshStandardNodeMaterial as Br,TSL as jr}from"./three.webgpu.js";var{Fn:de,abs:ge,attribute:Hr,clamp:we,dot:Wr,float:gt,floor:Vr,fract:Gr,fwidth:Ss,max:ye,mix:Ht,mx_noise_float:Es,normalWorld:$r,pow:pe,select:Wt,sin:As,smoothstep:me,vec3:F}=jr;function qr(r,t){if(r==="blades")return gt(2);if(r==="pinnae")return gt(.97).sub(pe(ge(As(t.mul(40.84).add(1.5708))),3).mul(.55).mul(t.mul(-.6).add(1)));let e=we(t.sub(.1).div(.9),0,1);return ye(pe(As(pe(e,.8).mul(Math.PI)),.8).mul(.92),Wt(t.lessThan(.2),gt(.04),gt(0)))}function be(r,t){let e=re(r),s=new Br({color:e?16777215:8362581,roughness:.8,side:Fr});if(!e)return s;let[i,o]=e,n=Hr("uv","vec2"),a=n.x,h=n.y,l=a.greaterThanEqual(1),c=Vr(a.sub(1).mul(.5)).div(7),u=Gr(a.sub(1).mul(.5)).mul(4).sub(1),f=de(()=>{let x=Ht(F(.062,.155,.018),F(.145,.255,.03),c).toVar();o==="blades"&&x.mulAssign(me(0,.45,h).mul(.6).add(.5));let y=me(.08,0,ge(u)).mul(me(.12,.03,Ss(h)));return Ht(x,x.mul(1.5).add(.015),y.mul(.5))}),d=de(()=>{if(i==="stalks")return Ht(F(.1,.075,.03),F(.12,.17,.04),we(h.mul(.02),0,1));let x=Es(F(a.mul(11),h.mul(2.6),4)).mul(.6).add(Es(F(a.mul(18),h.mul(16),9)).mul(.3)).add(.45);return Ht(F(.05,.037,.027),F(.27,.215,.165),we(x,0,1))}),p=Wt(l,f(),d());s.colorNode=p;let m=de(()=>{let x=qr(o,h).sub(ge(u)),y=ye(Ss(x),1e-4);return Wt(l,x.div(y).add(.5),gt(1))});s.opacityNode=m(),s.alphaTest=.5;let b=ye(Wr($r,F(t.x,t.y,t.z)).negate(),0);return s.emissiveNode=Wt(l,p.mul(F(1.5,1.45,.45)).mul(b).mul(.8),F(0)),s}var Yr=12e3,Kr=Math.PI*(3-Math.sqrt(5)),Os=({sphere:r},t,e=1)=>1.1*r.radius*e*Math.sqrt(t);function Ts({metadata:r,motion:t,rest:e},s,i){let o=t.duration||1,n=r.up_axis==="z";return Array.from({length:s},(a,h)=>{let l=i*Math.sqrt((h+.3)/s),c=h*Kr+.5*Math.sin(h*12.9898),u=.75+.5*(Math.sin(h*78.233)*.5+.5),f=l*Math.cos(c),d=l*Math.sin(c);return{...n?{x:f,y:d,z:e[2]*(1-u)}:{x:f,y:e[1]*(1-u),z:d},size:u,angle:h*2.4,seconds:h*.7548776662%1*o}})}var Ps=(r,{metadata:t})=>r.map(({x:e,y:s,z:i})=>t.up_axis==="z"?[e,-s]:[e,i]);function Ds(r,t,e,s){return Array.from({length:Math.min(Yr,Math.round(t*r.length))},(i,o)=>{let[n,a]=r[Math.floor(o/t)],h=Math.floor(o%t/3),l=20*s,c=2*Math.PI*k(Math.floor(o/t)*7+h+1,l),u=e*(.12+.88*k(Math.floor(o/t)*5+h+1,l+1)),f=.16*e*Math.sqrt(k(o+1,l+2)),d=2*Math.PI*k(o+1,l+3);return{x:n+u*Math.cos(c)+f*Math.cos(d),z:a+u*Math.sin(c)+f*Math.sin(d),size:.8+.8*k(o+1,l+4),angle:2*Math.PI*k(o+1,l+5),seconds:100*k(o+1,l+6)}})}function Rs(r,{metadata:t,rest:e}){return t.up_axis==="z"?r.map(({x:s,z:i,size:o,...n})=>({...n,size:o,x:s,y:-i,z:e[2]*(1-o)})):r.map(({size:s,...i})=>({...i,size:s,y:e[1]*(1-s)}))}var Xr=4;function ks(r){let t=r.getAll("each").map(Number);return r.getAll("floor").map((e,s)=>({source:e,each:t[s]>0?t[s]:Xr}))}var Cs=["The file cannot be fetched","The server did not answer, or it has no such file. Check the address, and whether you are online."],Ns=["The file is cut off too early","Its end is missing, as after a download that was interrupted. Get it again."],Zr={NOT_AN_ATH_FILE:["This is not an .ath file","It begins as another kind of file. If it came from the web, its address may lead to a page about the file and not to the file."],NO_MOTION:["This GLB holds no plant that moves","athcodec encode FILE.glb --into OUT.glb puts the motion of its animation into it."],UNSUPPORTED_VERSION:["This file is of another version of the format","A newer viewer may show it, or the file can be made again from its source."],HTTP:Cs,NETWORK:Cs,MISSING:Ns,TRUNCATED:Ns,NEEDS_HOST_MESH:["This file needs the mesh that it was made for","It holds the motion alone. Open it together with its mesh: athcodec view FILE --host-mesh MESH."],UNSUPPORTED_FEATURE:["This file uses something newer than this viewer","A newer viewer may show it."],WRONG_HOST_MESH:["The mesh is not the one that this file was made for","The file fits one mesh alone, point for point."],CLIP:["The file has no such clip","The address names a clip that is not in the file."],CHANGED:["The file has changed","While it was loading, another one took its place. Load it again."],WORKER:["The decoder cannot be started","The page is not complete: ath_worker.js belongs beside it."],GRAPHICS:["This browser cannot draw in 3D","The page needs WebGL 2. It may be turned off in the browser's settings."]},Jr=["The file is damaged","Some of its bytes are not what they were when it was made. Get it again."],Qr=["HTTP","NETWORK","MISSING","TRUNCATED","CHANGED","WORKER"];function Is(r){let[t,e]=Zr[r]??Jr;return{title:t,advice:e,passing:Qr.includes(r)}}import{Euler as Ls,Vector3 as ve}from"./three.webgpu.js";var Vt={KeyW:[0,1],ArrowUp:[0,1],KeyS:[0,-1],ArrowDown:[0,-1],KeyA:[-1,0],ArrowLeft:[-1,0],KeyD:[1,0],ArrowRight:[1,0]},tn=2.6,Us=.0035,zs=1.3,en=.12,Gt=class{on=!1;#t=new Set;#e=[0,0];#i=new ve;#r=new Ls(0,0,0,"YXZ");constructor(t,e,s,{height:i,speed:o,changed:n}){Object.assign(this,{camera:t,canvas:e,height:i,speed:o,changed:n}),addEventListener("keydown",a=>this.#o(a)),addEventListener("keyup",({code:a})=>this.#t.delete(a)),addEventListener("blur",()=>this.#t.clear()),e.addEventListener("pointermove",a=>this.#s(a)),this.#a(s)}begin(){if(this.on)return;let{camera:t}=this,e=t.getWorldDirection(new ve);this.on=!0,this.#r.set(Math.max(-.3,Math.min(Math.asin(e.y),.1)),Math.atan2(-e.x,-e.z),0),this.changed(!0)}end(){this.on&&(this.on=!1,this.#t.clear(),this.changed(!1))}#o(t){let{code:e,target:s}=t;t.ctrlKey||t.metaKey||t.altKey||s.closest?.("input, button")||(e==="Escape"&&this.end(),!(!(e in Vt)&&!e.startsWith("Shift"))&&(this.#t.add(e),e in Vt&&(t.preventDefault(),this.begin())))}#s({buttons:t,movementX:e,movementY:s}){!this.on||!(t&1)||(this.#r.y+=Us*e,this.#r.x=Math.max(-zs,Math.min(this.#r.x+Us*s,zs)))}#a(t){let e=i=>{let{left:o,top:n,width:a,height:h}=t.getBoundingClientRect(),l=(i.clientX-o)/a*2-1,c=1-(i.clientY-n)/h*2,u=Math.max(1,Math.hypot(l,c));this.#e=[l/u,c/u],t.style.setProperty("--x",l/u),t.style.setProperty("--y",-c/u)},s=()=>{this.#e=[0,0],t.style.setProperty("--x",0),t.style.setProperty("--y",0)};t.addEventListener("pointerdown",i=>{t.setPointerCapture(i.pointerId),this.begin(),e(i)}),t.addEventListener("pointermove",i=>{t.hasPointerCapture(i.pointerId)&&e(i)});for(let i of["pointerup","pointercancel"])t.addEventListener(i,s)}update(t){if(!this.on)return;let e=[...this.#t].reduce(([h,l],c)=>[h+(Vt[c]?.[0]??0),l+(Vt[c]?.[1]??0)],this.#e),s=Math.max(1,Math.hypot(...e)),i=this.speed*([...this.#t].some(h=>h.startsWith("Shift"))?tn:1),o=new ve(e[0]/s,0,-e[1]/s).multiplyScalar(i).applyEuler(new Ls(0,this.#r.y,0)),n=1-Math.exp(-t/en),{position:a}=this.camera;this.#i.lerp(o,n),a.addScaledVector(this.#i,t),a.y+=(this.height-a.y)*(1-Math.exp(-3*t)),this.camera.quaternion.setFromEuler(this.#r)}};var P=r=>document.getElementById(r),wt=new URLSearchParams(location.search),$t=Number(wt.get("count")??1e4),un=.85,fn=.28,dn=.7,pn=40,mn=12,T={modules:{three:sn,loading:ne},frames:0,milliseconds:0,forest:null,ath:null,error:null};window.athcodecForest=T;var gn=r=>Math.floor(200+55*k(r,3))<<16|Math.floor(215+40*k(r,6))<<8|205;function Fs({motion:{clips:r},metadata:t}){let e=r.map(({name:o})=>t.clips?.[o]?.strength).filter(Number.isFinite),[s,i]=[Math.min(...e),Math.max(...e)];return i>s?{calm:s,wild:i}:null}function wn(r,t,e){return Promise.all(ks(wt).map(async({source:s,each:i},o)=>{let n=await new K().loadAsync(s),a=Fs(n),{clips:h}=n.motion,l=()=>be(n.metadata,J),c=new st(r,n,{material:l}),u=f=>h[a?0:f%h.length].name;return c.setInstances(Rs(Ds(t,i,e,o),n).map((f,d)=>({...f,clip:u(d)}))),{forest:c,winds:a}}))}async function yn(){if(!await navigator.gpu?.requestAdapter())return null;let r=new cn({canvas:P("canvas"),antialias:!0});return r.init().then(()=>r.backend.isWebGPUBackend?r:null,()=>null)}async function bn(){let r=await yn();if(!r){location.replace(`index.html${location.search}#forest=${$t}`);return}let t=await new K().loadAsync(wt.get("file")),e=t.hasFaces,{radius:s}=t.sphere,i=new st(r,t,{shape:e?void 0:ws(t,X(t)),material:()=>e?be(t.metadata,J):new nn({roughness:.85,side:rn})}),o=Fs(t),{clips:n}=t.motion,a=o?1:n.length,h=Ts(t,$t,Os(t,$t,un)).map((w,E)=>({...w,clip:n[E%a].name,tint:gn(E)}));i.setInstances(h);let l=await wn(r,Ps(h,t),.9*s),c=new hn,u=new an(40,1,.02*s,400*s),f=new Ft(u,P("canvas")),d=new jt(c,s),p=/swiftshader|llvmpipe/i.test(r.backend.device.adapterInfo?.architecture??""),m=new Gt(u,P("canvas"),P("stick"),{height:fn*s,speed:dn*s,changed:w=>x(w)});r.toneMapping=on,r.shadowMap.enabled=!0,d.shadows=wt.get("quality")==="full"||!p,c.add(i,...l.map(w=>w.forest)),u.position.set(3*s,2.4*s,8*s),f.target.set(0,.9*s,0),f.maxPolarAngle=.49*Math.PI,f.maxDistance=150*s,f.enableDamping=!0,Object.assign(T,{ath:t,forest:i,floor:l.map(w=>w.forest),renderer:r,camera:u,controls:f,scene:c,walk:m,time:null,seconds:0,playing:!0});let b=w=>{T.moves=w,P("play").textContent=w?"Pause":"Play"};b(!matchMedia("(prefers-reduced-motion: reduce)").matches),P("play").addEventListener("click",()=>b(!T.moves));let x=w=>{P("walk").setAttribute("aria-pressed",w),f.enabled=!w,w||f.target.copy(u.position).add(u.getWorldDirection(new ln).multiplyScalar(4*s)).setY(.9*s)};P("walk").addEventListener("click",()=>m.on?m.end():m.begin()),o&&Object.assign(P("strength"),{min:o.calm,max:o.wild,step:(o.wild-o.calm)/100,value:o.wild});let y=()=>{let w=Number(P("strength").value),E=Number(P("heading").value);P("strength-value").textContent=w.toFixed(1),P("heading-value").textContent=`${E}°`;for(let{forest:A,winds:R}of[{forest:i,winds:o},...l])R&&A.wind(o?w:R.calm+.5*w*(R.wild-R.calm)),A.sway(R||o?1:w,E*Math.PI/180)};for(let w of["strength","heading"])P(w).addEventListener("input",y);y();let g=null,v=0,M=w=>{v=w>pn?v+1:0,!(v<mn||wt.get("quality")==="full")&&(v=0,d.sun.castShadow?d.shadows=!1:r.setPixelRatio(1))},S=w=>{let E=g===null?0:w-g;g=w,M(E),m.update(Math.min(E,1e3)/1e3),d.around(m.on?u.position:f.target);let{clientWidth:A,clientHeight:R}=P("canvas");(A!==T.width||R!==T.height)&&(Object.assign(T,{width:A,height:R}),r.setPixelRatio(Math.min(devicePixelRatio,2)),r.setSize(A,R,!1),u.aspect=A/R,u.updateProjectionMatrix()),m.on||f.update();let I=performance.now();T.moves&&(T.seconds+=E/1e3);for(let yt of[i,...T.floor])yt.update(u,R,T.time??T.seconds);T.milliseconds=performance.now()-I,r.render(c,u),T.frames++},D=()=>{let w=[i,...T.floor].reduce((E,{bytesOfMotion:A})=>E+A,0)/1e3;P("status").textContent=`${$t.toLocaleString("en")} plants, ${Math.round(w).toLocaleString("en")} kB of motion on the graphics card`};for(let w of[i,...T.floor])w.addEventListener("level",D);r.setAnimationLoop(w=>{T.playing&&S(w)}),T.draw=S}bn().catch(r=>{let{title:t,advice:e}=Is(r.codeName);T.error=r.message,Object.assign(P("status"),{textContent:r.codeName?`${t}. ${e}`:r.message,title:r.message,className:"wrong"}),P("controls").hidden=!0});
