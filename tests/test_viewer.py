@@ -908,7 +908,8 @@ def test_a_truncated_file_plays_to_its_level(opened, sample_ath, ranges):
 def test_the_page_says_that_a_file_cannot_be_shown(opened, sample_ath, damage, words):
     files = {} if damage is None else {"tree.ath": damage(sample_ath.read_bytes())}
     with ThrottledServer(files) as line:
-        page = opened(line.page("tree.ath"), "document.getElementById('message').checkVisibility()")
+        shown = "document.getElementById('message').checkVisibility()"
+        page = opened(line.page("tree.ath"), shown, quiet="Failed to load resource")  # as the browser says it
         assert words in page.inner_text("#message h2") and page.inner_text("#message p").strip()
 
 
