@@ -39,6 +39,7 @@ OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all fi
     Feature.FREE_RIGID: {"rest_error": None},
     Feature.TURN: {"rest_error": None},
     Feature.CONNECTED: {"attributes": "all"},
+    Feature.SIDES: {"attributes": "all"},
     Feature.ATTRIBUTES: {"attributes": "all"},
     Feature.JOINS: {"segment_frames": SHORT_SEGMENT},
     Feature.STRAIGHT: {"segment_frames": SHORT_SEGMENT},
@@ -46,10 +47,6 @@ OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all fi
 }
 # Options of the file without a feature that no search omits.
 OPTIONS_WITHOUT: Mapping[Feature, dict[str, Any]] = {Feature.HOST: {}, Feature.ATTRIBUTES: {}}
-OTHERS = {  # Features that no encoder leaves out; measured by one that was changed for it.
-    "sides": "open sides as guesses of faces",
-    "adaptive": "adaptive vertices of rest poses",
-}
 LEAST = 1.0  # Per cent that a feature has to save on some file.
 LEAST_BYTES = 500  # Smallest file in the table: a few bytes of smaller ones are many per cent.
 
@@ -58,7 +55,7 @@ How many per cent larger files are without the feature: the mean of all files, t
 and the most. A file that does not use a feature counts as 0; below 0 the search ends in a smaller file without. Files
 have no attributes, a rest pose of the bound and, unless they are named as such, no layers. Those for
 {Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value} have rest poses that keep faces, those for
-{Feature.CONNECTED.value}, {OTHERS["sides"]} and {Feature.ATTRIBUTES.value} all attributes, those for
+{Feature.CONNECTED.value}, {Feature.SIDES.value} and {Feature.ATTRIBUTES.value} all attributes, those for
 {Feature.JOINS.value} and {Feature.STRAIGHT.value} segments of {SHORT_SEGMENT} frames. Files below {LEAST_BYTES} bytes,
 of which a byte is many per cent, are left out. What saves less than {LEAST:g} % everywhere is marked.
 """
@@ -171,6 +168,8 @@ class _Files:
         of_all = {
             Feature.HOST: is_host,
             Feature.ATTRIBUTES: bool(self._clip.attributes) or self._polygons is not None,
+            Feature.SIDES: self._polygons is not None,
+            Feature.ADAPTIVE: bool(settings.lags.any()) or settings.connected_rest,
             Feature.CONNECTED: settings.connected_rest,
             Feature.COPIES: settings.shape_of is not None,
             Feature.REPEATS: bool(np.any(plan.seen.repeats)),
@@ -213,7 +212,7 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         name = f"`{own['clip']}` at {own['bound']:g}" + (" in layers" if own["ladder"] else "")
         growth.setdefault(own["feature"], {})[name] = 100 * (own["without"] / own["with"] - 1)
     rows = []
-    titles = {feature.name.lower(): feature.value for feature in Feature} | OTHERS
+    titles = {feature.name.lower(): feature.value for feature in Feature}
     for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):
         values = growth[name]
         used, most = [value for value in values.values() if value], max(values, key=lambda file: values[file])

@@ -23,6 +23,7 @@ class Feature(Enum):
     MEAN_POSE = "motion about the mean pose"
     PREDICTED = "predicted motion"
     LATTICE = "lattice points of predicted motion"
+    ADAPTIVE = "adaptive vertices of rest poses"
     CONNECTED = "connected rest poses"
     COPIES = "copies in rest poses"
     LEVEL_0_REST = "a rest pose for level 0 alone"
@@ -33,4 +34,5 @@ class Feature(Enum):
     STRAIGHT = "waves that end in straight lines"
     PERIODIC = "periodic time bases"
     REPEATS = "repeats"
+    SIDES = "open sides as guesses of faces"
     ATTRIBUTES = "faces, edges and attributes"

@@ -803,7 +803,7 @@ class EncodingJob:
             store.add(ct.METADATA, writing.pack_metadata(metadata))
         faces = _polygons(source, self.options)
         if faces is not None:
-            store.add(ct.FACES, polygons.pack(faces, places))
+            store.add(ct.FACES, polygons.pack(faces, places, Feature.SIDES not in self.options.without))
         if self._keeps_static and source.edges is not None:
             store.add(ct.EDGES, self._edges(source.edges))
 

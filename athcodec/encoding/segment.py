@@ -207,7 +207,7 @@ class Source:
     @cached_property
     def mesh(self) -> Mesh | None:
         """Faces that rest poses may go by."""
-        if Feature.CONNECTED in self.without:
+        if {Feature.CONNECTED, Feature.ADAPTIVE} & self.without:  # Connected vertices are adaptive, too.
             return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 

@@ -141,10 +141,12 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
 }
 
 int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
-                         const int32_t *places, int32_t place_count, const uint32_t *counts, const int32_t *corners)
+                         const int32_t *places, int32_t place_count, const uint32_t *counts, const int32_t *corners,
+                         int has_sides)
 {
     faces_model *model = (faces_model *)memory;
     start_faces(model, shape, vertex_count, places, place_count, (uint32_t *)counts, (int32_t *)corners);
+    model->list.has_no_sides = !has_sides;
     coder_start(&model->coder, bytes, capacity);
     return written(&model->coder, code_faces(model, 0));
 }
