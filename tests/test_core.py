@@ -354,10 +354,10 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     front = parts.chunks[0][0].offset
     assert refusal(b"PK" + data[2:]) == "NOT_AN_ATH_FILE file: got first bytes 0x504b5448; expected 0x89415448"
     assert refusal(data[:8] + b"\2\6\0\0" + data[12:]) == (
-        "UNSUPPORTED_VERSION file: got format version 2.6; expected 0.14"
+        "UNSUPPORTED_VERSION file: got format version 2.6; expected 0.15"
     )
     assert refusal(data[:8] + b"\0\x0e\4\x80" + data[12:]) == (
-        "UNSUPPORTED_FEATURE file: got format 0.14 with feature 2, 15; expected features that this decoder has"
+        "UNSUPPORTED_FEATURE file: got format 0.15 with feature 2, 15; expected features that this decoder has"
     )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 24"
     assert refusal(data[:100]) == f"MISSING front: got 100 bytes; expected {front}"

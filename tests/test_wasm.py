@@ -402,7 +402,7 @@ OPEN = "answer(thrown(() => AthFile.open(read(path))));"
     "at, name, in_chunk, sentence",
     [
         (0, "NOT_AN_ATH_FILE", False, "file: got first bytes 0x99415448; expected 0x89415448"),
-        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.14; expected 0.14"),
+        (8, "UNSUPPORTED_VERSION", False, "file: got format version 16.15; expected 0.15"),
         (70, "BAD_CHECKSUM", False, "front: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
         (-1, "BAD_CHECKSUM", True, r"chunk HIERARCHY at byte \d+: got checksum 0x[0-9a-f]{8}; expected 0x[0-9a-f]{8}"),
     ],

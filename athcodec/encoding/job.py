@@ -484,10 +484,10 @@ class EncodingJob:
         bound = choice.settings.bound
         split = self._split(bound, thresholds)
         source = self.source if split is None else split.marked
-        if choice.predicted is None and source.segment_frames != self.options.segment_frames:
+        if not choice.predicted and source.segment_frames != self.options.segment_frames:
             source = source.in_segments(self.options.segment_frames)
         job = dataclasses.replace(self, source=source)
-        if choice.predicted is not None:
+        if choice.predicted:
             return job._predicted(choice)
         ath = self.seen.ath(thresholds)
         return job._layered(ath, choice, CodedPrelude(source.about(choice.reference), ath, choice.settings))
@@ -654,7 +654,7 @@ class EncodingJob:
 
     def draft(self, decided: Decided) -> Draft:
         options = self.options
-        if decided.choice.predicted is None:
+        if not decided.choice.predicted:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
         if len(decided.layers.each) == 1:
             options = dataclasses.replace(options, ladder=())
@@ -741,7 +741,7 @@ class EncodingJob:
             self.clip.dtype == np.float64,
             len(self.clip.clip_range_frames),
             len(layers.each),
-            decided.choice.predicted is not None,
+            decided.choice.predicted,
             stages=tuple(stages),
             joins=joins,
             repeats=decided.source.repeats,
@@ -844,7 +844,7 @@ class EncodingJob:
             frames = self._positions(block.pop()) if block else (source.positions(index), self._exact(index))
             return index, self._motion(decided, index, *frames, before, after)
 
-        if decided.choice.predicted is not None:
+        if decided.choice.predicted:
             return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
         order = self._in_order(source, segments)
         begun = pool.ordered(begin, self._linked(decided, order), at_once - 1)
@@ -957,7 +957,7 @@ def _summary(
     sizes["HEADER"] = result.header.file_length - sum(sizes.values())
     settings, bound = decided.choice.settings, decided.choice.settings.bound
     choices = {
-        "motion": "transformed" if decided.choice.predicted is None else "predicted",
+        "motion": "transformed" if not decided.choice.predicted else "predicted",
         "step_ratio": settings.step / bound,
         "rest_step_ratio": settings.rest_step / bound,
         "still": settings.still,

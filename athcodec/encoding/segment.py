@@ -20,17 +20,7 @@ from athcodec.decoding import container as ct
 from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.features import Feature
-from athcodec.encoding.motion import (
-    NODE_ROOT,
-    STEM_ROOT,
-    LearnedModes,
-    LevelStream,
-    Plan,
-    PlanSample,
-    SegmentMotion,
-    gather,
-    zeros,
-)
+from athcodec.encoding.motion import LearnedModes, LevelStream, Plan, PlanSample, SegmentMotion, gather, zeros
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.settings import BEAM, Settings
@@ -346,10 +336,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
     branches["flags"] = (
-        SHEET * (settings.forms != BEAM)
-        + LOOSE * (settings.loose | free)
-        + WHOLE * ath.whole_branches()
-        + STILL * settings.still
+        SHEET * (settings.forms != BEAM) + LOOSE * free + WHOLE * ath.whole_branches() + STILL * settings.still
     )
     branches["rigid"] = settings.rigid
     branches["lag"], branches["detail"] = settings.lags, settings.details
@@ -368,7 +355,6 @@ def plain_settings(source: Source, levels: int, bound: float, step: float, rest_
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         forms=none,
-        loose=none > 0,
         rigid=none,
         lags=none,
         details=finer_than(source.details, bound),
@@ -516,8 +502,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     level_streams = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
-        root = NODE_ROOT if settings.is_straight else STEM_ROOT
-        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step, root=root)
+        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step)
         if level in bases:
             stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
         level_streams.append(stream)
@@ -680,10 +665,7 @@ def analyse(
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
     """Return the head of the stems of a level, whose time basis is among `bases` if it is learned."""
     head = writing.StemsHead(
-        settings.step_of(level),
-        settings.rotation_step_factors[level],
-        turn=qz.turn_of(settings.turn_step),
-        basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
+        settings.step_of(level), settings.rotation_step_factors[level], turn=qz.turn_of(settings.turn_step)
     )
     if level in bases:
         basis = bases[level]

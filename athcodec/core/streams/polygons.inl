@@ -223,7 +223,8 @@ static int32_t code_at_place(ath_coder *coder, faces_model *model, const faces_l
                              int32_t place, int32_t vertex)
 {
     if (!faces->places) return coder_bit(coder, is_there, vertex == place && !faces->has_no_sides) ? place : -1;
-    int is_met = ENCODING && !faces->has_no_sides && faces->places[vertex] == place && is_near(&faces->members, place, vertex);
+    int is_met =
+        ENCODING && !faces->has_no_sides && faces->places[vertex] == place && is_near(&faces->members, place, vertex);
     return coder_bit(coder, is_there, is_met) ? code_member(coder, model, &faces->members, place, vertex) : -1;
 }
 
