@@ -127,14 +127,14 @@ invalid("cut-in-header TRUNCATED: 23 bytes", lambda: first_bytes(23))
 invalid("cut-in-front-stream TRUNCATED: ends inside the front stream", lambda: first_bytes(40))
 invalid("cut-in-checksums TRUNCATED: ends inside the checksums", lambda: first_bytes(rules.u32(lone().file(), 16) - 1))
 header("major-1 UNSUPPORTED_VERSION: Major_Version 1, which is to come", major=1, minor=0)
-header("minor-before UNSUPPORTED_VERSION: Minor_Version 13", minor=13)
-header("minor-later UNSUPPORTED_VERSION: Minor_Version 15", minor=15)
+header("minor-before UNSUPPORTED_VERSION: Minor_Version 14", minor=14)
+header("minor-later UNSUPPORTED_VERSION: Minor_Version 16", minor=16)
 header("feature-first UNSUPPORTED_FEATURE: the lowest bit of Features is set", features=1)
 header("feature-last UNSUPPORTED_FEATURE: the highest bit of Features is set", features=1 << 15)
 header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=1, features=1)
 invalid(
     "cut-behind-features UNSUPPORTED_FEATURE: 12 bytes are enough to refuse a feature",
-    lambda: first_bytes(12, b"\0\x0e\0\1"),
+    lambda: first_bytes(12, b"\0\x0f\0\1"),
 )
 header("vertices-limit LIMIT_EXCEEDED: Vertex_Count 2^26 + 1", place_count=(1 << 26) + 1)
 header("branches-limit LIMIT_EXCEEDED: Branch_Count 2^20 + 1, more than vertices as well", branch_count=(1 << 20) + 1)
