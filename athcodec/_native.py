@@ -242,7 +242,10 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_place_mesh": (None, [c_void_p, c_int32, c_int32]),
     "ath_build_mesh": (None, [c_void_p, c_int32, POINTER(CorePolygons), *[c_void_p] * 3]),
     "ath_faces_memory": (c_uint64, [c_int32, c_int32]),
-    "ath_encode_faces": (c_int64, [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_int32, c_void_p, c_void_p]),
+    "ath_encode_faces": (
+        c_int64,
+        [*_WRITER, POINTER(CorePolygons), c_int32, c_void_p, c_int32, c_void_p, c_void_p, c_int32],
+    ),
     "ath_encode_places": (c_int64, [*_WRITER, c_uint32, c_int32, c_int32, c_void_p]),
     "ath_hash_positions": (None, [c_int64, c_void_p, *[c_int32] * 2, *[c_int] * 2, c_void_p, c_void_p]),
     "ath_find_near": (None, [*[c_int32] * 3, c_void_p, c_void_p, c_double, c_void_p, c_uint32, c_void_p]),
@@ -269,7 +272,7 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_predicted_memory": (c_size_t, [c_int32]),
     "ath_encode_predicted": (
         c_int64,
-        [*_WRITER, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, c_int, *[c_void_p] * 3],
+        [*_WRITER, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, *[c_void_p] * 3],
     ),
     "ath_encode_corrections": (c_int64, [*_WRITER, c_int32, c_int32, c_void_p, c_int64]),
 }

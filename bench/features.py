@@ -26,6 +26,7 @@ from athcodec.encoding.progress import Work
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure
+from bench.foreign import CLIPS, PROGRAMS
 from bench.store import IN_BRACKETS, Store, commits
 from bench.suite import SUITES, cases
 from bench.tables import environment, table
@@ -39,40 +40,38 @@ OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all fi
     Feature.FREE_RIGID: {"rest_error": None},
     Feature.TURN: {"rest_error": None},
     Feature.CONNECTED: {"attributes": "all"},
+    Feature.SIDES: {"attributes": "all"},
     Feature.ATTRIBUTES: {"attributes": "all"},
     Feature.JOINS: {"segment_frames": SHORT_SEGMENT},
-    Feature.STRAIGHT: {"segment_frames": SHORT_SEGMENT},
     Feature.HOST: {"host_rest": True},
 }
 # Options of the file without a feature that no search omits.
 OPTIONS_WITHOUT: Mapping[Feature, dict[str, Any]] = {Feature.HOST: {}, Feature.ATTRIBUTES: {}}
-OTHERS = {  # Features that no encoder leaves out; measured by one that was changed for it.
-    "sides": "open sides as guesses of faces",
-    "adaptive": "adaptive vertices of rest poses",
+LEAST = 3.0  # Per cent that a feature has to save on clips of MAKERS makers.
+MAKERS = 2  # Makers of clips that a feature without another use has to serve.
+GONE = {  # Features that the format had, and that the figures spoke against.
+    "loose": "a search for loose branches",
+    "lattice": "lattice points of predicted motion",
+    "straight": "waves that end in straight lines",
 }
-LEAST = 1.0  # Per cent that a feature has to save on some file.
 LEAST_BYTES = 500  # Smallest file in the table: a few bytes of smaller ones are many per cent.
 
 NOTE = f"""
 How many per cent larger files are without the feature: the mean of all files, the mean of those that use it, the least
-and the most. A file that does not use a feature counts as 0; below 0 the search ends in a smaller file without. Files
-have no attributes, a rest pose of the bound and, unless they are named as such, no layers. Those for
-{Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value} have rest poses that keep faces, those for
-{Feature.CONNECTED.value}, {OTHERS["sides"]} and {Feature.ATTRIBUTES.value} all attributes, those for
-{Feature.JOINS.value} and {Feature.STRAIGHT.value} segments of {SHORT_SEGMENT} frames. Files below {LEAST_BYTES} bytes,
-of which a byte is many per cent, are left out. What saves less than {LEAST:g} % everywhere is marked.
-"""
-
-SOURCES = """
-Clips that `python -m bench data` does not make were given by their paths: `leaves_373x121f`; `growing_front`, the
-sample tree along whose branches a front runs, what it has not reached standing at its tip; `sample_loop`, the sample
-with 20 frames of its end blended into its start; `bean_8_days`, a bean plant that the Helios simulator grew; `utm`, a
-scanned stem in UTM coordinates; `mj_1k_200f`, a tree of 1,000 rigid links on hinges in wind.
+and the most; makers: of how many makers a clip is {LEAST:g} % larger or more. A file that does not use a feature counts
+as 0; below 0 the search ends in a smaller file without. Files have no attributes, a rest pose of the bound and, unless
+they are named as such, no layers. Those for {Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value}
+have rest poses that keep faces, those for {Feature.CONNECTED.value}, {Feature.SIDES.value} and
+{Feature.ATTRIBUTES.value} all attributes, those for {Feature.JOINS.value} and {GONE["straight"]} segments of
+{SHORT_SEGMENT} frames; where several are left out at once, all of these. Files below {LEAST_BYTES} bytes, of which a
+byte is many per cent, are left out. A feature stays that serves clips of {MAKERS} makers, or a use that bytes do not
+judge.
 """
 
 NOT_JUDGED = """
-Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, and rigid
-parts, which keep the shape of faces. Not to be left out by an encoder alone: modes of a free beam for maps, gaps in
+Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, rigid parts
+and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0 alone, by which the
+first picture comes early. Not to be left out by an encoder alone: modes of a free beam for maps, gaps in
 bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """
 
@@ -136,8 +135,9 @@ class _Files:
         self.broken: list[str] = []
 
     def sizes(self, features: tuple[Feature, ...]) -> tuple[int, int]:
-        """Return the bytes with some features, by the options of the first one, and without them."""
-        feature, options = features[0], OPTIONS.get(features[0], {})
+        """Return the bytes with some features, by the options of all of them, and without them."""
+        feature = features[0]
+        options = {name: value for each in features for name, value in OPTIONS.get(each, {}).items()}
         if self._polygons is None and "rest_error" in options:
             options = {}
         plan, size = self._with_all(options)
@@ -171,15 +171,17 @@ class _Files:
         of_all = {
             Feature.HOST: is_host,
             Feature.ATTRIBUTES: bool(self._clip.attributes) or self._polygons is not None,
+            Feature.SIDES: self._polygons is not None,
+            Feature.ADAPTIVE: bool(settings.lags.any()) or settings.connected_rest,
             Feature.CONNECTED: settings.connected_rest,
             Feature.COPIES: settings.shape_of is not None,
             Feature.REPEATS: bool(np.any(plan.seen.repeats)),
-            Feature.PREDICTED: choice.predicted is not None,
+            Feature.PREDICTED: choice.predicted,
         }
         if feature in of_all:
             return of_all[feature]
-        if choice.predicted is not None:
-            return feature is Feature.LATTICE and choice.predicted
+        if choice.predicted:
+            return False
         learned = any(any(own.learned_bases) for own in both)
         return {
             Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
@@ -190,7 +192,6 @@ class _Files:
             Feature.SHEETS: bool((settings.forms == SHEET).any()),
             Feature.RINGS: bool((settings.forms > SHEET).any()),
             Feature.STILL: settings.still,
-            Feature.LOOSE: bool(settings.loose.any()),
             Feature.RIGID: bool(settings.rigid.any()),
             Feature.FREE_RIGID: settings.free_rigid,
             Feature.TURN: settings.turn_step > 0,
@@ -199,7 +200,6 @@ class _Files:
             Feature.REFINED_REST: layered,
             Feature.WIDE: True,
             Feature.JOINS: plan.segment_count > 1,
-            Feature.STRAIGHT: settings.is_straight,
             Feature.PERIODIC: settings.periodic,
         }.get(feature, False)
 
@@ -207,13 +207,16 @@ class _Files:
 def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each feature that was measured, in per cent of the bytes with it."""
     growth: dict[str, dict[str, float]] = {}
+    makers: dict[str, set[str]] = {}
     for own in sizes:
         if own["with"] < LEAST_BYTES:
             continue
         name = f"`{own['clip']}` at {own['bound']:g}" + (" in layers" if own["ladder"] else "")
-        growth.setdefault(own["feature"], {})[name] = 100 * (own["without"] / own["with"] - 1)
+        value = 100 * (own["without"] / own["with"] - 1)
+        growth.setdefault(own["feature"], {})[name] = value
+        makers.setdefault(own["feature"], set()).update({_maker(own["clip"])} if value >= LEAST else ())
     rows = []
-    titles = {feature.name.lower(): feature.value for feature in Feature} | OTHERS
+    titles = {feature.name.lower(): feature.value for feature in Feature} | GONE
     for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):
         values = growth[name]
         used, most = [value for value in values.values() if value], max(values, key=lambda file: values[file])
@@ -227,10 +230,15 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "least %": _rounded(min(values.values())),
                 "most %": _rounded(values[most]),
                 "most of": most if values[most] > 0 else "",
-                f"below {LEAST:g} %": "" if values[most] >= LEAST else "x",
+                "makers": len(makers[name]),
             }
         )
     return rows
+
+
+def _maker(clip: str) -> str:
+    """Return the program that made a clip, or the clip's name if it is none of others."""
+    return PROGRAMS[CLIPS[clip].program][0] if clip in CLIPS else clip
 
 
 def _rounded(value: float) -> str:
@@ -241,7 +249,7 @@ def table_text(contents: Mapping[str, Any]) -> str:
     """Return the table of spec/rationale.md: Markdown, with the clips that were measured below."""
     sizes = contents["sizes"]
     rows = summary(sizes)
-    lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|---|"] if rows else []
+    lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|--:|"] if rows else []
     lines += ["| " + " | ".join("-" if cell is None else str(cell) for cell in row.values()) + " |" for row in rows]
     files: dict[str, list[str]] = {}
     for own in sizes:
@@ -253,5 +261,5 @@ def table_text(contents: Mapping[str, Any]) -> str:
             bounds.append(name)
     clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
     made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
-    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", made_by, SOURCES, NOTE, NOT_JUDGED)]
+    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", made_by, NOTE, NOT_JUDGED)]
     return "\n\n".join(["\n".join(lines), *paragraphs]) + "\n"

@@ -114,7 +114,7 @@ def scripted_signed(original: Callable, coder, model, c, sign=None):
     coder.decisions.extend(magnitude_bits(abs(value), 30))
     if original(coder, model, c):
         coder.decisions.append(value < 0)
-        rules.code_sign(coder, sign)
+        coder.raw_bit() if sign is None else coder.bit(sign)
     return value
 
 
@@ -582,16 +582,16 @@ def clip_entry(
     return head + name + struct.pack(f"<{len(seams or ())}f", *seams or ())
 
 
-def steady_time(first: float = 0.0, step: float = 0.25, method: int = 0) -> bytes:
-    return steady_times((first, step), method=method)
+def steady_time(first: float = 0.0, step: float = 0.25) -> bytes:
+    return steady_times((first, step))
 
 
-def steady_times(*clips: tuple[float, float], method: int = 0) -> bytes:
+def steady_times(*clips: tuple[float, float]) -> bytes:
     """First and Step of each clip."""
-    return bytes([method]) + b"".join(struct.pack("<dd", first, step) for first, step in clips)
+    return bytes(1) + b"".join(struct.pack("<dd", first, step) for first, step in clips)
 
 
-def whole_rates(*rates: int, method: int = 3) -> bytes:
+def whole_rates(*rates: int, method: int = 1) -> bytes:
     """Rate of each clip."""
     return bytes([method]) + b"".join(struct.pack("<H", rate) for rate in rates)
 
@@ -604,11 +604,11 @@ def stems_head(
     step: float = 0.125, rotation: int = 0, kind: int = 0, rank: int = 0, basis: bytes = b"", base: int = 255
 ) -> bytes:
     head = struct.pack("<fBB", step, rotation, kind)
-    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if kind > 1 else head
+    return head + struct.pack("<HBI", rank, base, len(basis)) + basis if kind > 0 else head
 
 
-def predicted_head(step: float = 0.0625, lattice: int = 0) -> bytes:
-    return struct.pack("<fB", step, lattice)
+def predicted_head(step: float = 0.0625) -> bytes:
+    return struct.pack("<f", step)
 
 
 def basis_stream(rows: list[list[int]]) -> bytes:

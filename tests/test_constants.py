@@ -41,7 +41,7 @@ C = c_constants("include/ath.h", "bits/format.h", "model/motion.h", "container/c
 def js_constants(path: str) -> dict[str, int]:
     """Integers that are declared at the top of a module."""
     code = (VIEWER / path).read_text("utf-8")
-    lines = re.findall(r"^const ((?:[A-Z_]+ = (?:0x)?[0-9a-f]+(?:, )?)+);", code, flags=re.M)
+    lines = re.findall(r"^(?:export )?const ((?:[A-Z_]+ = (?:0x)?[0-9a-f]+(?:, )?)+);", code, flags=re.M)
     return {name: int(value, 0) for line in lines for name, value in re.findall(r"([A-Z_]+) = (\w+)", line)}
 
 

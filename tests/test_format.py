@@ -71,7 +71,10 @@ def spec() -> ModuleType:
 
 @pytest.mark.parametrize(
     "title, form",
-    [("Header", container._HEADER), ("CORRECTIONS", writing._CORRECTIONS), ("REFINED_REST", writing._REFINED_REST)],
+    [
+        ("Header", container._HEADER),
+        *((title, writing._STEP) for title in ("CORRECTIONS", "REFINED_REST", "Predicted motion")),
+    ],
 )
 def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     names = {"s": "bytes", "B": "u8", "H": "u16", "I": "u32", "Q": "u64", "f": "f32", "d": "f64"}

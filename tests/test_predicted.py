@@ -18,7 +18,6 @@ from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, pl
 import athcodec
 from athcodec import encoding
 from athcodec.encoding import search
-from athcodec.encoding.choices import prediction
 from athcodec.metrics import SmoothnessMeter
 from bench.odd.growing import unfolding_leaves
 from spec.document import File
@@ -189,14 +188,6 @@ def test_growth_does_not_twitch_where_bytes_are_spent_on_it(fraction, most, shar
     with athcodec.open(tmp_path / "a.ath") as decoder:
         meter.add(clip.block(0, clip.frame_count), decoder.positions())
     assert meter.max_error_acceleration <= most and meter.worst_share <= share
-
-
-@SLOW
-def test_points_of_the_lattice_tell_noise_in_fewer_bits_than_cubes(monkeypatch, tmp_path):
-    clip = ODD["noise"]()
-    found = size(clip, tmp_path, 1e-4)
-    monkeypatch.setattr(prediction, "LATTICE", prediction.CUBES)
-    assert 8 * (size(clip, tmp_path, 1e-4).bytes - found.bytes) >= 0.6 * clip.frame_count * clip.vertex_count
 
 
 def test_frames_that_are_there_already_cost_nothing(always, tmp_path):

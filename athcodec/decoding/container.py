@@ -23,9 +23,9 @@ from athcodec.errors import BadChunk, LimitExceeded
 from athcodec.options import set_numbers
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR, FEATURES = 0, 14, 0
+MAJOR, MINOR, FEATURES = 0, 15, 0
 NO_LEVEL = 255
-STEM_WAVES, NODE_WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(4)  # Values of Basis.
+WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(3)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
 OPTIONAL, KIND_ID = 0x8000, 0x7FFF
 FIRST_PRIVATE = 0xC000  # The first kind of chunk that other programs may define.

@@ -19,6 +19,7 @@ from athcodec.encoding import polygons, streams, writing
 from athcodec.encoding.choices.levels import chosen_levels
 from athcodec.encoding.coded_clip import CodedClip, host_rest, stored_polygons
 from athcodec.encoding.decided import CodedSegment, Decided
+from athcodec.encoding.features import Feature
 from athcodec.encoding.file_options import EncodingOptions
 from athcodec.encoding.layers import layer_chunks
 from athcodec.encoding.progress import Progress, silent
@@ -111,7 +112,7 @@ class FileAssembly:
             self.clip.dtype == np.float64,
             len(self.clip.motion.clip_range_frames),
             len(layers.each),
-            decided.choice.predicted is not None,
+            decided.choice.predicted,
             stages=tuple(stages),
             joins=joins,
             repeats=decided.source.repeats,
@@ -181,7 +182,7 @@ class FileAssembly:
             store.add(ct.METADATA, writing.pack_metadata(metadata))
         faces = stored_polygons(source, self.options)
         if faces is not None:
-            store.add(ct.FACES, polygons.pack(faces, places))
+            store.add(ct.FACES, polygons.pack(faces, places, Feature.SIDES not in self.options.without))
         if self._keeps_static and source.edges is not None:
             store.add(ct.EDGES, self._edges(source.edges))
 
@@ -247,7 +248,7 @@ class FileAssembly:
         sizes["HEADER"] = result.header.file_length - sum(sizes.values())
         settings, bound = decided.choice.settings, decided.choice.settings.bound
         choices = {
-            "motion": "transformed" if decided.choice.predicted is None else "predicted",
+            "motion": "predicted" if decided.choice.predicted else "transformed",
             "step_ratio": settings.step / bound,
             "rest_step_ratio": settings.rest_step / bound,
             "still": settings.still,

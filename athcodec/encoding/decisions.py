@@ -159,10 +159,10 @@ class FileDecisions:
         bound = choice.settings.bound
         split = self._split(bound, thresholds)
         source = self.source if split is None else split.marked
-        if choice.predicted is None and source.segment_frames != self.options.segment_frames:
+        if not choice.predicted and source.segment_frames != self.options.segment_frames:
             source = source.in_segments(self.options.segment_frames)
         decisions = dataclasses.replace(self, source=source)
-        if choice.predicted is not None:
+        if choice.predicted:
             return decisions._predicted(choice)
         ath = self.seen.ath(thresholds)
         return decisions._layered(ath, choice, CodedPrelude(source.about(choice.reference), ath, choice.settings))
@@ -327,7 +327,7 @@ class FileDecisions:
 
     def draft(self, decided: Decided) -> Draft:
         options = self.options
-        if decided.choice.predicted is None:
+        if not decided.choice.predicted:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
         if len(decided.layers.each) == 1:
             options = dataclasses.replace(options, ladder=())

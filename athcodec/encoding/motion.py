@@ -41,7 +41,7 @@ from athcodec.decoding import container as ct
 from athcodec.decoding.container import from_short_float
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
-STEM_ROOT, NODE_ROOT = -1, -2  # Roots of streams in waves that are not learned (core/model/motion.h).
+NO_ROOT = -1  # Root of streams without a learned basis (core/model/motion.h).
 RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
 PERIOD = 128  # Vertices from one run of a sample to the next.
 LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
@@ -303,7 +303,7 @@ class LevelStream:
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves, by the root.
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces; 0: any.
-    root: int = STEM_ROOT  # Level of the first stream whose learned basis begins with the same rows.
+    root: int = NO_ROOT  # Level of the first stream whose learned basis begins with the same rows.
 
 
 class SegmentMotion:
@@ -355,9 +355,7 @@ class SegmentMotion:
 
     def waves_of(self, stream: LevelStream) -> np.ndarray:
         """Return the waves of a stream, or what is learned in their place, (rank, frames)."""
-        if stream.temporal is not None:
-            return stream.temporal
-        return self.node_waves if stream.root == NODE_ROOT else self.waves
+        return self.waves if stream.temporal is None else stream.temporal
 
     def _bind(self) -> None:
         self._c_streams = (Stream * len(self.streams))()

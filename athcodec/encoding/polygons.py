@@ -19,8 +19,9 @@ MESH_PARTS = 3  # Calls of the core that build a mesh.
 PLACES_IN_ROWS = 1, 3, 4, 6  # Columns of PLACES that are tried: faces with vertices of their own have 3 or 4 corners.
 
 
-def pack(polygons: Polygons, places: Places) -> bytes:
-    """Return FACES or EDGES. Raises ClipError if no reader would accept that many."""
+def pack(polygons: Polygons, places: Places, has_sides: bool = True) -> bytes:
+    """Return FACES or EDGES. Raises ClipError if no reader would accept that many. has_sides: guesses of open sides are
+    used."""
     count = polygons.face_count + len(polygons.corners)
     if count > ct.Limits.corners:
         raise ClipError(f"faces: got {count} faces and corners; the limit is {ct.Limits.corners}")
@@ -34,6 +35,7 @@ def pack(polygons: Polygons, places: Places) -> bytes:
         place_count,
         None if polygons.counts is None else address(polygons.counts, np.uint32, polygons.face_count),
         address(polygons.corners, np.int32, len(polygons.corners)),
+        has_sides,
         model=_memory(vertex_count, place_count),
     )
     return writing.pack_polygons(polygons.shape, stream)

@@ -29,8 +29,7 @@ CORRECTION_STEP = 1.12  # Step of corrections, in limits. Rounding leaves at mos
 LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)
 MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
 END_WEIGHTS = (5.0, 1.0, 0.25)
-# If the velocity changes by less than STRAIGHT bounds in a usual frame, every bend at an end is seen. Rows then end in
-# straight lines, in waves of that kind.
+# If the velocity changes by less than STRAIGHT bounds in a usual frame, every bend at an end is seen.
 STRAIGHT, STRAIGHT_END_WEIGHTS = 0.05, (20.0, 600.0, 50.0)
 
 

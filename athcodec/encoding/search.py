@@ -361,7 +361,6 @@ class Search:
             lags=start.lags,
             connected_rest=start.connected_rest,
             shape_of=start.shape_of,
-            loose=start.loose,
             learned_pieces=None,
             learned_coded=False,
         )

@@ -22,17 +22,7 @@ from athcodec.encoding import streams, writing
 from athcodec.encoding.coded_clip import CodedClip
 from athcodec.encoding.features import Feature
 from athcodec.encoding.file_options import EncodingOptions
-from athcodec.encoding.motion import (
-    NODE_ROOT,
-    STEM_ROOT,
-    LearnedModes,
-    LevelStream,
-    Plan,
-    PlanSample,
-    SegmentMotion,
-    gather,
-    zeros,
-)
+from athcodec.encoding.motion import LearnedModes, LevelStream, Plan, PlanSample, SegmentMotion, gather, zeros
 from athcodec.encoding.polygons import Mesh
 from athcodec.encoding.segmentation import split_segments
 from athcodec.encoding.settings import BEAM, Settings
@@ -240,7 +230,7 @@ class Source:
     @cached_property
     def mesh(self) -> Mesh | None:
         """Faces that rest poses may go by."""
-        if Feature.CONNECTED in self.without:
+        if {Feature.CONNECTED, Feature.ADAPTIVE} & self.without:  # Connected vertices are adaptive, too.
             return None
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 
@@ -374,10 +364,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
     branches["flags"] = (
-        SHEET * (settings.forms != BEAM)
-        + LOOSE * (settings.loose | free)
-        + WHOLE * ath.whole_branches()
-        + STILL * settings.still
+        SHEET * (settings.forms != BEAM) + LOOSE * free + WHOLE * ath.whole_branches() + STILL * settings.still
     )
     branches["rigid"] = settings.rigid
     branches["lag"], branches["detail"] = settings.lags, settings.details
@@ -396,7 +383,6 @@ def plain_settings(source: Source, levels: int, bound: float, step: float, rest_
         level_steps=np.ones(levels),
         rest_step=qz.single(rest_step),
         forms=none,
-        loose=none > 0,
         rigid=none,
         lags=none,
         details=finer_than(source.details, bound),
@@ -544,8 +530,7 @@ def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]
     level_streams = []
     for level in range(levels):
         factor = float(settings.rotation_step_factors[level])
-        root = NODE_ROOT if settings.is_straight else STEM_ROOT
-        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step, root=root)
+        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step)
         if level in bases:
             stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
         level_streams.append(stream)
@@ -708,10 +693,7 @@ def analyse(
 def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
     """Return the head of the stems of a level, whose time basis is among `bases` if it is learned."""
     head = writing.StemsHead(
-        settings.step_of(level),
-        settings.rotation_step_factors[level],
-        turn=qz.turn_of(settings.turn_step),
-        basis_kind=ct.NODE_WAVES if settings.is_straight else ct.STEM_WAVES,
+        settings.step_of(level), settings.rotation_step_factors[level], turn=qz.turn_of(settings.turn_step)
     )
     if level in bases:
         basis = bases[level]

@@ -44,7 +44,7 @@ class SegmentCoder:
             frames = self._positions(block.pop()) if block else (source.positions(index), self._exact(index))
             return index, self._motion(index, *frames, before, after)
 
-        if decided.choice.predicted is not None:
+        if decided.choice.predicted:
             return pool.ordered(predict, ((index, [source.block(index)]) for index in segments), at_once)
         order = self._in_order(source, segments)
         begun = pool.ordered(begin, self._linked(order), at_once - 1)

@@ -23,7 +23,7 @@ OF_SAMPLE = (
     "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic "
     "learned_coded"
 ).split()
-OF_BRANCHES = "forms loose lags details rigid".split()  # Arrays with an entry for each branch.
+OF_BRANCHES = "forms lags details rigid".split()  # Arrays with an entry for each branch.
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,6 @@ class Settings:
     level_steps: np.ndarray  # (levels,) factors on the step.
     rest_step: float
     forms: np.ndarray  # (B,) int32: BEAM, SHEET, or the vertices of each ring of a tube.
-    loose: np.ndarray  # (B,) bool
     rigid: np.ndarray  # (B,) int32: the number of layers, from the first on, in which a branch is rigid.
     lags: np.ndarray  # (B,) int32
     details: np.ndarray  # (B,) int32
@@ -87,17 +86,7 @@ class Settings:
     @property
     def rounding(self) -> Rounding:
         """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, qz.end_weights(self._relative_change))
-
-    @property
-    def _relative_change(self) -> float:
-        """The change of velocity in a usual frame, in bounds."""
-        return self.usual_change / float(np.min(self.limit))
-
-    @property
-    def is_straight(self) -> bool:
-        """Whether rows end in straight lines, as modes of a beam do, and not in parabolas."""
-        return self._relative_change < qz.STRAIGHT and Feature.STRAIGHT not in self.without
+        return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
 
     def step_of(self, level: int) -> float:
         """Return the step of the stems of a level."""
@@ -144,6 +133,6 @@ class Choice:
     first_layer: Settings
     learned_modes: LearnedModes | None  # Learned modes of the last layer.
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
-    predicted: bool | None = None  # Whether vertices are points of the lattice, where motion is predicted.
+    predicted: bool = False  # Whether motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.
     untried: tuple[str, ...] = ()  # What was left out of the search for these, in words.

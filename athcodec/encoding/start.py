@@ -11,7 +11,7 @@ import numpy as np
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.choices import rest
 from athcodec.encoding.choices.forms import first_forms
-from athcodec.encoding.choices.rigid import first_rigid, loose_branches
+from athcodec.encoding.choices.rigid import first_rigid
 from athcodec.encoding.choices.rotations import first_rotations
 from athcodec.encoding.layers import layered_poses_size
 from athcodec.encoding.segment import Source, plain_settings, poses_size
@@ -35,7 +35,6 @@ def first_settings(
     settings = replace(
         settings,
         forms=first_forms(source, samples),
-        loose=loose_branches(source, samples[-1].positions),
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,

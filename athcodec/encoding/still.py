@@ -69,7 +69,7 @@ class SplitSource:
 
     def _choice(self, chosen: Choice, bound: float) -> Choice:
         stillness = self._still_settings(bound)
-        is_predicted = chosen.predicted is not None
+        is_predicted = chosen.predicted
         settings = self._settings(chosen.settings, stillness, is_predicted)
         connected = [replace(settings, connected_rest=flag) for flag in (False, True)]
         if chosen.settings.connected_rest != stillness.connected_rest:

@@ -216,7 +216,7 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 
 
 def encode_predicted(
-    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, lattice: bool, dtype
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Code predicted motion of a segment; return it and the positions that it decodes to, (T, N, 3) of `dtype`. None:
     steps so large cannot keep the limits. source: (T, N, 3) float64 less the origin; limits: (N,)."""
@@ -235,7 +235,6 @@ def encode_predicted(
             frames,
             positions.dtype == np.float64,
             step,
-            lattice,
             address(source, np.float64, source.size),
             address(limits, np.float64, vertices),
             positions.ctypes.data,

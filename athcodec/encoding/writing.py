@@ -21,9 +21,8 @@ from athcodec.decoding.container import (
     ARRAY_KINDS,
     KIND_ID,
     NO_LEVEL,
-    NODE_WAVES,
     ROTATION_FACTORS,
-    STEM_WAVES,
+    WAVES,
     Chunk,
     Header,
     Limits,
@@ -46,16 +45,15 @@ _REST = struct.Struct("<B3ff")
 _SOURCE_REST = struct.Struct("<Bf")
 _MESH_CHECKSUM = struct.Struct("<II")
 _TIME = struct.Struct("<B")
+BY_STEP, BY_RATE, ONE_BY_ONE = range(3)  # Values of Method of TIME.
 _STEADY = struct.Struct("<dd")
 _RATE = struct.Struct("<H")
 _CLIP = struct.Struct("<IIBB")
 _STEMS = struct.Struct("<fBB")
 _BASIS = struct.Struct("<HBI")
-_CORRECTIONS = struct.Struct("<f")
 _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
-_REFINED_REST = struct.Struct("<f")
-_PREDICTED = struct.Struct("<fB")
+_STEP = struct.Struct("<f")  # Of REFINED_REST, PREDICTED and CORRECTIONS.
 _POLYGONS = struct.Struct("<II")
 _IS_MIXED, _IS_DERIVED = 8, 16  # Bits of the first byte of FACES and EDGES.
 
@@ -140,34 +138,27 @@ def mesh_checksum(mesh: np.ndarray) -> bytes:
 
 def pack_steady_time(*times: np.ndarray) -> bytes | None:
     """Return TIME by the rule that gives the very same times in seconds, (T,) for each clip; None: none does."""
-    for method, code in ((3, _RATE), (4, _RATE), (0, _STEADY), (1, _STEADY)):
-        rules = [_steady_rule(method, time) for time in times]
+    for method, code, find in ((BY_RATE, _RATE, _rate_of), (BY_STEP, _STEADY, _step_of)):
+        rules = [find(time) for time in times]
         if None not in rules:
             return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
     return None
 
 
-def _steady_rule(method: int, time: np.ndarray) -> tuple[float, ...] | None:
-    """Return what the method stores if it gives these times."""
-    if method < 2:
-        step = _steady_step(method, time)
-        return None if step is None else (float(time[0]), step)
+def _rate_of(time: np.ndarray) -> tuple[int] | None:
+    """Return the whole rate that gives these times from 0 on."""
     rate = round(1 / float(time[1])) if len(time) > 1 and float(time[1]) > 1e-5 else 1
-    index = np.arange(len(time))
-    same = 0 < rate < 65536 and ((index / rate if method == 3 else index * (1 / rate)) == time).all()
-    return (rate,) if same else None
+    return (rate,) if 0 < rate < 65536 and (np.arange(len(time)) / rate == time).all() else None
 
 
-def _steady_step(method: int, time: np.ndarray) -> float | None:
-    if len(time) == 1:
-        return 1.0
+def _step_of(time: np.ndarray) -> tuple[float, float] | None:
+    """Return the first time and the step that give these times."""
     index, first = np.arange(len(time)), float(time[0])
+    if len(time) == 1:
+        return first, 1.0
     steps = {(float(time[-1]) - first) / (len(time) - 1), float(time[1]) - first}
-    if method == 1:
-        steps = {round(1 / step * 1000) / 1000 for step in steps if step > 1e-300} - {0.0}
     with np.errstate(over="ignore", invalid="ignore"):  # A step that overflows cannot give the times back.
-        fit = (step for step in steps if (first + (index / step if method else index * step) == time).all())
-        return next(fit, None)
+        return next(((first, step) for step in steps if (first + index * step == time).all()), None)
 
 
 def pack_clips(
@@ -189,7 +180,7 @@ def pack_clips(
 
 
 def pack_time(stream: bytes) -> bytes:
-    return _TIME.pack(2) + stream
+    return _TIME.pack(ONE_BY_ONE) + stream
 
 
 @dataclass
@@ -199,7 +190,7 @@ class StemsHead:
 
     step: float
     rotation_step_factor: int
-    basis_kind: int = STEM_WAVES
+    basis_kind: int = WAVES
     rank: int = 0
     basis: bytes = b""
     base: int = NO_LEVEL
@@ -209,7 +200,7 @@ class StemsHead:
 def pack_stems(head: StemsHead, stream: bytes) -> bytes:
     rotation = ROTATION_FACTORS.index(head.rotation_step_factor) | head.turn << 4
     data = _STEMS.pack(head.step, rotation, head.basis_kind)
-    if head.basis_kind > NODE_WAVES:
+    if head.basis_kind != WAVES:
         data += _BASIS.pack(head.rank, head.base, len(head.basis)) + head.basis
     return data + stream
 
@@ -225,15 +216,15 @@ def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
 
 
 def pack_refined_rest(step: float, stream: bytes) -> bytes:
-    return _REFINED_REST.pack(step) + stream
+    return _STEP.pack(step) + stream
 
 
-def pack_predicted(step: float, lattice: bool, stream: bytes) -> bytes:
-    return _PREDICTED.pack(step, lattice) + stream
+def pack_predicted(step: float, stream: bytes) -> bytes:
+    return _STEP.pack(step) + stream
 
 
 def pack_corrections(step: float, stream: bytes) -> bytes:
-    return _CORRECTIONS.pack(step) + stream
+    return _STEP.pack(step) + stream
 
 
 def _compress(array: np.ndarray) -> bytes:

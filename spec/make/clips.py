@@ -78,9 +78,7 @@ for title, make in {
     "clips-time: First and Step of each clip: the second begins before the first and overlaps it": lambda: two_clips(
         time=steady_times((10.0, 0.5), (-1.0, 0.25))
     ),
-    "clips-time-rate: First and rate of each clip, which all begin at 0": lambda: two_clips(
-        time=steady_times((0.0, 24.0), (0.0, 30.0), method=1)
-    ),
+    "clips-time-rate: a rate of each clip, which all begin at 0": lambda: two_clips(time=whole_rates(24, 30)),
     "clips-time-uneven: times one by one, that descend and repeat from clip to clip": lambda: two_clips(
         time=uneven_time(0.0, 0.5, 2.0, -1.0, 0.5, 0.75, 2.0)
     ),
@@ -99,8 +97,8 @@ for title, make in {
             30,
             clips=(CALM, STORM),
             heads={
-                (1, 0): stems_head(0.5, 2, 3, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
-                (1, 1): stems_head(0.001, 0, 3, 2, basis_stream([[32, 64], [8192, -8192]])),
+                (1, 0): stems_head(0.5, 2, 2, 3, basis_stream([[6400, -6400, 6400], [8192, 0, -8192], [64, 128, 192]])),
+                (1, 1): stems_head(0.001, 0, 2, 2, basis_stream([[32, 64], [8192, -8192]])),
                 (2, 2): stems_head(0.25, 1),
             },
         )

@@ -34,10 +34,10 @@ def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
 
 
 SHARED_BASES = {
-    1: stems_head(0.5, 1, 3, 1, basis_stream([[4928, -5760]])),
-    2: stems_head(0.5, 1, 3, 1, base=1),
-    3: stems_head(0.125, 2, 3, 2, basis_stream([[-4800, 8192]]), base=2),
-    4: stems_head(0.03125, 2, 3, 2, base=3),
+    1: stems_head(0.5, 1, 2, 1, basis_stream([[4928, -5760]])),
+    2: stems_head(0.5, 1, 2, 1, base=1),
+    3: stems_head(0.125, 2, 2, 2, basis_stream([[-4800, 8192]]), base=2),
+    4: stems_head(0.03125, 2, 2, 2, base=3),
 }
 BEAMS = stems_of("-1 36 lag=0, 0 5 20 lag=0, 0 1 35 lag=0, 0 40 7 SHEET lag=2, -1 1 lag=0")
 LEVEL_1_REST = {(REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
@@ -55,7 +55,7 @@ def learned(*levels: int) -> dict:
     random = np.random.default_rng(5)
     return LAYER_HEADS | {
         level: stems_head(
-            0.5 / 4 ** max(level - 2, 0), level % 3, 3, 1 + level % 2, basis_by_chance(random, 1 + level % 2, 2)
+            0.5 / 4 ** max(level - 2, 0), level % 3, 2, 1 + level % 2, basis_by_chance(random, 1 + level % 2, 2)
         )
         for level in levels
     }
@@ -127,7 +127,7 @@ def stiff(seed: int, **fields) -> Plant:
     return plant
 
 
-LAST_BASIS = 3, 2, basis_stream([[4800, -3200], [1232, 8176]])
+LAST_BASIS = 2, 2, basis_stream([[4800, -3200], [1232, 8176]])
 HALF_TURNS = (16, 0, 0), (0, 16, 0), (0, 0, 16), (16, 0, 1), (0, -16, 3)
 
 
@@ -155,7 +155,7 @@ for title, make in {
     "with further rows": layered(heads=LAYER_HEADS | SHARED_BASES),
     "layers-learned-apart: two roots of learned time bases: predictions of pieces of level 1 alone are of all "
     "frequencies": layered(
-        heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 1, 3, 1, basis_stream([[192, 6336]]))}
+        heads=LAYER_HEADS | SHARED_BASES | {2: stems_head(0.5, 1, 2, 1, basis_stream([[192, 6336]]))}
     ),
     "layers-rigid: branches that move as they are in the first layers": refinements(
         RIGID,
@@ -382,9 +382,9 @@ for title, make in {
         segments=2,
         layers=2,
         heads={
-            0: stems_head(0.5, 0, 3, 2, IMPULSES),
-            (2, 0): stems_head(0.25, 0, 3, 2, IMPULSES),
-            (2, 1): stems_head(1.0, 0, 3, 2, base=0),
+            0: stems_head(0.5, 0, 2, 2, IMPULSES),
+            (2, 0): stems_head(0.25, 0, 2, 2, IMPULSES),
+            (2, 1): stems_head(1.0, 0, 2, 2, base=0),
         },
         scripts={(STEMS, 0): row((1, 0, -1), (-1, 2, 3)), (STEMS, 2): row()},
     ),
@@ -396,7 +396,7 @@ for title, make in {
         is_float64=True,
         rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
         heads={
-            0: stems_head(8.0, 4 << 4, 3, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
+            0: stems_head(8.0, 4 << 4, 2, 5, basis_stream([[8192 * (k == t) for t in range(5)] for k in range(5)])),
             2: stems_head(0.25),
         },
         scripts={
@@ -424,7 +424,7 @@ for title, make in {
         points=[[0, 0, 0], [3, 0, 0], [1, 4, 0]],
         heads={0: stems_head(0.125)}
         | {
-            (2, s): stems_head(0.125 / ratio, 0, 3, 1, basis_stream([[int(size * 8192)] * 2]))
+            (2, s): stems_head(0.125 / ratio, 0, 2, 1, basis_stream([[int(size * 8192)] * 2]))
             for s, (ratio, size) in enumerate(HALVED_RATIOS)
         },
         scripts={(STEMS, 0): [*row(), *row((1, -1, 1))]}

@@ -42,24 +42,10 @@ def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.
     return frame_of(stems, of_vertex, lambda: followed_at(chance.random.random() / follow))
 
 
-def frame_points(stems: list[Stem], seed: int) -> list[int]:
-    """The same of points of the lattice: integers, or halves of even ones, or signs and halves of odd ones."""
-    chance = Chance(seed, large=12)
-
-    def of_vertex() -> list[int]:
-        if not chance.answer("bit", 1):
-            return [0]
-        first = chance.answer("signed", 0)
-        asked = ("bit", "unsigned") * 2 if first % 2 else ("signed",) * 2
-        return [1, first, *(chance.answer(what, 0) for what in asked)]
-
-    return frame_of(stems, of_vertex, lambda: followed_at(chance.random.random() / 0.3))
-
-
-def predicted(stems: list[Stem], frames: list, segments: int = 1, lattice: int = 0, **fields) -> Plant:
+def predicted(stems: list[Stem], frames: list, segments: int = 1, **fields) -> Plant:
     """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
     scripts = {(PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
-    fields = {"predicted": predicted_head(lattice=lattice)} | fields
+    fields = {"predicted": predicted_head()} | fields
     fields["scripts"] = scripts | fields.get("scripts", {})
     return Plant(stems, len(frames) * segments, segments, **fields)
 
@@ -147,17 +133,6 @@ for title, make in {
     "predicted-following-huge: what follows leaves the range of binary32, and of binary64": lambda: predicted(
         LONG, swayed(6, 60, LONG, large=30, follow=1.0), predicted=predicted_head(FLOAT_MAX), is_float64=True
     ),
-    "predicted-lattice: vertices are points of the lattice": lambda: predicted(
-        ROOTED, [[0, 1, *frame_points(ROOTED, 30 + t)] for t in range(20)], lattice=1
-    ),
-    "predicted-lattice-huge: the largest points of the lattice, even and odd": lambda: predicted(
-        SINGLE,
-        [
-            [0, 1, 1, -((1 << 30) - 1), 1, (1 << 30) - 1, 0, (1 << 30) - 1],
-            [0, 1, 1, (1 << 30) - 2, (1 << 30) - 1, -((1 << 30) - 1)],
-        ],
-        predicted=predicted_head(FLOAT_MAX, 1),
-    ),
     "predicted-references: frames that are copies of earlier ones, of the rest pose, and coded "
     "about earlier ones": lambda: predicted(
         ROOTED,
@@ -222,8 +197,7 @@ for title, make in {
     invalid(title, make)
 
 for name, reason, content in (
-    ("short", "4 bytes", predicted_head()[:4]),
-    ("lattice-2", "Is_Lattice is 2", predicted_head(lattice=2)),
+    ("short", "3 bytes", predicted_head()[:3]),
     ("step-0", "Step 0", predicted_head(0.0)),
     ("step-nan", "Step is NaN", predicted_head(math.nan)),
     ("left-over", "a byte behind the stream", predicted_head() + b"\1" * 400),

@@ -108,7 +108,7 @@ for title, make in {
         heads={
             (1, 0): stems_head(0.5, 2),
             (1, 1): stems_head(0.001, 0),
-            (2, 1): stems_head(0.25, 1, 3, 2, basis_stream([[6400, -6400, 6400], [8192, 0, -8192]])),
+            (2, 1): stems_head(0.25, 1, 2, 2, basis_stream([[6400, -6400, 6400], [8192, 0, -8192]])),
         },
     ),
     "steps-largest: Step at the end of binary32: infinities and NaN as the arithmetic yields them": lambda: moving(
@@ -142,8 +142,8 @@ for title, make in {
         stems_head() + write(rules.decode_stems, [3], forked_plan(), stems_motion(stems_head(), 2), 1)
     ),
     "frequencies-of-basis: a row codes two frequencies of a learned basis of rank 1": lambda: (
-        basis(1, 3, basis_stream([[64, 128]]))()
-        + write(rules.decode_stems, [2], forked_plan(), stems_motion(basis(1, 3, basis_stream([[64, 128]]))(), 2), 1)
+        basis(1, 2, basis_stream([[64, 128]]))()
+        + write(rules.decode_stems, [2], forked_plan(), stems_motion(basis(1, 2, basis_stream([[64, 128]]))(), 2), 1)
     ),
     "zero-behind: a zero byte behind the stream": lambda: fork().content(STEMS, 1, 0) + b"\0",
 }.items():

@@ -4,8 +4,8 @@ from spec.make.base import *
 from spec.make.clips import two_clips
 
 
-def steady(first: float, step: float, method: int = 0) -> Callable[[], bytes]:
-    return lambda: steady_time(first, step, method)
+def steady(first: float, step: float) -> Callable[[], bytes]:
+    return lambda: steady_time(first, step)
 
 
 def clip_times(title: str, make: Callable[[], bytes]) -> None:
@@ -17,9 +17,8 @@ STEADY = (0.0, 0.25)
 
 
 valid("time-whole-rate: times by a whole rate", lambda: lone(frames=7, time=whole_rates(3)))
-valid("time-whole-step: times by a step that is one over a whole rate", lone, frames=7, time=whole_rates(49, method=4))
 valid("time-largest-rate: Rate 65535", lambda: lone(frames=7, time=whole_rates(65535)))
-valid("time-rate: times by their rate, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 24.0, 1)))
+valid("time-step: times by their step, First below 0", lambda: lone(frames=4, time=steady_time(-2.0, 1 / 24)))
 valid("time-wide: times far from 0, with a Step that just counts", lone, frames=3, time=steady_time(2.0**52, 1.0))
 valid(
     "time-uneven: times one by one, -0.0 and subnormal ones among them",
@@ -27,21 +26,18 @@ valid(
 )
 valid("time-one-uneven: a single time by Method 2", lambda: lone(time=uneven_time(1.5)))
 prelude(TIME, "empty: no bytes", b"")
-prelude(TIME, "method-5: Method 5", lambda: whole_rates(1, method=5))
-for method in (3, 4):
-    prelude(TIME, f"whole-{method}-0: Rate 0 of Method {method}", lambda method=method: whole_rates(0, method=method))
+prelude(TIME, "method-3: Method 3", lambda: whole_rates(1, method=3))
+prelude(TIME, "whole-0: Rate 0", lambda: whole_rates(0))
 prelude(TIME, "whole-short: half of Rate", lambda: whole_rates(2)[:2])
 prelude(TIME, "whole-long: two Rates of one clip", lambda: whole_rates(2, 2))
 prelude(TIME, "short: First and half of Step", lambda: steady_time()[:13])
 prelude(TIME, "long: a byte behind Step", lambda: steady_time() + b"\0")
 for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     prelude(TIME, f"step-{what}: Step is {value}", steady(0.0, value))
-    prelude(TIME, f"rate-{what}: Step of Method 1 is {value}", steady(0.0, value, 1))
 prelude(TIME, "first-nan: First is NaN", steady(NAN, 1.0))
 prelude(TIME, "first-infinite: First is infinite", steady(-INFINITY, 1.0))
 prelude(TIME, "stands-still: Step vanishes beside First", steady(1e30, 1.0))
 prelude(TIME, "overflows: times beyond binary64", steady(0.0, HIGHEST))
-prelude(TIME, "rate-overflows: a rate so low that times are infinite", steady(0.0, TINY, 1))
 prelude(TIME, "equal: a time twice", lambda: uneven_time(0.0, 1.0, 1.0, 2.0))
 prelude(TIME, "descends: a time before the one before", lambda: uneven_time(0.0, 1.0, 2.0, 1.5))
 prelude(TIME, "zeros: -0.0 is not before 0.0", lambda: uneven_time(-0.0, 0.0, 1.0, 2.0))
@@ -62,6 +58,7 @@ invalid(
     "time-of-one-infinite: First of a single frame is infinite",
     lambda: lone().change(TIME, content=steady_time(INFINITY)),
 )
+clip_times("second-rate-0: Rate of the second clip is 0", lambda: whole_rates(24, 0))
 clip_times("of-one-clip: First and Step of one clip of two", lambda: steady_times(STEADY))
 clip_times("of-three-clips: First and Step of three clips where two are", lambda: steady_times(STEADY, STEADY, STEADY))
 clip_times("without-last-step: First of the second clip without its Step", lambda: steady_times(STEADY, STEADY)[:-8])
@@ -73,10 +70,6 @@ for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite"
     clip_times(
         f"second-step-{what}: Step of the second clip is {value}",
         lambda value=value: steady_times(STEADY, (0.0, value)),
-    )
-    clip_times(
-        f"second-rate-{what}: Step of the second clip, by Method 1, is {value}",
-        lambda value=value: steady_times(STEADY, (0.0, value), method=1),
     )
 for title, make in {
     "second-first-nan: First of the second clip is NaN": lambda: steady_times(STEADY, (NAN, 1.0)),

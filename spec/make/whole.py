@@ -24,7 +24,7 @@ def everything() -> Draft:
     vertices = sum(stem.count for stem in EVERYTHING)
     places = [*range(vertices), 2, 0, 2]
     bases = {
-        level: stems_head(0.03 + 0.01 * level, level % 3, 3, rank, basis_by_chance(random, rank, 5))
+        level: stems_head(0.03 + 0.01 * level, level % 3, 2, rank, basis_by_chance(random, rank, 5))
         for level, rank in ((1, 3), (2, 1), (4, 5))
     }
     plant = Plant(

@@ -26,15 +26,6 @@ ATH_INLINE int32_t parity_of(const int32_t point[3], int32_t k)
     return k == 0 ? ANY_INTEGER : point[0] & 1 ? ODD_INTEGER : EVEN_INTEGER;
 }
 
-/* Rounds a value to steps. Fractions of at least `half` round away from 0; 0.5 rounds to the nearest. */
-ATH_INLINE int32_t steps_in(double value, double step, double half)
-{
-    double units = value / step;
-    if (!(units > -1073741823.0)) return -1073741823;
-    if (!(units < 1073741823.0)) return 1073741823;
-    return units < 0.0 ? -(int32_t)(1.0 - half - units) : (int32_t)(1.0 - half + units);
-}
-
 #ifdef ATH_ENCODING
 
 /* Finds the point within the slack that is likely to take the fewest bits, else the nearest point. */
@@ -66,22 +57,15 @@ static void nearest_of_lattice(const double units[3], double slack, const uint32
 
 #endif
 
-/* sign: null if nothing is known of it. */
-ATH_INLINE int code_sign(ath_coder *coder, ath_context *sign, int negative)
-{
-    return sign ? coder_bit(coder, sign, negative) : coder_raw_bit(coder, negative);
-}
-
 /* about: class of the expected magnitude. */
-static int32_t code_integer(ath_coder *coder, lattice_model *model, int32_t parity, int32_t about, ath_context *sign,
-                            int32_t value)
+static int32_t code_integer(ath_coder *coder, lattice_model *model, int32_t parity, int32_t about, int32_t value)
 {
     number_model *numbers = &model->parities[parity];
     int32_t doubled = parity != ANY_INTEGER, odd = parity == ODD_INTEGER, negative = 0;
     if (doubled) about = about > 2 ? about - 2 : 0;
-    if (odd) negative = code_sign(coder, sign, value < 0);
+    if (odd) negative = coder_raw_bit(coder, value < 0);
     uint32_t coded = code_in_class(coder, numbers, about, magnitude_of(value) >> doubled);
-    if (!odd && coded != 0) negative = code_sign(coder, sign, value < 0);
+    if (!odd && coded != 0) negative = coder_raw_bit(coder, value < 0);
     int32_t magnitude = (int32_t)(coded << doubled) + odd;
     return negative ? -magnitude : magnitude;
 }

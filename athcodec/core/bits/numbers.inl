@@ -94,16 +94,28 @@ ATH_INLINE uint32_t code_unsigned(ath_coder *coder, number_model *model, uint32_
     return code_in_class(coder, model, number_class(expected), value);
 }
 
-ATH_INLINE int32_t code_signed_in_class(ath_coder *coder, number_model *model, int32_t about, int32_t value)
+/* sign: null if nothing is known of it. */
+ATH_INLINE int32_t code_signed_in_class(ath_coder *coder, number_model *model, int32_t about, ath_context *sign,
+                                        int32_t value)
 {
     uint32_t magnitude = code_in_class(coder, model, about, magnitude_of(value));
     if (magnitude == 0) return 0;
-    return coder_raw_bit(coder, value < 0) ? -(int32_t)magnitude : (int32_t)magnitude;
+    int negative = sign ? coder_bit(coder, sign, value < 0) : coder_raw_bit(coder, value < 0);
+    return negative ? -(int32_t)magnitude : (int32_t)magnitude;
 }
 
 ATH_INLINE int32_t code_signed(ath_coder *coder, number_model *model, uint32_t expected, int32_t value)
 {
-    return code_signed_in_class(coder, model, number_class(expected), value);
+    return code_signed_in_class(coder, model, number_class(expected), 0, value);
+}
+
+/* Rounds a value to steps. Fractions of at least `half` round away from 0; 0.5 rounds to the nearest. */
+ATH_INLINE int32_t steps_in(double value, double step, double half)
+{
+    double units = value / step;
+    if (!(units > -1073741823.0)) return -1073741823;
+    if (!(units < 1073741823.0)) return 1073741823;
+    return units < 0.0 ? -(int32_t)(1.0 - half - units) : (int32_t)(1.0 - half + units);
 }
 
 #endif

@@ -436,7 +436,7 @@ int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes
     head->exact = chunk.bytes[0];
     head->step = 1.0;
     *body = rest_of(chunk, 1);
-    return head->exact ? ATH_OK : ath_parse_refined_rest(*body, &head->step, body);
+    return head->exact ? ATH_OK : ath_parse_stepped(*body, &head->step, body);
 }
 
 /* Returns the bytes of the character at the front; 0 if it is not UTF-8 (RFC 3629), or a control character. */
@@ -496,27 +496,22 @@ int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *e
 
 int ath_parse_time(ath_bytes chunk, int32_t clip_count, ath_time_method *method, ath_bytes *body)
 {
-    if (chunk.size < 1 || chunk.bytes[0] > 4) return ATH_BAD_CHUNK;
-    *method = chunk.bytes[0];
+    if (chunk.size < 1 || chunk.bytes[0] > ATH_TIME_STREAM) return ATH_BAD_CHUNK;
+    *method = (ath_time_method)chunk.bytes[0];
     *body = rest_of(chunk, 1);
-    size_t of_each = *method > 2 ? 2 : 16;
-    return *method == 2 || body->size == of_each * (size_t)clip_count ? ATH_OK : ATH_BAD_CHUNK;
+    size_t of_each = *method == ATH_TIME_RATE ? 2 : 16;
+    return *method == ATH_TIME_STREAM || body->size == of_each * (size_t)clip_count ? ATH_OK : ATH_BAD_CHUNK;
 }
 
 int ath_parse_steady(ath_bytes body, ath_time_method method, int32_t clip, double *first, double *step)
 {
-    if (method > 2) {
-        double rate = (double)u16_at(body.bytes + 2 * (size_t)clip);
-        *first = 0.0;
-        *step = method == 3 ? rate : 1.0 / rate;
-        return rate > 0.0 ? ATH_OK : ATH_BAD_CHUNK;
-    }
-    *first = f64_at(body.bytes + 16 * (size_t)clip);
-    *step = f64_at(body.bytes + 16 * (size_t)clip + 8);
+    *first = method == ATH_TIME_RATE ? 0.0 : f64_at(body.bytes + 16 * (size_t)clip);
+    *step = method == ATH_TIME_RATE ? (double)u16_at(body.bytes + 2 * (size_t)clip)
+                                    : f64_at(body.bytes + 16 * (size_t)clip + 8);
     return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }
 
-int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body)
+int ath_parse_stepped(ath_bytes chunk, double *step, ath_bytes *body)
 {
     if (chunk.size < 4) return ATH_BAD_CHUNK;
     *step = (double)f32_at(chunk.bytes);
@@ -551,7 +546,7 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->basis_kind = chunk.bytes[5];
     *body = rest_of(chunk, 6);
     if (!is_step(head->step) || head->basis_kind > ATH_BASIS_AS_SAMPLES) return ATH_BAD_CHUNK;
-    if (head->basis_kind <= ATH_NODE_WAVES) return ATH_OK;
+    if (head->basis_kind == ATH_WAVES) return ATH_OK;
     if (body->size < 7) return ATH_BAD_CHUNK;
     head->rank = (int32_t)u16_at(body->bytes);
     head->base = body->bytes[2] == ATH_NO_LEVEL ? -1 : body->bytes[2];
@@ -561,21 +556,4 @@ int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_b
     head->basis.size = length;
     *body = rest_of(*body, 7 + length);
     return ATH_OK;
-}
-
-int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body)
-{
-    if (chunk.size < 5 || chunk.bytes[4] > 1) return ATH_BAD_CHUNK;
-    head->step = (double)f32_at(chunk.bytes);
-    head->lattice = chunk.bytes[4];
-    *body = rest_of(chunk, 5);
-    return is_step(head->step) ? ATH_OK : ATH_BAD_CHUNK;
-}
-
-int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body)
-{
-    if (chunk.size < 4) return ATH_BAD_CHUNK;
-    *step = (double)f32_at(chunk.bytes);
-    *body = rest_of(chunk, 4);
-    return is_step(*step) ? ATH_OK : ATH_BAD_CHUNK;
 }

@@ -45,25 +45,20 @@ typedef struct {
     const uint8_t *seams; /* loops only: full_level_count floats, see ath_seam */
 } ath_clip_entry;
 
-typedef struct {
-    double step;
-    int32_t lattice;
-} ath_predicted_head;
+/* first + i * step; i / rate, with a whole rate; one by one */
+typedef enum { ATH_TIME_STEP, ATH_TIME_RATE, ATH_TIME_STREAM } ath_time_method;
 
-/* 0: first + i * step; 1: first + i / rate; 2: stream; 3: i / rate and 4: i * (1 / rate), with a whole rate */
-typedef int32_t ath_time_method;
-
-/* Time basis of STEMS: the waves of stems or of nodes, or learned rows, as integers of waves or as samples. */
-enum { ATH_STEM_WAVES, ATH_NODE_WAVES, ATH_BASIS_IN_WAVES, ATH_BASIS_AS_SAMPLES };
+/* Time basis of STEMS: the waves of stems, or learned rows, as integers of waves or as samples. */
+enum { ATH_WAVES, ATH_BASIS_IN_WAVES, ATH_BASIS_AS_SAMPLES };
 enum { ATH_MOST_SAMPLE = 8192 }; /* the sample that stands for 1 */
 
 typedef struct {
     double step, rotation_step_factor;
-    int32_t basis_kind; /* up to ATH_NODE_WAVES: no basis is learned */
-    int32_t rank;       /* rows of a learned basis */
-    int32_t base;       /* level of the stream whose basis this one begins with; -1: none */
-    int32_t ratio;      /* refinements: the step of the layer before over this one's */
-    int32_t turn;       /* the largest rotation step of rigid pieces is 2 to the power of -turn / 2; 0: no limit */
+    int32_t basis_kind;
+    int32_t rank;  /* rows of a learned basis */
+    int32_t base;  /* level of the stream whose basis this one begins with; -1: none */
+    int32_t ratio; /* refinements: the step of the layer before over this one's */
+    int32_t turn;  /* the largest rotation step of rigid pieces is 2 to the power of -turn / 2; 0: no limit */
     ath_bytes basis;
 } ath_stems_head;
 
@@ -85,10 +80,9 @@ int ath_parse_steady(ath_bytes body, ath_time_method method, int32_t clip, doubl
 int ath_parse_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
 /* Heads of refinements. shift: predictions are the integers of the layer before times 2 ^ shift. */
 int ath_parse_refined_stems(ath_bytes chunk, int32_t frames, ath_stems_head *head, ath_bytes *body);
-int ath_parse_refined_rest(ath_bytes chunk, double *step, ath_bytes *body);
 int ath_parse_refined_shapes(ath_bytes chunk, int32_t *shift, ath_bytes *body);
-int ath_parse_predicted(ath_bytes chunk, ath_predicted_head *head, ath_bytes *body);
-int ath_parse_corrections(ath_bytes chunk, double *step, ath_bytes *body);
+/* REFINED_REST, PREDICTED, CORRECTIONS: a step and a stream. */
+int ath_parse_stepped(ath_bytes chunk, double *step, ath_bytes *body);
 
 int ath_is_finite(double value);
 

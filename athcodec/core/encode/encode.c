@@ -141,10 +141,12 @@ int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, cons
 }
 
 int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape, int32_t vertex_count,
-                         const int32_t *places, int32_t place_count, const uint32_t *counts, const int32_t *corners)
+                         const int32_t *places, int32_t place_count, const uint32_t *counts, const int32_t *corners,
+                         int has_sides)
 {
     faces_model *model = (faces_model *)memory;
     start_faces(model, shape, vertex_count, places, place_count, (uint32_t *)counts, (int32_t *)corners);
+    model->list.has_no_sides = !has_sides;
     coder_start(&model->coder, bytes, capacity);
     return written(&model->coder, code_faces(model, 0));
 }
@@ -409,40 +411,18 @@ static void shorten(const double left[3], double limit2, int32_t steps[3])
     }
 }
 
-/* Finds the point of the lattice within the limit that is likely to take the fewest bits. Its reach is within the
- * limit. */
-static void cheapest_of_lattice(const double left[3], double limit, uint32_t expected, int32_t steps[3])
+static void nearest_point(const double left[3], int32_t steps[3])
 {
-    double spare = limit - LATTICE_REACH, length2 = 0.0, nearer[3];
-    uint32_t mean[3] = {expected, expected, expected};
-    for (size_t k = 0; k < 3; k++) length2 = length2 + left[k] * left[k];
-    double keep = spare <= 0.0 ? 1.0 : length2 > spare * spare ? 1.0 - spare / ath_sqrt(length2) : 0.0;
-    for (size_t k = 0; k < 3; k++) nearer[k] = keep * left[k];
-    nearest_of_lattice(nearer, LATTICE_REACH, mean, steps);
-}
-
-static void nearest_point(const prediction *p, const double left[3], int32_t steps[3])
-{
-    static const uint32_t mean[3] = {0, 0, 0};
-    if (p->head.lattice) {
-        nearest_of_lattice(left, 0.0, mean, steps);
-        return;
-    }
     for (size_t k = 0; k < 3; k++) steps[k] = steps_in(left[k], 1.0, 0.5);
 }
 
-/* Finds the smallest integers that keep a vertex within its limit. left: distance from the prediction, in units. */
-static void cheapest_point(const prediction *p, int32_t v, const double left[3], double limit, int32_t steps[3])
+/* Finds the smallest integers that keep a vertex within its limit. left: distance from the prediction, in steps. */
+static void cheapest_point(const double left[3], double limit, int32_t steps[3])
 {
-    uint32_t near, beside;
-    if (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] < limit * limit) {
-        steps[0] = steps[1] = steps[2] = 0;
-    } else if (p->head.lattice) {
-        cheapest_of_lattice(left, limit, expected_size(p->vertices, v, &near, &beside), steps);
-    } else {
-        nearest_point(p, left, steps);
-        shorten(left, limit * limit, steps);
-    }
+    steps[0] = steps[1] = steps[2] = 0;
+    if (left[0] * left[0] + left[1] * left[1] + left[2] * left[2] < limit * limit) return;
+    nearest_point(left, steps);
+    shorten(left, limit * limit, steps);
 }
 
 /* Returns 0 if no integers keep the vertex within its limit. */
@@ -450,15 +430,15 @@ static int choose_steps(prediction *p, const predicted_source *source, int32_t v
                         int32_t steps[3])
 {
     const double *wanted = source_of(p, source, v), *was = p->around.was[0] + 3 * (size_t)v;
-    double left[3], unit = unit_of(&p->head);
+    double left[3];
     for (size_t k = 0; k < 3; k++) {
-        left[k] = (wanted[k] - (was[k] + way->way[k])) / unit;
+        left[k] = (wanted[k] - (was[k] + way->way[k])) / p->step;
         if (!(absolute(left[k]) < 1073741820.0)) return 0;
     }
-    cheapest_point(p, v, left, source->limits[v] / unit, steps);
+    cheapest_point(left, source->limits[v] / p->step, steps);
     place_vertex(p, v, way, steps);
     if (is_within(p, source, p->frame, v)) return 1;
-    nearest_point(p, left, steps);
+    nearest_point(left, steps);
     place_vertex(p, v, way, steps);
     return is_within(p, source, p->frame, v);
 }
@@ -496,10 +476,10 @@ static int encode_vertex(ath_coder *coder, prediction *p, const predicted_source
         follow(p, v);
         return 1;
     }
-    predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    predict_vertex(&p->model, p->step, p->vertices, &p->around, v, &way);
     if (!choose_steps(p, source, v, &way, steps)) return 0;
-    code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
-    learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    code_steps(coder, &p->model, p->vertices, v, steps);
+    learn_vertex(&p->model, p->vertices, &p->around, v, &way);
     if (vertex->leads) code_followed(coder, &p->model, vertex, choose_following(p, source, v));
     return 1;
 }
@@ -521,8 +501,8 @@ size_t ath_predicted_memory(int32_t vertex_count)
 }
 
 int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan, const double *origin,
-                             int32_t frames, int is_float64, double step, int lattice, const double *source,
-                             const double *limits, void *positions)
+                             int32_t frames, int is_float64, double step, const double *source, const double *limits,
+                             void *positions)
 {
     ath_coder coder;
     prediction *p = (prediction *)memory;
@@ -530,8 +510,7 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
-    p->head.step = step;
-    p->head.lattice = lattice;
+    p->step = step;
     start_prediction(p, plan, origin, is_float64, positions);
     for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
     return written(&coder, valid);

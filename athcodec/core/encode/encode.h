@@ -243,10 +243,11 @@ ATH_ENCODER_API int64_t ath_encode_source_rest(void *model, uint8_t *bytes, size
 ATH_ENCODER_API int64_t ath_encode_exact_rest(void *model, uint8_t *bytes, size_t capacity, const ath_branch *branches,
                                               int32_t branch_count, const ath_mesh *mesh, int is_float64,
                                               const double *rest);
-/* memory: ath_faces_memory bytes. places: of each vertex, below place_count; not read if there are as many. */
+/* memory: ath_faces_memory bytes. places: of each vertex, below place_count; not read if there are as many. has_sides:
+ * whether guesses of open sides are used. */
 ATH_ENCODER_API int64_t ath_encode_faces(void *memory, uint8_t *bytes, size_t capacity, const ath_polygons *shape,
                                          int32_t vertex_count, const int32_t *places, int32_t place_count,
-                                         const uint32_t *counts, const int32_t *corners);
+                                         const uint32_t *counts, const int32_t *corners, int has_sides);
 /* The stream of PLACES. memory: ath_faces_memory bytes for place_count vertices and places. */
 ATH_ENCODER_API int64_t ath_encode_places(void *memory, uint8_t *bytes, size_t capacity, uint32_t columns,
                                           int32_t vertex_count, int32_t place_count, const int32_t *places);
@@ -275,12 +276,12 @@ ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_
                                               const ath_motion *motion, const ath_integers *integers, int32_t level);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                            const ath_motion *motion, const ath_integers *integers, int32_t level);
-/* memory: ath_predicted_memory bytes. lattice: 1 if vertices are points of the lattice. source: frames x vertex_count x
- * 3, less the origin. limits: one per vertex. Fills positions, as decoded. */
+/* memory: ath_predicted_memory bytes. source: frames x vertex_count x 3, less the origin. limits: one per vertex. Fills
+ * positions, as decoded. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
 ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                              const double *origin, int32_t frames, int is_float64, double step,
-                                             int lattice, const double *source, const double *limits, void *positions);
+                                             const double *source, const double *limits, void *positions);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                                int32_t frames, const int32_t *corrections, int64_t count);
 

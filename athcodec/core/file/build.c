@@ -96,7 +96,7 @@ static int start_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     ath_layer *layer = &file->layers[q];
     ath_bytes body;
     double step;
-    int result = ath_parse_refined_rest(chunk, &step, &body);
+    int result = ath_parse_stepped(chunk, &step, &body);
     if (result != ATH_OK || file->rest_is_exact) return ATH_BAD_CHUNK;
     ath_start_rest(file->model, body, file->branches, file->info.branch_count, step, file->connected,
                    rest_steps_before(file, q), plan_before(file, q)->rest, layer->rest_steps, layer->rest);

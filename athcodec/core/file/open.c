@@ -362,10 +362,11 @@ static int time_clip(const ath_file *file, int32_t index, ath_time_method method
 {
     ath_clip *clip = file->clips + index;
     double *times = file->times + clip->first_frame, first = 0.0, step = 0.0;
-    if (method != 2 && ath_parse_steady(body, method, index, &first, &step) != ATH_OK) return ATH_BAD_CHUNK;
+    if (method != ATH_TIME_STREAM && ath_parse_steady(body, method, index, &first, &step) != ATH_OK)
+        return ATH_BAD_CHUNK;
     for (int32_t i = 0; i < clip->frame_count; i++) {
-        if (method == 0 || method == 4) times[i] = first + (double)i * step;
-        if (method == 1 || method == 3) times[i] = first + (double)i / step;
+        if (method == ATH_TIME_STEP) times[i] = first + (double)i * step;
+        if (method == ATH_TIME_RATE) times[i] = (double)i / step;
         if (!ath_is_finite(times[i]) || (i > 0 && !(times[i] > times[i - 1]))) return ATH_BAD_CHUNK;
     }
     clip->duration = times[clip->frame_count - 1] - times[0];
@@ -378,7 +379,7 @@ static int read_time(ath_file *file, ath_fault_info *fault)
     ath_time_method method;
     int result = ath_load(file, ATH_TIME, &chunk, fault);
     if (result == ATH_OK) result = ath_parse_time(chunk, file->info.clip_count, &method, &body);
-    if (result == ATH_OK && method == 2)
+    if (result == ATH_OK && method == ATH_TIME_STREAM)
         result = ath_decode_times(file->model, body.bytes, body.size, file->info.frame_count, file->times);
     for (int32_t i = 0; result == ATH_OK && i < file->info.clip_count; i++) result = time_clip(file, i, method, body);
     return result;

@@ -4,8 +4,7 @@
 
 #include "model/plan.h"
 
-/* Roots of streams without a learned basis. */
-enum ath_root { ATH_STEM_ROOT = -1, ATH_NODE_ROOT = -2 };
+enum { ATH_NO_ROOT = -1 }; /* root of streams without a learned basis */
 
 /* How the integers of one level and segment are to be read. */
 typedef struct ath_stream {
@@ -13,7 +12,7 @@ typedef struct ath_stream {
     double rotation_step_factor; /* step of rotation tracks over `step`; 0: no rotations are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t root;     /* level of the first stream whose learned basis begins with the same rows, or an ath_root */
+    int32_t root;     /* level of the first stream whose learned basis begins with the same rows, or ATH_NO_ROOT */
     double turn_step; /* largest rotation step of rigid pieces; 0: no limit */
 } ath_stream;
 

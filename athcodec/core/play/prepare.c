@@ -245,12 +245,11 @@ int32_t ath_watched_level(const ath_work *work) { return ath_level_of(&work->fil
 /* The observer follows the segment asked for, not the one before it. */
 static ath_watcher *watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
-static void set_waves(const ath_work *work, ath_stream *stream, int32_t root)
+static void set_waves(const ath_work *work, ath_stream *stream)
 {
-    stream->temporal =
-        root == ATH_NODE_ROOT ? ath_file_node_waves(work->file, work->index) : ath_file_waves(work->file, work->index);
+    stream->temporal = ath_file_waves(work->file, work->index);
     stream->temporal_rank = work->segment->frames;
-    stream->root = root;
+    stream->root = ATH_NO_ROOT;
 }
 
 static void restore_streams(ath_work *work)
@@ -260,7 +259,7 @@ static void restore_streams(ath_work *work)
         ath_stream *stream = work->streams + d;
         if (!ath_has_stream(work->file, d)) continue;
         work->kept = ath_kept_stream(work->kept, stream, work->stems[d].temporal, work->segment->frames);
-        if (stream->root < 0) set_waves(work, stream, stream->root);
+        if (stream->root < 0) set_waves(work, stream);
     }
 }
 
@@ -367,7 +366,7 @@ static void ready_motion(ath_work *work)
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
     for (int32_t d = 0; d < ATH_LEVELS; d++) {
         work->streams[d].step = 1.0;
-        set_waves(work, work->streams + d, ATH_STEM_ROOT);
+        set_waves(work, work->streams + d);
     }
 }
 
@@ -582,10 +581,7 @@ static int open_stems(ath_work *work, int32_t d)
     stream->step = head.step;
     stream->rotation_step_factor = head.rotation_step_factor;
     stream->turn_step = head.turn > 0 ? ath_node_step(-head.turn) : 0.0;
-    if (head.basis_kind == ATH_NODE_WAVES)
-        set_waves(work, stream, ATH_NODE_ROOT);
-    else if (head.basis_kind != ATH_STEM_WAVES)
-        result = read_temporal(work, &head, d);
+    if (head.basis_kind != ATH_WAVES) result = read_temporal(work, &head, d);
     if (q > 0) {
         work->layers[q].motion.ratio = head.ratio;
         refinement_model_init(reader->refined, frames, reader->history);
@@ -613,7 +609,7 @@ static int open_shapes(shapes_reader *reader)
 static int open_corrections(corrections_reader *reader)
 {
     ath_bytes body;
-    int result = ath_parse_corrections(bytes_of(reader->chunk), &reader->step, &body);
+    int result = ath_parse_stepped(bytes_of(reader->chunk), &reader->step, &body);
     if (result != ATH_OK) return result;
     correction_model_init(reader->model);
     coder_start(&reader->coder, body.bytes, body.size);

@@ -46,7 +46,8 @@ typedef struct {
     int32_t bound;
     uint32_t most; /* most corners of a face */
     uint32_t face, first, previous, count;
-    int32_t is_in_turn; /* whether each number but the next one has been there before, as in PLACES */
+    int32_t has_no_sides; /* whether an encoder codes vertices as if guesses of places did not hold */
+    int32_t is_in_turn;   /* whether each number but the next one has been there before, as in PLACES */
 } faces_list;
 
 typedef struct {
@@ -221,8 +222,9 @@ static int32_t code_member(ath_coder *coder, faces_model *model, const face_memb
 static int32_t code_at_place(ath_coder *coder, faces_model *model, const faces_list *faces, ath_context *is_there,
                              int32_t place, int32_t vertex)
 {
-    if (!faces->places) return coder_bit(coder, is_there, vertex == place) ? place : -1;
-    int is_met = ENCODING && faces->places[vertex] == place && is_near(&faces->members, place, vertex);
+    if (!faces->places) return coder_bit(coder, is_there, vertex == place && !faces->has_no_sides) ? place : -1;
+    int is_met =
+        ENCODING && !faces->has_no_sides && faces->places[vertex] == place && is_near(&faces->members, place, vertex);
     return coder_bit(coder, is_there, is_met) ? code_member(coder, model, &faces->members, place, vertex) : -1;
 }
 

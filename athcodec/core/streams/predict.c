@@ -30,7 +30,7 @@ int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *
     prediction *segment = &p->segment;
     ath_bytes body;
     carve_all(p, plan->vertex_count, (uint8_t *)p);
-    if (ath_parse_predicted(chunk, &segment->head, &body) != ATH_OK) return ATH_BAD_CHUNK;
+    if (ath_parse_stepped(chunk, &segment->step, &body) != ATH_OK) return ATH_BAD_CHUNK;
     start_prediction(segment, plan, origin, is_float64, positions);
     coder_start(&p->coder, body.bytes, body.size);
     p->frames = frames;
@@ -52,10 +52,10 @@ static void decode_vertex(ath_coder *coder, prediction *p, int32_t v)
         follow(p, v);
         return;
     }
-    predict_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
-    code_steps(coder, &p->model, p->head.lattice, p->vertices, v, steps);
+    predict_vertex(&p->model, p->step, p->vertices, &p->around, v, &way);
+    code_steps(coder, &p->model, p->vertices, v, steps);
     place_vertex(p, v, &way, steps);
-    learn_vertex(&p->model, &p->head, p->vertices, &p->around, v, &way);
+    learn_vertex(&p->model, p->vertices, &p->around, v, &way);
     if (p->vertices[v].leads) code_followed(coder, &p->model, p->vertices + v, 0);
 }
 

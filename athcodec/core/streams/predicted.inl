@@ -4,26 +4,23 @@
 #define ATH_STREAMS_PREDICTED_INL
 
 #include "container/container.h"
-#include "bits/lattice.inl"
+#include "bits/numbers.inl"
 #include "model/plan.h"
 
-enum { GUESSES = 11, FEATURES = 8, FITS = 3, LINE_GUESS = 5, FRONT_GUESS = 9, OTHER_FRONT = 10 };
-enum { LONGEST_LINE = 24, LONGEST_MEAN = 64, SOLVED_EVERY = 16, FIT_MEMORY = 256, RUNS = 8 };
+enum { FRONT_GUESS = 5, OTHER_FRONT, GUESSES };
+enum { RUNS = 8 };
 
 /* The state of a vertex from frame to frame. */
 typedef struct {
-    double line[3], slope[3]; /* the line through the last positions */
-    double mean[3];
-    double error[GUESSES], noise; /* noise: error of the line while the vertex does not turn */
-    int32_t age, frames;          /* positions in the line, and in the mean */
-    int32_t steps[3];             /* the last integers that were not all 0 */
-    uint32_t size[2];             /* sums of the integers' magnitudes in the last two frames */
-    int32_t before, above;        /* the vertex that this one follows, and the one that that follows; -1: none */
-    int32_t base;                 /* attach vertex, or first vertex, of the stem; -1: this is that vertex */
-    int32_t near;                 /* the vertex whose errors and integers are likely to be similar; -1: none */
-    int32_t tip;                  /* the last vertex of the stem; -1: this is an end */
-    int32_t earlier, next;        /* neighbours in the order of coding; -1: none */
-    double along;                 /* length of the stem at rest, from its base to this vertex */
+    double error[GUESSES];
+    int32_t steps[3];      /* the last integers that were not all 0 */
+    uint32_t size[2];      /* sums of the integers' magnitudes in the last two frames */
+    int32_t before;        /* the vertex that this one follows; -1: none */
+    int32_t base;          /* attach vertex, or first vertex, of the stem; -1: this is that vertex */
+    int32_t near;          /* the vertex whose errors and integers are likely to be similar; -1: none */
+    int32_t tip;           /* the last vertex of the stem; -1: this is an end */
+    int32_t earlier, next; /* neighbours in the order of coding; -1: none */
+    double along;          /* length of the stem at rest, from its base to this vertex */
     /* The rest is for the last vertex of a stem. */
     double reach[2];         /* how far its front had got along that length in the last two frames */
     int32_t front[2];        /* the first vertex that the front had not passed */
@@ -34,18 +31,10 @@ typedef struct {
  * front has passed as at rest and the others at the tip; or only those others. */
 enum { FOLLOW_NONE, FOLLOW_ENDS, FOLLOW_FRONT, FOLLOW_TIP, FOLLOW_CODES };
 
-/* Weights of the features, found by least squares. */
 typedef struct {
-    double moments[FEATURES][FEATURES], products[FEATURES], weights[FEATURES];
-    int32_t count, wait;
-} predicted_fit;
-
-typedef struct {
-    lattice_model lattice;
-    number_model distance;
+    number_model numbers, distance;
     ath_context moved[4][4][3], sign[3][3], copied[RUNS][RUNS], usual[2];
     ath_context followed[FOLLOW_CODES - 1][FOLLOW_CODES][FOLLOW_CODES];
-    predicted_fit fits[FITS];
     int32_t run, last_run, last_distance, last_followed;
     double advance; /* how far the front of the last stem under way got in a frame */
 } predicted_model;
@@ -53,21 +42,19 @@ typedef struct {
 /* Positions of the frames around the current one, less the origin, vertex_count x 3 each. */
 typedef struct {
     const double *rest;
-    const double *was[3]; /* the frame that this one is coded about, the frame that that is coded about, and so on */
-    const double *last;   /* the frame before */
+    const double *was[2]; /* the frame that this one is coded about, and the frame that that is coded about */
     double *now;
 } predicted_frames;
 
 /* Predicted ways of a vertex from its position in the frame that this one is coded about. */
 typedef struct {
-    double guess[GUESSES][3], features[3][FEATURES], way[3];
-    int32_t fit;
+    double guess[GUESSES][3], way[3];
 } predicted_way;
 
 static void predicted_model_init(predicted_model *model)
 {
     memset(model, 0, sizeof *model);
-    lattice_model_init(&model->lattice);
+    number_model_init(&model->numbers);
     number_model_init(&model->distance);
     for (int32_t own = 0; own < 4; own++)
         for (int32_t near = 0; near < 4; near++)
@@ -80,7 +67,6 @@ static void predicted_model_init(predicted_model *model)
     for (int32_t copied = 0; copied < 2; copied++) context_init(&model->usual[copied], 60000);
     for (int32_t i = 0; i < (FOLLOW_CODES - 1) * FOLLOW_CODES * FOLLOW_CODES; i++)
         context_init(&model->followed[0][0][0] + i, 32768);
-    for (int32_t f = 0; f < FITS; f++) model->fits[f].wait = 1;
     model->last_distance = 1;
 }
 
@@ -104,53 +90,6 @@ ATH_INLINE int code_reference(ath_coder *coder, predicted_model *model, int32_t 
         model->run = 0;
     }
     return 1;
-}
-
-/* Solves by Cholesky factorisation. */
-static void solve_fit(predicted_fit *fit)
-{
-    double lower[FEATURES][FEATURES], y[FEATURES];
-    for (int32_t i = 0; i < FEATURES; i++) {
-        double sum = fit->products[i];
-        for (int32_t j = 0; j <= i; j++) {
-            double a = fit->moments[i][j];
-            if (i == j) a = a + (1.0 + a * 1e-6);
-            for (int32_t k = 0; k < j; k++) a = a - lower[i][k] * lower[j][k];
-            lower[i][j] = i < j ? 0.0 : i == j ? ath_sqrt(a > 0.5 ? a : 0.5) : a / lower[j][j];
-        }
-        for (int32_t k = 0; k < i; k++) sum = sum - lower[i][k] * y[k];
-        y[i] = sum / lower[i][i];
-    }
-    for (int32_t i = FEATURES - 1; i >= 0; i--) {
-        double sum = y[i];
-        for (int32_t k = i + 1; k < FEATURES; k++) sum = sum - lower[k][i] * fit->weights[k];
-        fit->weights[i] = sum / lower[i][i];
-    }
-}
-
-ATH_HOT static void add_sample(predicted_fit *fit, const predicted_way *p, const double way[3], double weight)
-{
-    const double *x = p->features[0], *y = p->features[1], *z = p->features[2];
-    for (int32_t i = 0; i < FEATURES; i++) {
-        double wx = weight * x[i], wy = weight * y[i], wz = weight * z[i];
-        for (int32_t j = 0; j < FEATURES; j++)
-            fit->moments[i][j] = fit->moments[i][j] + (wx * x[j] + wy * y[j] + wz * z[j]);
-        fit->products[i] = fit->products[i] + (wx * way[0] + wy * way[1] + wz * way[2]);
-    }
-}
-
-static void learn_fit(predicted_fit *fit, const predicted_way *p, const double way[3], double weight)
-{
-    add_sample(fit, p, way, weight);
-    fit->count = ath_min(fit->count + 1, 8 * SOLVED_EVERY);
-    if (--fit->wait > 0) return;
-    solve_fit(fit);
-    fit->wait = ath_min(1 + fit->count / 8, SOLVED_EVERY);
-    double keep = 1.0 - (double)fit->wait / (double)FIT_MEMORY;
-    for (int32_t i = 0; i < FEATURES; i++) {
-        for (int32_t j = 0; j < FEATURES; j++) fit->moments[i][j] = fit->moments[i][j] * keep;
-        fit->products[i] = fit->products[i] * keep;
-    }
 }
 
 ATH_INLINE int is_number(double x) { return x - x == 0.0; }
@@ -265,56 +204,32 @@ static void guess_front(const predicted_model *model, const predicted_vertex *ve
 }
 
 ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frames *frames, size_t v, size_t k,
-                           double scale, const double *weights, predicted_way *p)
+                           double scale, predicted_way *p)
 {
     const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
     size_t at = 3 * v + k;
-    double x = was[at], own = x - was2[at], before = 0.0, before2 = 0.0, above = 0.0, above2 = 0.0;
-    double joined = 0.0, stem = 0.0, waits = 0.0;
+    double x = was[at], before = 0.0, before2 = 0.0, stem = 0.0, waits = 0.0;
     if (vertex->before >= 0) {
         size_t u = 3 * (size_t)vertex->before + k;
         before = now[u] - was[u];
         before2 = was[u] - was2[u];
-        joined = now[u] - x;
-    }
-    if (vertex->above >= 0) {
-        size_t u = 3 * (size_t)vertex->above + k;
-        above = now[u] - was[u];
-        above2 = was[u] - was2[u];
     }
     if (vertex->base >= 0) {
         size_t u = 3 * (size_t)vertex->base + k;
-        waits = frames->rest[u] - x;
         stem = (now[u] - x) + scale * (frames->rest[at] - frames->rest[u]);
+        waits = frames->rest[u] - x;
     }
-    double features[FEATURES] = {own,
-                                 was2[at] - frames->was[2][at],
-                                 before,
-                                 before2,
-                                 above,
-                                 above2,
-                                 (vertex->line[k] + vertex->slope[k]) - x,
-                                 vertex->mean[k] - x};
-    double fitted = 0.0;
-    for (int32_t i = 0; i < FEATURES; i++) {
-        p->features[k][i] = features[i];
-        fitted = fitted + weights[i] * features[i];
-    }
-    double guesses[FRONT_GUESS] = {own,  0.0,   before, own + (before - before2), joined, features[6],
-                                   stem, waits, fitted};
+    double guesses[FRONT_GUESS] = {0.0, before, (x - was2[at]) + (before - before2), stem, waits};
     for (int32_t i = 0; i < FRONT_GUESS; i++) p->guess[i][k] = guesses[i];
 }
 
-static void predict_vertex(const predicted_model *model, const ath_predicted_head *head,
-                           const predicted_vertex *vertices, const predicted_frames *frames, int32_t v,
-                           predicted_way *p)
+static void predict_vertex(const predicted_model *model, double step, const predicted_vertex *vertices,
+                           const predicted_frames *frames, int32_t v, predicted_way *p)
 {
     const predicted_vertex *vertex = vertices + v, *near = vertex->near >= 0 ? vertices + vertex->near : 0;
-    p->fit = vertex->before < 0 ? 0 : vertex->near == vertex->before ? 2 : 1;
-    const predicted_fit *fit = model->fits + p->fit;
-    double best = 0.0, scale = stem_scale(frames, vertex, v, head->step);
+    double best = 0.0, scale = stem_scale(frames, vertex, v, step);
     int32_t chosen = 0;
-    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scale, fit->weights, p);
+    for (size_t k = 0; k < 3; k++) guess_axis(vertex, frames, (size_t)v, k, scale, p);
     guess_front(model, vertices, frames, v, p);
     for (int32_t i = 0; i < GUESSES; i++) {
         double error = vertex->error[i];
@@ -327,46 +242,18 @@ static void predict_vertex(const predicted_model *model, const ath_predicted_hea
     for (size_t k = 0; k < 3; k++) p->way[k] = is_number(p->guess[chosen][k]) ? p->guess[chosen][k] : 0.0;
 }
 
-/* Adds a position to the line, which begins anew when the vertex turns. */
-ATH_INLINE void learn_line(predicted_vertex *vertex, const double *x, const double *last, double off, double step)
-{
-    int turned = off > 4.0 * step + 3.0 * vertex->noise;
-    if (!turned) vertex->noise = vertex->noise + (off - vertex->noise) * 0.125;
-    vertex->age = turned ? 1 : ath_min(vertex->age + 1, LONGEST_LINE);
-    double n = (double)vertex->age, more = (n + 1.0) * (n + 2.0);
-    double at = (4.0 * n + 2.0) / more, along = 6.0 / more;
-    for (size_t k = 0; k < 3; k++) {
-        double ahead = vertex->line[k] + vertex->slope[k], miss = x[k] - ahead;
-        if (turned) {
-            vertex->line[k] = x[k];
-            vertex->slope[k] = x[k] - last[k];
-        } else {
-            vertex->line[k] = ahead + at * miss;
-            vertex->slope[k] = vertex->slope[k] + along * miss;
-        }
-    }
-}
-
-static void learn_vertex(predicted_model *model, const ath_predicted_head *head, predicted_vertex *vertices,
-                         const predicted_frames *frames, int32_t v, const predicted_way *p)
+static void learn_vertex(predicted_model *model, predicted_vertex *vertices, const predicted_frames *frames, int32_t v,
+                         const predicted_way *p)
 {
     predicted_vertex *vertex = vertices + v;
-    predicted_fit *fit = model->fits + p->fit;
     const double *x = frames->now + 3 * (size_t)v, *was = frames->was[0] + 3 * (size_t)v;
-    double way[3], error[GUESSES];
+    double way[3];
     for (size_t k = 0; k < 3; k++) way[k] = x[k] - was[k];
     for (int32_t i = 0; i < GUESSES; i++) {
-        error[i] =
+        double error =
             absolute(way[0] - p->guess[i][0]) + absolute(way[1] - p->guess[i][1]) + absolute(way[2] - p->guess[i][2]);
-        vertex->error[i] = 0.5 * vertex->error[i] + error[i];
+        vertex->error[i] = 0.5 * vertex->error[i] + error;
     }
-    double off =
-        absolute(way[0] - p->way[0]) + absolute(way[1] - p->way[1]) + absolute(way[2] - p->way[2]) + head->step;
-    learn_fit(fit, p, way, 1.0 / (off * off));
-    learn_line(vertex, x, frames->last + 3 * (size_t)v, error[LINE_GUESS], head->step);
-    vertex->frames = ath_min(vertex->frames + 1, LONGEST_MEAN);
-    for (size_t k = 0; k < 3; k++)
-        vertex->mean[k] = vertex->mean[k] + (x[k] - vertex->mean[k]) / (double)vertex->frames;
     if (vertex->tip < 0) learn_front(model, vertices, frames, v);
 }
 
@@ -384,8 +271,8 @@ ATH_INLINE uint32_t expected_size(const predicted_vertex *vertices, int32_t v, u
 
 ATH_INLINE int32_t sign_class(int32_t steps) { return steps < 0 ? 0 : steps > 0 ? 2 : 1; }
 
-ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lattice, predicted_vertex *vertices,
-                           int32_t v, int32_t steps[3])
+ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, predicted_vertex *vertices, int32_t v,
+                           int32_t steps[3])
 {
     static const int32_t none[3] = {0, 0, 0};
     predicted_vertex *vertex = vertices + v;
@@ -397,8 +284,7 @@ ATH_INLINE void code_steps(ath_coder *coder, predicted_model *model, int32_t lat
         for (int32_t k = 0; k < 3; k++) {
             uint32_t about = k == 0 ? expected : (2 * expected + sum * 16 / (uint32_t)k) / 3;
             ath_context *sign = &model->sign[sign_class(signs[k])][sign_class(vertex->steps[k])];
-            int32_t parity = lattice ? parity_of(steps, k) : ANY_INTEGER;
-            steps[k] = code_integer(coder, &model->lattice, parity, number_class(about), sign, steps[k]);
+            steps[k] = code_signed_in_class(coder, &model->numbers, number_class(about), sign, steps[k]);
             sum += clipped(steps[k]);
         }
         memcpy(vertex->steps, steps, sizeof vertex->steps);
@@ -439,12 +325,12 @@ static int32_t take_place(const double *rest, int32_t *last, uint32_t places, do
     return same ? before : -1;
 }
 
-enum { AROUND = 5 };
+enum { AROUND = 3 };
 
 /* The state of a segment. positions: the output, frames x vertex_count x 3, float or (is_float64) double. */
 typedef struct {
     predicted_model model;
-    ath_predicted_head head;
+    double step;
     predicted_vertex *vertices;
     double *memory[AROUND];
     int32_t *last; /* vertices by cell */
@@ -512,7 +398,7 @@ static void follow_stems(prediction *p, const ath_branch *branches, int32_t bran
 /* A vertex at the rest position of an earlier one follows that, unless the vertex that it follows lies there, too. */
 static void follow_twins(prediction *p)
 {
-    double width = p->head.step * 0.00390625;
+    double width = p->step * 0.00390625;
     uint32_t places = twin_places(p->vertex_count);
     for (uint32_t i = 0; i < places; i++) p->last[i] = -1;
     for (int32_t v = 0; v >= 0; v = p->vertices[v].next) {
@@ -537,12 +423,6 @@ static void start_prediction(prediction *p, const ath_plan *plan, const double *
     memset(p->vertices, 0, (size_t)p->vertex_count * sizeof *p->vertices);
     follow_stems(p, plan->branches, plan->branch_count);
     follow_twins(p);
-    for (int32_t v = 0; v < p->vertex_count; v++) {
-        predicted_vertex *vertex = p->vertices + v;
-        vertex->above = vertex->before >= 0 ? p->vertices[vertex->before].before : -1;
-        memcpy(vertex->line, p->rest + 3 * (size_t)v, sizeof vertex->line);
-        memcpy(vertex->mean, p->rest + 3 * (size_t)v, sizeof vertex->mean);
-    }
 }
 
 /* Returns the positions of a frame; the rest pose for negative ones. */
@@ -589,25 +469,18 @@ static int start_frame(ath_coder *coder, prediction *p, int *copied, int32_t dis
         copy_frame(p, from);
         return 1;
     }
-    for (int32_t i = 0; i < 3; i++, from = about(p, from)) p->around.was[i] = known_frame(p, from, p->memory[i]);
-    p->around.last = distance == 1 ? p->around.was[0] : known_frame(p, p->frame - 1, p->memory[3]);
+    for (int32_t i = 0; i < 2; i++, from = about(p, from)) p->around.was[i] = known_frame(p, from, p->memory[i]);
     p->around.rest = p->rest;
-    p->around.now = p->memory[4];
+    p->around.now = p->memory[2];
     return 1;
-}
-
-ATH_INLINE double unit_of(const ath_predicted_head *head)
-{
-    return head->lattice ? LATTICE_UNIT * head->step : head->step;
 }
 
 /* Puts a vertex, moved by its steps, into the output and into `now`. */
 static void place_vertex(prediction *p, int32_t v, const predicted_way *way, const int32_t steps[3])
 {
     size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)p->frame + from;
-    double unit = unit_of(&p->head);
     for (size_t k = 0; k < 3; k++) {
-        put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * unit);
+        put_out(p, at, k, p->around.was[0][from + k] + way->way[k] + (double)steps[k] * p->step);
         p->around.now[from + k] = put_back(p, at, k);
     }
 }
@@ -638,7 +511,7 @@ static void follow_ends(prediction *p, int32_t v, double scale, int32_t followed
 static double scale_of(const prediction *p, int32_t tip, int32_t followed)
 {
     if (followed != FOLLOW_ENDS) return 1.0;
-    return grown(p->rest, p->around.now, p->vertices[tip].base, tip, p->head.step);
+    return grown(p->rest, p->around.now, p->vertices[tip].base, tip, p->step);
 }
 
 static void follow(prediction *p, int32_t v)

@@ -92,7 +92,7 @@ static void code_rest_point(ath_coder *coder, lattice_model *lattice, const rest
         int32_t about = (number_class((mean[k] + mean[0] + mean[1] + mean[2]) / 4)
                          + number_class((own[k] + own[0] + own[1] + own[2]) / 4) + 1)
                         / 2;
-        integers[k] = code_integer(coder, lattice, parity_of(integers, k), about, 0, integers[k]);
+        integers[k] = code_integer(coder, lattice, parity_of(integers, k), about, integers[k]);
     }
 }
 

@@ -20,7 +20,6 @@ from athcodec.encoding import quantise as qz
 from athcodec.encoding import streams, writing
 from athcodec.encoding.choices.levels import MOST_AWAY, SourceFrames
 from athcodec.encoding.choices.rest import with_best_rest
-from athcodec.encoding.features import Feature
 from athcodec.encoding.motion import LevelStream, SegmentMotion, position_errors
 from athcodec.encoding.progress import PREDICTION, REST, Work
 from athcodec.encoding.segment import CodedPrelude, Source, plain_settings
@@ -33,7 +32,6 @@ from athcodec.motion.algebra import length
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
-CUBES, LATTICE = False, True  # Positions are rounded to one of these.
 REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
 USUAL_REST_RATIO = 0.5
 REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
@@ -60,16 +58,14 @@ def one_map_each(seen: Survey) -> Ath:
 
 
 def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
-    settings = plain_settings(source, ath.height + 2, bound, _largest_step(source.limit(bound), CUBES), rest_step)
+    settings = plain_settings(source, ath.height + 2, bound, _largest_step(source.limit(bound)), rest_step)
     return with_best_rest(source, ath, settings)
 
 
 class Way(NamedTuple):
-    """How motion is predicted: the step of the rest pose, in bounds, what positions are rounded to, and the largest
-    error, over the limit."""
+    """How motion is predicted: the step of the rest pose, in bounds, and the largest error, over the limit."""
 
     rest_ratio: float
-    lattice: bool = CUBES
     error_share: float = 1.0
 
 
@@ -103,8 +99,8 @@ def best_prediction(
 
     def coded(way: Way) -> FoundPrediction:
         settings = by_ratio(way.rest_ratio)
-        stepped = replace(settings, step=_largest_step(way.error_share * settings.limit, way.lattice))
-        choice = Choice(stepped, stepped, None, predicted=way.lattice, error_share=way.error_share)
+        stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
+        choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
         work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
         try:
             prelude = prelude_of(way.rest_ratio)
@@ -115,17 +111,14 @@ def best_prediction(
         twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
 
-    def best(share: float, most: float, lattice: bool) -> FoundPrediction:
+    def best(share: float, most: float) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
         ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
         found = coded(Way(ratios[0], error_share=share))
         if found.bytes > HOPELESS * most:
             return found
         tried = [found, *(coded(Way(ratio, error_share=share)) for ratio in ratios[1:])]
-        found = min(tried, key=lambda one: one.bytes)
-        if not lattice or Feature.LATTICE in source.without:
-            return found
-        return min(found, coded(found.way._replace(lattice=LATTICE)), key=lambda one: one.bytes)
+        return min(tried, key=lambda one: one.bytes)
 
     if usual:
         found = coded(Way(USUAL_REST_RATIO))
@@ -138,12 +131,12 @@ def best_prediction(
                 return None
     except BoundError:
         return None
-    found = best(1.0, math.inf, lattice=True)
+    found = best(1.0, math.inf)
     if found.twitches and smoothness != "bytes":
         relative = source.smallest_bound(bound) / source.seen.diagonal
         most = min(most_bytes, SMOOTHNESS[smoothness] * found.bytes)
         for share in _still_shares(relative, smoothness):
-            still = best(share, most, lattice=relative < FINE)
+            still = best(share, most)
             if still.bytes < most:
                 return still
     return found if found.bytes < most_bytes else None
@@ -178,9 +171,9 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
 
 
-def _largest_step(limit: np.ndarray | float, lattice: bool) -> float:
+def _largest_step(limit: np.ndarray | float) -> float:
     """Return the largest step that reaches every place within the limit."""
-    return qz.single((qz.LATTICE_REST_CAP if lattice else qz.SAFE_REST_CAP) * float(np.min(limit)))
+    return qz.single(qz.SAFE_REST_CAP * float(np.min(limit)))
 
 
 def _samples(source: Source) -> list[SegmentSample]:
@@ -196,27 +189,22 @@ def _samples(source: Source) -> list[SegmentSample]:
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample, frames: int) -> float:
     """Return the bytes of the frames that a sample stands for, without first frames, as far as its first ones tell."""
     some = sample.positions[:, :, :frames]
-    choice = Choice(settings, settings, None, predicted=CUBES)
+    choice = Choice(settings, settings, None, predicted=True)
     coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2] * sample.frames
 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
     """Return PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
-    lattice, settings = choice.predicted, choice.settings
-    assert lattice is not None
+    settings = choice.settings
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
     for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
         for factor in STEPS:
-            step = qz.single(factor * _largest_step(share * limits, lattice))
-            coded = streams.encode_predicted(
-                prelude.plan, prelude.origin, source, share * limits, step, lattice, prelude.dtype
-            )
+            step = qz.single(factor * _largest_step(share * limits))
+            coded = streams.encode_predicted(prelude.plan, prelude.origin, source, share * limits, step, prelude.dtype)
             if coded is not None:
-                return writing.pack_predicted(step, lattice, coded[0]), np.ascontiguousarray(
-                    coded[1].transpose(1, 2, 0)
-                )
+                return writing.pack_predicted(step, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
@@ -231,7 +219,6 @@ def code_predicted_segment(
     box: np.ndarray,
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
     """Return what CodedMotion.joined_to does. Predicted motion is not joined, and may jerk."""
-    assert choice.predicted is not None
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
 

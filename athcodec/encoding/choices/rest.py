@@ -30,7 +30,8 @@ def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
     hierarchy = source.hierarchy
     first, count, attach = hierarchy.first_vertex, hierarchy.stem_count, hierarchy.attach
     lags = np.zeros(hierarchy.branch_count, np.int32)
-    wanted = (source.sheet_like | (details > 0)) & (not source.host_rest)
+    is_adaptive = not source.host_rest and Feature.ADAPTIVE not in source.without
+    wanted = (source.sheet_like | (details > 0)) & is_adaptive
     for size, is_attached in product(np.unique(count[wanted]).tolist(), (False, True)):
         alike = np.flatnonzero(wanted & (count == size) & ((attach >= 0) == is_attached))
         for part in ranges(len(alike), 3 * size):
@@ -103,6 +104,8 @@ def best_slack(settings: Settings, trials: Trials) -> Settings:
 
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
     """Return the settings with other lags: no beams, one for all, or short stems told apart by their vertices."""
+    if Feature.ADAPTIVE in source.without:
+        return []
     best, count = settings.lags, source.hierarchy.stem_count
     no_beam = np.maximum(best, 1)
     others = [np.minimum(best, 1), no_beam, np.ones_like(best), np.where(count <= qz.SHORT_STEM, count, no_beam)]

@@ -1,4 +1,4 @@
-"""Rigid parts: which branches move without bending, which are loose, and how finely they turn (FORMAT.md, Rigid).
+"""Rigid parts: which branches move without bending, and how finely they turn (FORMAT.md, Rigid).
 
 A card that is smaller than the bound is noise after affine functions and modes have been quantised to it. As a rigid
 part it keeps its shape whatever the bound, and takes three rows in place of nine. A twig of few bounds has no direction
@@ -15,7 +15,7 @@ import numpy as np
 from athcodec._native import PIECE_VERTICES
 from athcodec.encoding import quantise as qz
 from athcodec.encoding.features import Feature
-from athcodec.encoding.segment import Source, stem_sizes
+from athcodec.encoding.segment import Source
 from athcodec.encoding.segment_samples import SegmentSample
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
@@ -45,18 +45,6 @@ def first_rigid(
     rigid = _rigid_layers(source, wanted, [sample.positions for sample in samples], [ratio * least for ratio in ratios])
     turns = rigid[source.keeps_shape].any() and Feature.TURN not in source.without
     return rigid, TURN_STEP if turns else 0.0
-
-
-def loose_branches(source: Source, sample: np.ndarray) -> np.ndarray:
-    """Return (B,) bool: branches whose base leaves its attach point by more than their size, such as fallen leaves."""
-    if Feature.LOOSE in source.without:
-        return np.zeros(source.hierarchy.branch_count, bool)
-    hierarchy, rest = source.hierarchy, source.rest
-    first, attach = hierarchy.first_vertex, np.maximum(hierarchy.attach, 0)
-    gap = np.linalg.norm(sample[first] - sample[attach], axis=1)
-    rest_gap = np.linalg.norm(rest[first] - rest[attach], axis=1)
-    stretch = np.abs(gap - rest_gap[:, None]).max(axis=1)
-    return (hierarchy.attach >= 0) & (stretch > np.maximum(stem_sizes(source), rest_gap))
 
 
 def best_freedom(settings: Settings, trials: Trials) -> Settings:
