@@ -356,7 +356,7 @@ def test_a_refused_front_is_described_by_the_place_and_the_values_found_and_allo
     assert refusal(data[:8] + b"\2\6\0\0" + data[12:]) == (
         "UNSUPPORTED_VERSION file: got format version 2.6; expected 0.15"
     )
-    assert refusal(data[:8] + b"\0\x0e\4\x80" + data[12:]) == (
+    assert refusal(data[:8] + b"\0\x0f\4\x80" + data[12:]) == (
         "UNSUPPORTED_FEATURE file: got format 0.15 with feature 2, 15; expected features that this decoder has"
     )
     assert refusal(data[:12]) == "MISSING header: got 12 bytes; expected 24"
