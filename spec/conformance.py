@@ -394,8 +394,11 @@ const { AthFile, AthError, ready } = await import(jobs.module);
 await ready;
 const items = {
   open: () => new Uint8Array(0),
-  rest: (file) => file.rest("source", { out: new (file.info.restIsFloat64 ? Float64Array : Float32Array)(
-    3 * file.info.vertexCount) }),
+  rest: (file) => {
+    file.levelRest(0);  // It may be about another pose than REST.
+    return file.rest("source", { out: new (file.info.restIsFloat64 ? Float64Array : Float32Array)(
+      3 * file.info.vertexCount) });
+  },
   time: (file) => file.times(),
   clips: (file) => Buffer.concat(file.clips.map((clip, i) => entry(file, clip, i))),
 };

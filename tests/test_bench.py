@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import report
+from bench import features, report
 from bench.store import read
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,3 +30,13 @@ def test_the_table_of_clips_that_stand_for_others_is_that_of_the_saved_figures()
             cells = [f"{one:,} | {other:,} | {other / one:.2f}" for one, other in sizes]
             assert f"| {float(bound):.0e}, `{ladder}` | {' | '.join(cells)} |".replace("e-0", "e-") in text
             assert all(0.5 < other / one < 2 for one, other in sizes)
+
+
+def test_the_table_of_features_counts_the_makers_whose_clips_a_feature_serves():
+    saved = {"skfem_leaf": 1040, "skfem_blade": 1100, "mujoco_cable_vine": 1031, "helios_bed": 1029}
+    sizes = [
+        {"clip": clip, "bound": 1e-3, "ladder": "", "feature": "copies", "with": 1000, "without": without}
+        for clip, without in saved.items()
+    ]
+    (row,) = features.summary(sizes)
+    assert row["makers"] == 2 and row["most of"] == "`skfem_blade` at 0.001"
