@@ -155,7 +155,7 @@ int32_t ath_array_ranges(const ath_file *file, ath_range *ranges, int32_t capaci
     uint64_t end = 0;
     for (int32_t i = 0; i < file->info.chunk_count; i++) {
         const ath_chunk *chunk = file->chunks + i;
-        if (chunk->kind != ATH_ATTRIBUTE || chunk->bytes) continue;
+        if (chunk->kind != ATH_ATTRIBUTE || chunk->bytes || chunk->length == 0) continue;
         int is_next = count > 0 && chunk->offset == end;
         ath_range range = {chunk->offset, chunk->length};
         end = chunk->offset + chunk->length;
