@@ -36,7 +36,7 @@ SHOWN = (
     "athcodec/core/include/ath.h",
     "athcodec/core/include/ath_gpu.h",
     "athcodec/core/include/ath_player.h",
-    "athcodec/core/examples/play.c",
+    "athcodec/core/examples/*",
     "tests/points_plugin/pyproject.toml",
     "tests/points_plugin/athcodec_points/*.py",
 )

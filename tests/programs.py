@@ -34,6 +34,15 @@ def vtk_python() -> str:
 
 
 @cache
+def raylib_library() -> Path:
+    """The library of raylib that draws in software, in a folder with the headers that belong to it."""
+    python = os.environ.get("ATHCODEC_RAYLIB") or _environment("raylib", "raylib-software")
+    script = "import importlib.util as u; print(u.find_spec('raylib').submodule_search_locations[0])"
+    [library] = Path(run_script(python, script).splitlines()[-1]).glob("_raylib_cffi.*.so")
+    return library
+
+
+@cache
 def usd_plugin_python() -> str:
     """A Python that has USD and this repository's plugin for it, and never athcodec."""
     root = Path(__file__).parent.parent

@@ -15,7 +15,7 @@ import pytest
 from counting import COUNTER
 from files import Parts
 from fuzz.targets import CORE
-from header import Fade
+from header import Fade, Range
 from moving_meshes import leafed_tree, mixed_clip
 from test_install import C_COMPILERS, CXX_COMPILERS, run
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.formats
 
 CLAMP, LOOP, PING_PONG, AS_MARKED = range(4)
 FILE_ORDER, SOURCE_ORDER = range(2)
-OK, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 9, 64, 65, 66, 68, 69
+OK, BAD_CHECKSUM, BAD_CHUNK, MORE, HELD, MISSING, NO_MEMORY, BAD_ARGUMENT = 0, 5, 9, 64, 65, 66, 68, 69
 BUDGET, EXACT = 150_000, 2**31 - 1
 SHIPPED = Path(athcodec.__file__).parent / "sample" / "leafed_tree.ath"
 VECTORS = Path(__file__).parent.parent / "spec" / "vectors" / "valid"
@@ -248,6 +248,62 @@ def test_of_a_prefix_the_deepest_level_that_is_there_is_shown(lib, sample_ath):
             (level,) = (i for i, pose in enumerate(wanted) if np.allclose(pose, shown, atol=1e-5))
             levels.add(level)
     assert len(levels) >= 2 and len(wanted) - 1 in levels
+
+
+def feed(player: Player, level: int, change: bytes = b"") -> None:
+    """Hands over the ranges that a level of the first clip needs, with other bytes at the front of each."""
+    file, ranges = c_void_p(player.lib.ath_player_file(player.player)), (Range * 64)()
+    with athcodec.open(player.whole) as decoder:
+        last = len(decoder.segments) - 1
+    count = player.lib.ath_ranges(file, level, 0, last, 0, ranges, 64)
+    for start, size in [(one.offset, one.size) for one in ranges[:count]]:
+        player.fed.append(change + player.whole[start + len(change) : start + size])
+        player.lib.ath_player_feed(player.player, player.fed[-1], c_uint64(start), c_size_t(size))
+
+
+def of_prelude(lib, data: bytes, budget: int) -> Player:
+    """A player that has the front and the prelude alone."""
+    front, memory = c_size_t(), c_size_t()
+    assert lib.ath_front(data, c_size_t(len(data)), None, byref(front), byref(memory), None) == OK
+    player = Player(lib, data[: front.value], budget=budget)
+    player.whole, player.fed = data, []
+    return player
+
+
+@pytest.mark.parametrize("budget", [EXACT, BUDGET])
+@pytest.mark.parametrize("name", ["shipped tree", "sample", "layers-mixed", "clips-loops"])
+def test_levels_play_from_their_ranges_alone_however_they_are_ordered(name, budget, lib, sample_ath):
+    """The bytes of a deep level are not those of all levels before it."""
+    path = {"sample": sample_ath, "shipped tree": SHIPPED}.get(name, VECTORS / f"{name}.ath")
+    with athcodec.open(path) as file:
+        count, levels = file.file.vertex_count, range(file.file.level_count)
+        wanted = [np.asarray(file.positions(0, level=level), np.float32) for level in levels]
+    for order in (levels, [levels[-1], 0], [levels[len(levels) // 2], levels[-1]]):
+        with of_prelude(lib, path.read_bytes(), budget) as player:
+            assert player.positions(count, 0.0) == MISSING
+            for level in order:
+                feed(player, level)
+                for _ in range(200):  # calls with a budget, until the level is prepared
+                    shown = player.positions(count, 0.0, level)
+                    assert isinstance(shown, np.ndarray), shown
+                assert lib.ath_player_ahead(player.player, EXACT) == OK
+                assert np.array_equal(player.positions(count, 0.0, level), wanted[level])
+
+
+def test_bytes_that_were_damaged_on_their_way_may_come_again(lib, sample_ath):
+    with athcodec.open(sample_ath) as file:
+        count, deepest = file.file.vertex_count, file.file.level_count - 1
+        wanted = np.asarray(file.positions(0), np.float32)
+    with of_prelude(lib, sample_ath.read_bytes(), BUDGET) as player:
+        feed(player, 0)
+        feed(player, deepest, change=b"damage")
+        assert isinstance(player.positions(count, 0.0, 0), np.ndarray)
+        calls = [player.positions(count, 0.0) for _ in range(50)]
+        results = {result for result in calls if isinstance(result, int)}
+        assert results == {BAD_CHECKSUM}
+        lib.ath_player_feed(player.player, player.whole, c_uint64(0), c_size_t(len(player.whole)))
+        lib.ath_player_set_budget(player.player, EXACT)
+        assert np.array_equal(player.positions(count, 0.0), wanted)
 
 
 def test_what_no_clip_has_is_refused_and_damage_named(lib, sample_ath):

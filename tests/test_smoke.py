@@ -14,7 +14,7 @@ can break unseen until then.
 | makers of vectors | vectors | three vectors come out the same |
 | batches | tools, slow | a worker in this process codes one clip |
 | loader for three.js, GPU form, pages, galleries | web, browser | one file each |
-| plugin for USD | programs | its calls have the arguments that the headers declare |
+| plugin for USD, player in raylib | programs | their calls have the arguments that the headers declare |
 | release for other machines, media type | programs | the recipe names the whole core, the type the first bytes |
 
 Other tests of the tier `programs` build nothing of ours: they give files to Blender, VTK and programs from npm. Makers
@@ -327,14 +327,17 @@ def arguments(text: str, start: int) -> int:
     raise ValueError(f"brackets: got none that closes the one at {start}")
 
 
-def test_the_plugin_for_usd_calls_functions_with_the_arguments_that_headers_declare():
-    def calls(path: Path) -> list[tuple[str, int]]:
-        text = re.sub(r"/\*.*?\*/|//[^\n]*", "", path.read_text("utf-8"), flags=re.DOTALL)
-        return [(found[1], arguments(text, found.end() - 1)) for found in re.finditer(r"\b(ath_\w+)\(", text)]
+def calls(path: Path) -> set[tuple[str, int]]:
+    """Functions of the core that a file names before a bracket, with their number of arguments."""
+    text = re.sub(r"/\*.*?\*/|//[^\n]*", "", path.read_text("utf-8"), flags=re.DOTALL)
+    return {(found[1], arguments(text, found.end() - 1)) for found in re.finditer(r"\b(ath_\w+)\(", text)}
 
+
+@pytest.mark.parametrize("place", ["usd/src/*", "core/examples/raylib_player.c"])
+def test_what_is_built_on_the_core_elsewhere_calls_functions_with_the_arguments_that_headers_declare(place):
     declared = {call for name in ("ath.h", "ath_player.h") for call in calls(CORE / "include" / name)}
-    called = {call for path in (ROOT / "athcodec" / "usd" / "src").iterdir() for call in calls(path)}
-    assert len(called) > 15 and called <= declared, called - declared
+    called = {call for path in (ROOT / "athcodec").glob(place) for call in calls(path)}
+    assert len(called) > 12 and called <= declared, called - declared
 
 
 def test_the_builder_of_releases_compiles_the_whole_core_and_looks_for_files_that_are_there(tmp_path):

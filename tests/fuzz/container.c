@@ -24,6 +24,26 @@ static void read_front(const uint8_t *bytes, size_t size, const ath_limits *limi
     }
 }
 
+/* Arrays and metadata that are accepted are bytes of their chunk, and state sizes within their limits. */
+static void read_static(const ath_file *file, int32_t chunk_count)
+{
+    for (int32_t i = 0; i < chunk_count; i++) {
+        const ath_chunk *chunk = ath_chunks(file) + i;
+        ath_array array;
+        if (ath_array_of(file, i, &array, NULL) != ATH_OK) continue;
+        uint64_t end = (uint64_t)(array.packed - chunk->bytes) + array.packed_bytes, count = array.item_bytes;
+        for (uint32_t d = 0; d < array.dimension_count; d++) count *= array.shape[d];
+        REQUIRE(end == chunk->length && (array.bytes > 0) == (array.packed_bytes > 0),
+                "an array's frame is in its chunk");
+        REQUIRE(array.bytes == count && count <= 1 << 28, "the size of an array is that of its shape");
+        REQUIRE((const uint8_t *)array.name + array.name_bytes == array.packed, "a name is in its chunk");
+    }
+    ath_metadata metadata;
+    if (ath_metadata_of(file, &metadata, NULL) != ATH_OK || !metadata.stored) return;
+    REQUIRE(metadata.bytes <= 1 << 20, "the size of metadata is within its limit");
+    REQUIRE(metadata.is_packed || metadata.bytes == metadata.stored_bytes, "a plain text is stored as it is");
+}
+
 static void open_it(const uint8_t *bytes, size_t size, const ath_limits *limits)
 {
     fuzz_file opened;
@@ -40,6 +60,7 @@ static void open_it(const uint8_t *bytes, size_t size, const ath_limits *limits)
                     "chunks are bytes of the file");
     }
     REQUIRE(end == info.file_length, "chunks end where the file does");
+    read_static(opened.file, info.chunk_count);
     fuzz_close(&opened);
 }
 

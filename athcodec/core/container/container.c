@@ -458,10 +458,10 @@ static size_t character_size(ath_bytes text)
     return 0;
 }
 
-static int is_name(ath_bytes text)
+int ath_is_text(ath_bytes text, int may_control)
 {
     while (text.size > 0) {
-        size_t size = character_size(text);
+        size_t size = may_control && text.bytes[0] < 0x80 ? 1 : character_size(text);
         if (size == 0) return 0;
         text = rest_of(text, size);
     }
@@ -488,7 +488,7 @@ int ath_parse_clip(ath_bytes *chunk, const ath_header *header, ath_clip_entry *e
     entry->name.bytes = chunk->bytes;
     entry->seams = chunk->bytes + entry->name.size;
     *chunk = rest_of(*chunk, entry->name.size + seams);
-    if (!is_name(entry->name)) return ATH_BAD_CHUNK;
+    if (!ath_is_text(entry->name, 0)) return ATH_BAD_CHUNK;
     for (int32_t level = 0; entry->loop && level < header->full_level_count; level++)
         if (!ath_is_finite((double)ath_seam(entry, level)) || ath_seam(entry, level) < 0.0f) return ATH_BAD_CHUNK;
     return ATH_OK;

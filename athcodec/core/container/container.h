@@ -70,6 +70,8 @@ ATH_INLINE int32_t ath_bits_of_type(int32_t type) { return (8 << (type & 3)) - (
 
 /* Returns how many vertices, of `vertex_count`, the numbers of an integer type can name. */
 int32_t ath_vertices_of_type(int32_t type, int32_t vertex_count);
+/* Returns whether bytes are UTF-8 (RFC 3629), of which control characters are taken if `may_control` is 1. */
+int ath_is_text(ath_bytes text, int may_control);
 int ath_parse_polygons(ath_bytes chunk, ath_polygons *shape, ath_bytes *body);
 int ath_parse_source_rest(ath_bytes chunk, ath_source_rest_head *head, ath_bytes *body);
 /* Parses the entry at the front of `chunk`, and moves `chunk` past it. */

@@ -5,6 +5,7 @@
  *     ath_fault_text                            say in a sentence why a file is refused
  *     ath_refine                                once per level
  *     ath_ranges, ath_feed                      ask which bytes a level needs, and hand them over
+ *     ath_array_named, ath_metadata_of          get the source's named arrays, such as "uv", and its metadata
  *     ath_prepare, or _start and _step          decode one segment at one level
  *     ath_prepare_to                            write all positions of a segment to memory of yours
  *     ath_keep, ath_prepare_onward              prepare a deeper level of a segment from the one that is prepared
@@ -374,7 +375,7 @@ ATH_API int32_t ath_segment_start(const ath_file *file, int32_t segment);
 ATH_API int32_t ath_segment_of(const ath_file *file, int32_t frame);
 
 /* An entry of the chunk table, which is in file order and includes unknown optional kinds. FORMAT.md describes the
- * payloads. Static data (METADATA, ATTRIBUTE) is as stored, including zstd frames: call ath_check_chunk before use. */
+ * payloads. The bytes are as stored: call ath_check_chunk before you use them. */
 typedef struct ath_chunk {
     const uint8_t *bytes; /* null: not fed */
     uint64_t offset;
@@ -408,6 +409,52 @@ ATH_API size_t ath_polygons_size(const ath_file *file);
 ATH_API int ath_read_polygons(const ath_file *file, int kind, void *memory, size_t memory_bytes, uint32_t *counts,
                               int32_t *corners, ath_fault_info *fault);
 
+/* Bytes of the file. */
+typedef struct ath_range {
+    uint64_t offset, size;
+} ath_range;
+
+/* A named array of the source, such as "uv" or "radius", from an ATTRIBUTE chunk; its number is the chunk's. The numbers
+ * of its elements are little-endian, in row-major order. They are packed: unpack the zstd frame with a zstd library,
+ * such as ZSTD_decompress(unpacked, array.bytes, array.packed, array.packed_bytes), and refuse the array unless exactly
+ * array.bytes bytes come out. Then ath_array_elements puts them in order. */
+typedef enum ath_array_kind {
+    ATH_BOOLEANS = 0,
+    ATH_UNSIGNED = 1,
+    ATH_INTEGERS = 2,
+    ATH_FLOATS = 3,
+    ATH_TEXTS = 4 /* padded with zeros */
+} ath_array_kind;
+enum { ATH_DIMENSIONS = 32 };
+typedef struct ath_array {
+    const char *name;             /* UTF-8 without a terminating zero, in the bytes of the chunk */
+    const uint8_t *packed;        /* one zstd frame */
+    uint64_t packed_bytes, bytes; /* of the frame, and of all elements; both are 0 if a size of the shape is 0 */
+    uint32_t name_bytes, kind, item_bytes, dimension_count;
+    uint32_t shape[ATH_DIMENSIONS];
+} ath_array;
+
+/* Writes the ranges of the arrays that have not been fed, which no level needs and which may stand behind the motion.
+ * Ranges ascend, and adjacent ones are merged. Returns their number, of which at most `capacity` are written. */
+ATH_API int32_t ath_array_ranges(const ath_file *file, ath_range *ranges, int32_t capacity);
+/* Returns the number of the array with a name, among those that have been fed and are valid; -1: none has it. */
+ATH_API int32_t ath_array_named(const ath_file *file, const char *name);
+/* Fills `array` from the chunk with a number. Returns ATH_OK, ATH_MISSING, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK,
+ * ATH_LIMIT_EXCEEDED, or ATH_BAD_ARGUMENT: the chunk is no ATTRIBUTE. fault: may be null. */
+ATH_API int ath_array_of(const ath_file *file, int32_t chunk, ath_array *array, ath_fault_info *fault);
+/* Writes the array.bytes bytes of all elements, from as many unpacked bytes that are elsewhere in memory. */
+ATH_API void ath_array_elements(const ath_array *array, const void *unpacked, void *elements);
+
+/* The metadata: a JSON object in UTF-8 without a terminating zero. That the text is JSON is not checked. */
+typedef struct ath_metadata {
+    const uint8_t *stored;        /* null: the file has none */
+    uint64_t stored_bytes, bytes; /* as stored, and of the text */
+    int32_t is_packed;            /* 1: one zstd frame, to be unpacked as that of an array; 0: the text itself */
+} ath_metadata;
+
+/* Fills `metadata`. Returns ATH_OK, ATH_BAD_CHECKSUM, ATH_BAD_CHUNK or ATH_LIMIT_EXCEEDED. fault: may be null. */
+ATH_API int ath_metadata_of(const ath_file *file, ath_metadata *metadata, ath_fault_info *fault);
+
 /* ---- bytes ------------------------------------------------------------------------------------------------------- */
 
 /* Hands over `size` bytes of the file from `offset` on. Chunks that lie wholly inside can be used from now on; others
@@ -415,10 +462,6 @@ ATH_API int ath_read_polygons(const ath_file *file, int kind, void *memory, size
 ATH_API void ath_feed(ath_file *file, const uint8_t *bytes, uint64_t offset, size_t size);
 /* Forgets chunks that touch a range, so that you may free their bytes. Do not drop chunks of a running preparation. */
 ATH_API void ath_drop(ath_file *file, uint64_t offset, uint64_t size);
-
-typedef struct ath_range {
-    uint64_t offset, size;
-} ath_range;
 
 /* Writes the ranges of bytes that the segments first to last, and those that they are joined to, need for `level` and
  * that have not been fed; if `all` is 1, those that have been fed as well. Ranges ascend, and adjacent ones are merged.

@@ -5,6 +5,7 @@
  *     #include "ath_player.h"
  *
  *     ath_player_open, ath_player_close      open all of a file or a prefix of it, at once or in slices
+ *     ath_player_feed                        hand over ranges of it that have arrived since
  *     ath_player_positions, _matrices        get what to draw of a clip at a time and level
  *     ath_player_faded_positions             do the same during a fade from level to level
  *     ath_player_blended_positions           blend several clips by weights
@@ -16,13 +17,13 @@
  *     ath_player_triangles, _lines           get the topology
  *     ath_player_normals, _tangents          compute what shading needs
  *
- * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. For
- * downloads that grow, and to decide yourself what is in memory, use ath.h.
+ * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. To
+ * decide yourself what is in memory, use ath.h.
  *
  * Time. A call that shows something builds levels and prepares segments for its budget, about 2 ms, and at most one step
  * of ath.h more. Opening takes longer, unless you choose options.in_slices.
  * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. If
- * there is none, it prepares level 0 at once. If the level is prepared for only one of two frames, that one is held.
+ * there is none, it prepares level 0 at once, or the coarsest one whose bytes have been fed. If the level is prepared for only one of two frames, that one is held.
  *
  * Threads. Use a player from one thread at a time. Only ath_player_run may run on other threads meanwhile, each job on
  * one. Hand the job over and back by a queue of yours.
@@ -62,6 +63,9 @@ int ath_player_open(ath_player **player, const uint8_t *bytes, size_t size, cons
                     ath_fault_info *fault);
 /* Closes a player, which may be null. End its jobs before. */
 void ath_player_close(ath_player *player);
+/* Hands over `size` bytes of the file from `offset` on, such as a range that ath_ranges names, as ath_feed does; they
+ * have to stay in place, too. Levels whose bytes have arrived are shown from the next call on. End all jobs before. */
+void ath_player_feed(ath_player *player, const uint8_t *bytes, uint64_t offset, size_t size);
 /* Returns the file, for ath_get_info, ath_clips, ath_level_for, ath_cut and all functions that take a const file. */
 const ath_file *ath_player_file(const ath_player *player);
 /* Returns the fault behind the last error. */
@@ -489,6 +493,14 @@ void ath_player_end(ath_player *player, ath_player_job *job)
     ath_player_retire(player, job);
 }
 
+/* What failed may succeed with these bytes. */
+void ath_player_feed(ath_player *player, const uint8_t *bytes, uint64_t offset, size_t size)
+{
+    ath_feed(player->file, bytes, offset, size);
+    player->refused = ATH_OK;
+    if (player->own && player->own->result != ATH_MORE) ath_player_end(player, player->own);
+}
+
 /* Returns the job that prepares a segment at a level; null: none. */
 static ath_player_job *ath_player_job_of(const ath_player *p, int32_t segment, int32_t level)
 {
@@ -538,11 +550,31 @@ static int ath_player_prepare(ath_player *p, int32_t segment, int32_t level, int
 
 /* ---- showing ---- */
 
-/* Returns the deepest level up to `level` (-1: any) whose bytes a segment has. */
+/* Returns whether a segment has the bytes of a level. Those of a coarser level need not be among them. */
+static int ath_player_has(const ath_player *p, int32_t segment, int32_t level)
+{
+    return ath_ranges(p->file, level, segment, segment, 0, NULL, 0) == 0;
+}
+
+/* Returns the deepest level up to `level` (-1: any) whose bytes a segment has; -1: none. */
 static int32_t ath_player_level_of(const ath_player *p, int32_t segment, int32_t level)
 {
     int32_t ready = ath_ready_level(p->file, segment);
-    return level < 0 || level > ready ? ready : level;
+    if (level < 0 || level >= ready) return ready;
+    while (level >= 0 && !ath_player_has(p, segment, level)) level--;
+    return level;
+}
+
+/* Returns the same for both segments of a blend. */
+static int32_t ath_player_level_at(const ath_player *p, const ath_blend *blend, int32_t level)
+{
+    int32_t before;
+    do {
+        before = level;
+        for (int32_t i = 0; i < 2 && (i == 0 || level >= 0); i++)
+            level = ath_player_level_of(p, blend->segment[i], level);
+    } while (level >= 0 && level != before);
+    return level;
 }
 
 /* Returns the best level up to `most` that is prepared of a segment, `level` or else a deeper one, or else a coarser
@@ -555,13 +587,21 @@ static int32_t ath_player_best(const ath_player *p, int32_t segment, int32_t lev
     return level;
 }
 
+/* Returns the coarsest level whose bytes a segment has, among which are those of `level`. */
+static int32_t ath_player_coarsest(const ath_player *p, int32_t segment, int32_t level)
+{
+    int32_t coarsest = 0;
+    while (coarsest < level && !ath_player_has(p, segment, coarsest)) coarsest++;
+    return coarsest;
+}
+
 /* Returns the level to prepare next on the way to a level: first the deepest of at most an eighth of its size. */
 static int32_t ath_player_aim(const ath_player *p, int32_t segment, int32_t level)
 {
     int32_t aim = level;
     if (ath_player_find(p, segment, level) || ath_player_job_of(p, segment, level)) return level;
-    while (aim > 0 && p->sizes[aim] > p->sizes[level] / 8) aim--;
-    return ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
+    while (aim >= 0 && (p->sizes[aim] > p->sizes[level] / 8 || !ath_player_has(p, segment, aim))) aim--;
+    return aim >= 0 && ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
 }
 
 /* Gets the segments of a moment at a level or, until they are prepared, at the best level up to `most`. */
@@ -570,7 +610,7 @@ static int ath_player_moment_at(ath_player *p, double frame, int32_t level, int3
     ath_blend blend = ath_blend_at(p->file, frame);
     int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1, exactly = ATH_PLAYER_EXACT;
     int result = ATH_OK;
-    for (int32_t i = 0; i < count; i++) level = ath_player_level_of(p, blend.segment[i], level);
+    level = ath_player_level_at(p, &blend, level);
     moment->frame = frame;
     moment->level = level;
     moment->segment_count = 0;
@@ -579,7 +619,7 @@ static int ath_player_moment_at(ath_player *p, double frame, int32_t level, int3
     if (best >= 0)
         ath_player_find(p, blend.segment[0], best)->used = p->calls;
     else if (p->left != exactly)
-        result = ath_player_prepare(p, blend.segment[0], 0, &exactly);
+        result = ath_player_prepare(p, blend.segment[0], ath_player_coarsest(p, blend.segment[0], level), &exactly);
     if (result == ATH_OK && p->left != exactly)
         result = ath_player_prepare(p, blend.segment[0], ath_player_aim(p, blend.segment[0], level), &p->left);
     for (int32_t i = 0; i < count && result == ATH_OK; i++)
@@ -766,8 +806,7 @@ static int ath_player_wish(const ath_player *p, int32_t place, int32_t *segment,
     const ath_player_track *track = p->tracks + (place < shown ? place / 3 : place - shown);
     ath_blend blend = ath_blend_at(p->file, track->frame);
     *segment = place < shown ? blend.segment[place % 3 / 2] : ath_player_next(p, track);
-    *level = track->level;
-    for (int32_t i = 0; place < shown && i < 2; i++) *level = ath_player_level_of(p, blend.segment[i], *level);
+    *level = place < shown ? ath_player_level_at(p, &blend, track->level) : track->level;
     if (place >= shown && *segment >= 0) *level = ath_player_level_of(p, *segment, *level);
     if (*level < 0) *segment = -1;
     if (place < shown && place % 3 == 0 && *segment >= 0) *level = ath_player_aim(p, *segment, *level);
