@@ -133,3 +133,23 @@ def test_feet_of_several_plants_carry_all_of_them():
     assert on_feet.branch_parent.tolist() == [9] * 9 + [-1]
     feet = np.flatnonzero(on_feet.vertex_branch == 9)
     assert set(feet) <= set(range(0, 54, 6)) and np.ptp(standing[0, feet], axis=0)[[0, 2]].min() > 1.5
+
+
+def test_organs_that_grow_in_proportion_do_not_stand_still():
+    tree, random = blown_tree(3, 12, 24), np.random.default_rng(7)
+    leaf, count = random.standard_normal((40, 3)) * [0.1, 0.1, 0.002], 12
+    feet, size = 2 * random.standard_normal((count, 1, 3)), np.linspace(0.2, 1.0, tree.frame_count)
+    leaves = (feet + np.multiply.outer(size, np.broadcast_to(leaf, (count, 40, 3)))).reshape(tree.frame_count, -1, 3)
+    moving = tree.block(0, tree.frame_count)
+    both = np.concatenate([moving, leaves], axis=1).astype(np.float32)
+    of_leaves = np.repeat(np.arange(count), 40)
+    label = np.concatenate([np.zeros(tree.vertex_count, int), 1 + of_leaves])
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(both.reshape(-1, 3), axis=0)))
+
+    def clip(positions: np.ndarray, labels: np.ndarray) -> MotionClip:
+        parents = np.full(labels.max() + 1, -1)
+        return MotionClip(positions, tree.time, rest=positions[-1], vertex_branch=labels, branch_parent=parents)
+
+    alone = size_of(clip(both[:, : tree.vertex_count], 0 * label[: tree.vertex_count]), bound)
+    alone += size_of(clip(both[:, tree.vertex_count :], of_leaves), bound)
+    assert size_of(clip(both, label), bound) <= 1.2 * alone
