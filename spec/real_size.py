@@ -179,7 +179,8 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """As athcodec writes it; one has layers about the mean pose, and one refines its rest pose, paying or not."""
+    """As athcodec writes it; paying or not, one has layers about the mean pose, one refines its rest pose, and one moves
+    about its exact rest pose."""
     import athcodec
     from athcodec.encoding import start
     from athcodec.encoding.search import Search
@@ -187,6 +188,8 @@ def encoded(name: str) -> bytes:
     best, share = Search.about_best_reference, start.AT_ONCE_SHARE
     if name == "all":
         Search.about_best_reference = Search.about_mean_pose
+    if name == "exact-rest":
+        Search.about_best_reference = lambda search: search
     if name == "refined-rest":
         start.AT_ONCE_SHARE = 0.0
     try:
@@ -217,7 +220,7 @@ def features(data: bytes) -> set[str]:
         "joins": any(join.width for join in joins),
         "sloped joins": any(join.is_sloped for join in joins),
         "repeats": any(header.repeats),
-        "learned bases": any(head[5] > 1 for head in heads),
+        "learned bases": any(head[5] > 0 for head in heads),
         "sheets": any(branch.flags & rules.SHEET for branch in file.branches),
         "loose branches": any(branch.flags & rules.LOOSE for branch in file.branches),
         "whole subtrees": any(branch.flags & rules.WHOLE for branch in file.branches),

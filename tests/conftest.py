@@ -134,7 +134,7 @@ def opened_file(opened):
 @pytest.fixture
 def any_unit(monkeypatch):
     """Lets encoding store whatever unit and up axis a clip has, as encoders of other versions did."""
-    for module in ("encoder", "job"):
+    for module in ("encoder", "assembly"):
         monkeypatch.setattr(f"athcodec.encoding.{module}.stated_scene", lambda metadata: {})
 
 
