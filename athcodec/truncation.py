@@ -106,7 +106,7 @@ def truncate(
 
 
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
-    """Return the front of the file that ends with a level, and the chunks behind it.
+    """Return the front of a file that is cut off after a level, and the chunks it keeps, which follow the front.
 
     Chunks of unknown kinds are kept as FORMAT.md, "Rewriting", says of a file that is cut off behind a level.
     """

@@ -74,7 +74,7 @@ def best_other(sizes: Sizes, bound: float) -> Point | None:
 
 
 def exponent(bound: float) -> str:
-    """A bound as documents write it: 1e-4."""
+    """Return a bound as documents write it: 1e-4, and "lossless" for 0."""
     return f"{bound:.0e}".replace("e-0", "e-") if bound else "lossless"
 
 
@@ -134,7 +134,8 @@ def _beside(ours: int | None, best: Point | None) -> str | None:
 
 
 def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]) -> str:
-    """Sentences on where another codec's or the source's file is smaller, and on what has no file."""
+    """Return sentences on where another codec's or the source's file is smaller, on clips with a level that is worse
+    than the one before, on what has no file, and on the versions and time limits."""
     compared, smaller, larger, coarser = 0, [], [], []
     names = [clip["clip"] for clip in clips]
     own = [point for point in points if point["clip"] in names and point["bound"] in bounds]

@@ -429,6 +429,7 @@ static void print_facts(const opened *clip)
     put(", ", "work_bytes", (double)clip->work_bytes);
 }
 
+/* Prints one JSON object: facts on the file, and the times of its levels, of going on to deeper ones, and of seeks. */
 static void all(opened *clip, int rounds, int seeks)
 {
     level_run runs[LEVELS];

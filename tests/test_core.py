@@ -20,7 +20,6 @@ import athcodec
 from athcodec import errors
 from athcodec.decoding import container as ct
 from athcodec.encoding import search, start
-from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.settings import Settings
 from athcodec.encoding.trials import Trials
 
@@ -802,8 +801,8 @@ def refined(request) -> Player:
     clip = athcodec.join(clip) if isinstance(clip, dict) else clip
     with pytest.MonkeyPatch.context() as patch:
         if request.param == "time bases":
-            patch.setattr(learned_bases, "best_bases", all_learned)
-            patch.setitem(search.CHOICES, all_learned, ("time bases", 1.0))
+            patch.setitem(search.BY_NAME, "best_bases", all_learned)
+            patch.setitem(search.CHOICES, all_learned, "time bases")
         return Player(athcodec.encode(clip, **GIVEN | options))
 
 

@@ -359,7 +359,7 @@ class File:
         return [lib.ath_segment_start(self._file, segment) for segment in (*segments, segments.stop)]
 
     def cut(self, level: int) -> np.ndarray:
-        """Return the parts that the plant is made of at a level, (P,) of PART."""
+        """Return the parts that a level cuts the plant into, (P,) of PART: nodes and runs of exact vertices."""
         count = c_int32()
         lib.ath_cut_size(self._file, level, byref(count), None, None)
         parts = np.zeros(count.value, PART)

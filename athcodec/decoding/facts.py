@@ -152,4 +152,5 @@ def head(name: str, unit: Any) -> str:
 
 
 def size_of(facts: dict[str, Any]) -> str:
+    """Return a sentence on the size of the file beside that of its positions as float32."""
     return f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: {facts['ratio']:.1f} to 1."

@@ -42,7 +42,8 @@ class EncodingOptions:
         rest_error: LengthLike | None = None,
         **options,
     ) -> EncodingOptions:
-        """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them."""
+        """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them.
+        segment_frames: limits the segments of predicted motion, too."""
         if segment_frames is not None:
             options |= {"segment_frames": segment_frames, "predicted_frames": segment_frames}
         return cls(ladder=ladder_of(ladder), rest_precision=RestPrecision.of(rest_error), **options)

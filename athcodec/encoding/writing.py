@@ -77,7 +77,7 @@ class ChunkStore:
         self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
 
     def leave_out(self, is_needless: Callable[[Chunk], bool]) -> None:
-        """Drop chunks of motion."""
+        """Drop the chunks of motion that `is_needless` is true of. All other chunks stay."""
         self.entries = [entry for entry in self.entries if not (entry[0].is_motion and is_needless(entry[0]))]
 
     def replace(self, kind: int, payload: bytes) -> None:

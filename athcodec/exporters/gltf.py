@@ -314,8 +314,9 @@ def _add_channels(
     samplers: list[dict],
     channels: list[dict],
 ) -> None:
-    """Adds samplers and channels of those nodes (J,) that are used, by path; what moves has all keys, the others
-    one."""
+    """Append samplers and channels. poses, used, moves: one array for each of PATHS, of which the latter two say, (J,),
+    which nodes have a channel and which of those move. A node that moves gets a key per frame, one that is still a
+    single key."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
     for path, values, mine, moving in zip(PATHS, poses, used, moves):
         for which, count in ((moving, len(values)), (mine & ~moving, 1)):

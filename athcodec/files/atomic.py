@@ -278,6 +278,8 @@ def _prefix(name: str) -> str:
 
 
 def _locked_new_file(path: str) -> tuple[str, int]:
+    """Create a file beside `path` and lock it, so that no other writer takes it for a leftover. Return its name and
+    descriptor."""
     directory, name = os.path.split(path)
     while True:
         pending = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")

@@ -194,7 +194,7 @@ def _has_motion(node: GltfNode) -> bool:
 
 
 def _patterns(options: ReadOptions) -> list[str]:
-    """Return the patterns of the names of nodes and meshes to read."""
+    """Return the patterns in `options.only` that choose nodes and meshes, without those that choose animations."""
     return [name for name in options.only if not name.startswith(ANIMATION)]
 
 

@@ -504,6 +504,7 @@ class _Binary:
         return np.frombuffer(self._data, dtype, count, self._at)
 
     def skip(self, element: PlyElement, lengths: dict[str, int], count: int) -> None:
+        """Pass `count` rows of an element whose lists have these lengths."""
         self._at += count * element.row(self._order, lengths).itemsize
 
     def rest(self) -> int:

@@ -177,6 +177,7 @@ def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
     cache = UsdGeom.XformCache()
 
     def matrix(obj: _Prim, frame: int) -> np.ndarray:
+        """Return the map from the points of a prim to the world, (4, 4), or of all its copies, (copies, 4, 4)."""
         cache.SetTime(codes[frame])
         if obj.instances is not None:
             return obj.instances.matrices(cache, obj.prim, frame)

@@ -89,7 +89,8 @@ class Search:
         return self.known[at]
 
     def run(self, rounds: int) -> Settings:
-        """Return the best of all settings tried."""
+        """Return the best of all settings tried in at most `rounds` passes over all axes. Ends early where a pass
+        changes nothing or where the time is up."""
         with suppress(_OutOfTime):
             self._run(rounds)
         return self.settings(min(self.known, key=self.known.get))

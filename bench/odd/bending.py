@@ -35,6 +35,7 @@ class Bones:
 
     @classmethod
     def of(cls, plant: Plant) -> Bones:
+        """Return the nodes of a plant, with only what bending needs."""
         return cls(plant.parent, plant.branch, plant.branch_parent, plant.elements)
 
     @property

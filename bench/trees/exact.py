@@ -181,6 +181,7 @@ class Equations:
     """The stiffness of beams.py times a factor, plus a diagonal (6, N), with the root held: solved along the tree."""
 
     def __init__(self, plant: Plant, factor: float, diagonal: np.ndarray) -> None:
+        """Eliminate the equations from the tips to the root, once for all calls of `solve`."""
         matrices, coupling = _stiffness(plant, factor)
         for k in range(6):
             matrices[k, k] += diagonal[k]

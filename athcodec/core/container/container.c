@@ -71,6 +71,7 @@ static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_
                       known, found);
 }
 
+/* Checks the magic bytes as far as they are there, and the version and features once the bytes reach the checksum. */
 static int check_magic(const uint8_t *bytes, size_t available, ath_fault_info *fault)
 {
     static const uint8_t magic[8] = {0x89, 'A', 'T', 'H', '\r', '\n', 0x1a, '\n'};

@@ -146,7 +146,7 @@ def _map_levels(plan: Plan) -> list[int]:
 
 
 def _errors_of_maps(prelude: CodedPrelude, segment: SegmentMotion, sample: np.ndarray) -> Iterator[float]:
-    """Yield the RMS errors of a sample at the levels that have maps."""
+    """Yield the RMS error, at each level that has maps, of the segment against its source positions `sample`."""
     room = np.empty(sample.shape)
     for level in _map_levels(prelude.plan):
         pose = segment.pose(level, prelude.origin, prelude.dtype, room)

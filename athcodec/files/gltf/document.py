@@ -225,6 +225,7 @@ class GltfFile:
         return buffer, offset, size
 
     def _view(self, index: Any, view: Mapping, offset: int, size: int) -> bytes:
+        """Return bytes of the buffer view `view`, of number `index`, unpacked if it is compressed. Raises ClipError."""
         extensions = view.get("extensions") or {}
         for name in MESHOPT:
             if name in extensions:
