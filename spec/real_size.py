@@ -179,8 +179,8 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """As athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest pose, and
-    one moves about its exact rest pose."""
+    """As athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest pose,
+    and one moves about its exact rest pose."""
     import athcodec
     from athcodec.encoding import start
     from athcodec.encoding.search import Search
