@@ -133,6 +133,10 @@ class Search:
         start = first_settings(source, ath, bound, samples, ratios)
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)._in_mid_turn()
+        if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
+            plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
+            other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
+            search = other if other.first_cost() <= search.first_cost() else search
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)

@@ -14,10 +14,8 @@ from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.clip import source_stem_index
 
-VERTICES, PAIRED = (
-    2048,
-    256,
-)  # Vertices by which the motion is found, and those of which all pairs are looked at, about.
+VERTICES = 2048  # Vertices by which the motion is found, about.
+PAIRED = 256  # Vertices of which all pairs are looked at, about.
 ROUNDS = 12  # Fits, each by what the one before leaves least of.
 LEAST_WEIGHED = 1e-5  # Of the diagonal: what a vertex is off by, below which it counts no more for it.
 MOST_LEFT = 0.2  # Share of the squares of all motion that the rest of it is at most if there is motion in common.
