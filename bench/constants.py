@@ -56,10 +56,10 @@ FIXED: Mapping[str, Sequence[str]] = {
         *("FILE_BYTE", "CORRECTION", "LEVEL", "LEVEL_MOTION", "START", "POSE", "REST", "PIECE", "BASIS", "COMPONENT"),
         *("EIGENVECTOR", "FINDING", "LEARNT", "LEARNING", "LEAST_WORK", "WORK", "SMALL_TRIALS", "BRANCHES", "SIZES"),
     ),
-    "job": ("SPOOL_BYTES", "CHUNK_BYTES", "LEVEL_BYTES"),
+    "assembly": ("SPOOL_BYTES",),
+    "decisions": ("CHUNK_BYTES", "LEVEL_BYTES"),
     "joins": ("END_FRAMES", "WIDTHS", "SLOPED", "TURN"),
     "layers": ("MOST_LAYERS", "MOST_LEVELS"),
-    "prediction": ("CUBES", "LATTICE"),
     "rigid": ("MOST_TURN",),
     "rings": ("LEAST_RING", "LARGEST_RING"),
     "quantise": (

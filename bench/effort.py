@@ -53,10 +53,6 @@ JUDGING = {
 }
 # Choices that stand between both parts of the order.
 STEPS = ("best_pieces_in_any_basis", "best_steps", "learned_about_other_pose")
-BY_HAND = (  # The order that was made by hand.
-    ("best_freedom", "still_if_smaller", "best_forms", "best_rotations", "best_bases", "best_forms_again"),
-    ("settled", "calm_parts", "best_slack", "waves_if_smaller", "best_rotations", "best_bases"),
-)
 LEAST_SHARE = 1e-6  # Share of the work allowed below which a choice counts as not made.
 USUAL, MOST = 1.02, 1.05  # Bytes, over those of effort "best", of 95 % of all clips, and of every one.
 
@@ -68,7 +64,7 @@ FILES_NOTE = f"""
 Bytes of positions alone in one layer. Seconds: of the processor. Best: bytes of effort "best"; default / best: at most
 {USUAL:g} on 95 % of all clips, {MOST:g} on every one. Untried: what the encoder's order left out for want of work.
 """
-HALVES_NOTE = "Means of ratios of bytes. By hand: the order that was made by hand."
+HALVES_NOTE = "Means of ratios of bytes."
 
 Order = tuple[tuple[str, ...], tuple[str, ...]]
 
@@ -88,7 +84,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     learned = learner.learned(halves["learning"])
     learner.follow(halves["judging"], learned)
     of_encoder = order.BEFORE_STEPS, order.AFTER_STEPS
-    for effort, one in (("default", of_encoder), ("default", BY_HAND), ("default", learned), ("best", of_encoder)):
+    for effort, one in (("default", of_encoder), ("default", learned), ("best", of_encoder)):
         for case in [*halves["learning"], *halves["judging"]]:
             _measure_file(store, case, args.rel_error, one, effort)
     files = {half: _file_rows(store, chosen, args.rel_error, of_encoder, learned) for half, chosen in halves.items()}
@@ -258,19 +254,15 @@ def _file_rows(
     rows = []
     for case in chosen:
         ours, other, best = file(case, of_encoder), file(case, learned), file(case, of_encoder, "best")
-        by_hand = file(case, BY_HAND)
         rows.append(
             {
                 "clip": case.name,
                 "encoder": ours["bytes"],
-                "by hand": by_hand["bytes"],
                 "learned": other["bytes"],
                 "best": best["bytes"],
-                "encoder / by hand": ours["bytes"] / by_hand["bytes"],
                 "learned / encoder": other["bytes"] / ours["bytes"],
                 "default / best": ours["bytes"] / best["bytes"],
                 "seconds": ours["seconds"],
-                "seconds, by hand": by_hand["seconds"],
                 "seconds, best": best["seconds"],
                 "untried": ", ".join(ours["untried"]),
             }
@@ -282,12 +274,10 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return what a half says of the order learned, and of the default effort."""
     return {
         "clips": len(rows),
-        "files that differ": sum(row["encoder / by hand"] != 1 for row in rows),
-        "encoder / by hand": mean(row["encoder / by hand"] for row in rows),
+        "files that differ": sum(row["learned / encoder"] != 1 for row in rows),
         "learned / encoder": mean(row["learned / encoder"] for row in rows),
         f"default / best above {USUAL:g}": sum(row["default / best"] > USUAL for row in rows),
         f"above {MOST:g}": sum(row["default / best"] > MOST for row in rows),
         "most": max(row["default / best"] for row in rows),
         "seconds": sum(row["seconds"] for row in rows),
-        "seconds, by hand": sum(row["seconds, by hand"] for row in rows),
     }

@@ -63,9 +63,7 @@ class CodedClip:
     rest_dtype: np.dtype
     rest_given: bool  # Whether files keep the rest pose because the source has one.
     branches: Found | None = None  # Those that were found for a clip without.
-    reference: np.ndarray | None = (
-        None  # (P, 3) float64 in file order: what motion is coded about; None: the rest pose.
-    )
+    reference: np.ndarray | None = None  # (P, 3) float64 in file order: what motion is coded about; None: `rest`.
     exact_rest: bool = False  # Whether the rest pose comes back bit for bit.
     host_rest: bool = False  # Whether a host has the rest pose.
     host_mesh: np.ndarray | None = None  # Rest pose of the host with all vertices; None: `rest`.

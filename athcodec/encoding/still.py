@@ -17,7 +17,7 @@ from athcodec.encoding.settings import OF_BRANCHES, Choice, Settings
 from athcodec.encoding.shape import detail_of, finer_than
 from athcodec.encoding.start import still_choice
 from athcodec.encoding.survey import Ath, Survey
-from athcodec.motion.branches.still import LEAST_STILL, still_vertices
+from athcodec.motion.branches.still import LEAST_STILL
 from athcodec.motion.thresholds import Thresholds
 
 STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
@@ -25,24 +25,12 @@ STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands sti
 
 def still_branches(source: Source, bound: float) -> np.ndarray | None:
     """Return which branches belong to trees that stand still, (B,) bool; None: too few do, or all."""
-    hierarchy, seen, most = source.hierarchy, source.seen, STILL_SHARE * source.smallest_bound(bound)
-    distance = np.full(hierarchy.branch_count, np.inf)
-    distance[seen.branches] = seen.largest_distance
+    hierarchy = source.hierarchy
+    stays = source.seen.largest_ways <= STILL_SHARE * source.smallest_bound(bound)
     roots = np.flatnonzero(hierarchy.branch_parent < 0)
-    tree = np.repeat(np.arange(len(roots)), np.diff(np.append(roots, hierarchy.branch_count)))
-    # What the survey measured is the distance from a map of the whole tree, which is 0 of one that turns or grows, too.
-    may_stay = distance[roots] <= most
-    tree_of_vertex = np.repeat(tree, hierarchy.stem_count)
-    vertices = np.flatnonzero(may_stay[tree_of_vertex])
-    if len(vertices) < LEAST_STILL:
-        return None
-    of_source = hierarchy.vertex_source[vertices]
-    rest = source.clip.rest[of_source] if source.reference is None else source.rest[vertices] + source.origin
-    moves = ~still_vertices(source.clip.motion, of_source, rest, most)
-    stays = may_stay & (np.bincount(tree_of_vertex[vertices], moves, minlength=len(roots)) == 0)
-    still = stays[tree]
-    count = int(hierarchy.stem_count[still].sum())
-    return still if LEAST_STILL <= count < hierarchy.vertex_count else None
+    still = np.repeat(stays, np.diff(np.append(roots, hierarchy.branch_count)))
+    vertices = int(hierarchy.stem_count[still].sum())
+    return still if LEAST_STILL <= vertices < hierarchy.vertex_count else None
 
 
 @dataclass(frozen=True)
@@ -188,6 +176,7 @@ def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
 def _seen(seen: Survey, sample: PlantSample) -> Survey:
     """Return the survey of some branches, in the box of all."""
     chosen = np.isin(seen.branches, sample.branches)
+    roots = np.flatnonzero(seen.hierarchy.branch_parent < 0)
     return replace(
         seen,
         hierarchy=sample.source.hierarchy,
@@ -196,6 +185,7 @@ def _seen(seen: Survey, sample: PlantSample) -> Survey:
         largest_gads=seen.largest_gads[:, chosen],
         largest_distance=seen.largest_distance[chosen],
         most_beyond_xi=None if seen.most_beyond_xi is None else seen.most_beyond_xi[chosen],
+        largest_ways=seen.largest_ways[np.isin(roots, sample.branches)],
     )
 
 

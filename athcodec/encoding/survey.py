@@ -354,6 +354,8 @@ class Survey:
         The surveyed one; None where lam was 0.
     most_beyond_xi : (C,) integer array or None
         The most vertices beyond xi in a frame (LAD); None where lam was 0.
+    largest_ways : (R,) float64
+        For each tree, by its root, the largest distance of any of its vertices from where it is in the base pose.
     steps : (T,) float64
         The largest distance of any vertex from where it is in the frame before, 0 only if all have the same bits;
         infinite for the first frame.
@@ -371,6 +373,7 @@ class Survey:
     largest_distance: np.ndarray
     xi: float | None
     most_beyond_xi: np.ndarray | None
+    largest_ways: np.ndarray
     steps: np.ndarray
 
     @property
@@ -482,11 +485,12 @@ def survey(
     rest = np.asarray(clip.rest, float)[hierarchy.vertex_source] if rest is None else rest
     branches = np.flatnonzero(hierarchy.branch_depth < max_depth)
     pieces = _tested_pieces(hierarchy, rest, branches)
+    trees = hierarchy.first_vertex[hierarchy.branch_parent < 0]
     xi = limits.distances[1] if limits.lam else None
 
     def measured(portion: np.ndarray) -> tuple[_Extent, Differences]:
         frames = _in_file_order(portion, hierarchy)
-        return _Extent.of(frames, rest), Differences.of(seen_from(pieces.origin, frames), pieces, xi)
+        return _Extent.of(frames, rest, trees), Differences.of(seen_from(pieces.origin, frames), pieces, xi)
 
     extent, differences, gads = None, None, _Largest(limits.eta + 1)
     steps: list[float] = []
@@ -510,6 +514,7 @@ def survey(
         largest_distance=differences.largest_distance,
         xi=xi,
         most_beyond_xi=None if xi is None else differences.most_beyond_xi,
+        largest_ways=np.sqrt(extent.square_ways),
         steps=np.array(steps),
     )
 
@@ -581,20 +586,24 @@ def _thresholds(
 
 @dataclass(frozen=True)
 class _Extent:
-    """Bounding box (3,), number of frames, and sum of squared distances from the rest pose."""
+    """Bounding box (3,), number of frames, and squared distances from the rest pose: their sum, and the largest in each
+    tree, (R,)."""
 
     low: np.ndarray
     high: np.ndarray
     frame_count: int
     square_sum: float
+    square_ways: np.ndarray
 
     @classmethod
-    def of(cls, frames: np.ndarray, rest: np.ndarray) -> _Extent:
-        """Return the extent of frames (3,k,N) in the scene's coordinates; rest: (N,3)."""
+    def of(cls, frames: np.ndarray, rest: np.ndarray, trees: np.ndarray) -> _Extent:
+        """Return the extent of frames (3,k,N) in the scene's coordinates; rest: (N,3); trees: (R,) their first
+        vertices."""
         moved = frames - rest.T[:, None]
         moved *= moved
         low, high = (corner.astype(float) for corner in (frames.min(axis=(1, 2)), frames.max(axis=(1, 2))))
-        return cls(low, high, frames.shape[1], float(moved.sum()))
+        ways = np.maximum.reduceat(moved.sum(axis=0).max(axis=0), trees)
+        return cls(low, high, frames.shape[1], float(moved.sum()), ways)
 
     def __or__(self, other: _Extent) -> _Extent:
         return _Extent(
@@ -602,6 +611,7 @@ class _Extent:
             np.maximum(self.high, other.high),
             self.frame_count + other.frame_count,
             self.square_sum + other.square_sum,
+            np.maximum(self.square_ways, other.square_ways),
         )
 
     def rms_motion(self, vertex_count: int) -> float:

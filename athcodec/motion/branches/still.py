@@ -34,7 +34,7 @@ def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
     """
     if stands_still(clip):
         return None
-    still = still_vertices(clip, np.arange(clip.vertex_count), clip.source_rest, most)
+    still = _still_vertices(clip, most)
     if np.count_nonzero(still) < LEAST_STILL or still.all():
         return None
     links = _links(clip)
@@ -46,16 +46,16 @@ def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
     return chosen if LEAST_STILL <= np.count_nonzero(chosen) < clip.vertex_count else None
 
 
-def still_vertices(clip: MotionClip, vertices: np.ndarray, rest: np.ndarray, most: float) -> np.ndarray:
-    """Return which of some vertices (n,) of a clip stay within a distance of a pose (n, 3) in all frames, (n,) bool;
-    frames are read until fewer than LEAST_STILL do."""
-    still = np.ones(len(vertices), bool)
+def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
+    """Return which vertices stay within a distance of the rest pose, (N,) bool; frames are read until too few do."""
+    rest = clip.source_rest
+    still = np.ones(clip.vertex_count, bool)
     for _, block in clip.blocks():
         some = np.flatnonzero(still)
-        away = block[:, vertices[some]] != rest[some]
+        away = block[:, some] != rest[some]
         moved = away.any(axis=(0, 2))
         if most > 0 and moved.any():
-            apart = block[:, vertices[some[moved]]].astype(np.float64) - rest[some[moved]]
+            apart = block[:, some[moved]].astype(np.float64) - rest[some[moved]]
             moved[moved] = np.square(apart).sum(axis=2).max(axis=0) > most**2
         still[some[moved]] = False
         if np.count_nonzero(still) < LEAST_STILL:
