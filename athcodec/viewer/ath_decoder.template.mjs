@@ -8,7 +8,7 @@ const WASM = "@WASM@"; // zlib, base64
 // @include web/zstd.js
 // @include src/normals.js
 
-const OK = 0, BAD_CHUNK = 9, LIMIT_EXCEEDED = 10, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
+const OK = 0, BAD_CHUNK = 9, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };
 const MEASURES = { max: 0, p99: 1, rms: 2 };
 const WRAPS = { clamp: 0, loop: 1, pingpong: 2, marked: 3 };
@@ -39,7 +39,12 @@ const FAULT_SIZE = 56, LIMITS_SIZE = 40, FAULT_TEXT = 256, LEVEL_NAME = 32;
 const POLYGONS = { faceCount: "u32", cornerCount: "u32", columns: "u32", isMixed: "u8", isDerived: "u8" };
 const POLYGONS_SIZE = 16, POLYGON_KINDS = { faces: 5, edges: 0x8006 };
 const METADATA = 0x8004, ATTRIBUTE = 0x8020;
-const MOST_TEXT = 2 ** 20, MOST_ARRAY = 2 ** 28, MOST_NAME = 4096, MOST_WINDOW = 2 ** 23, MOST_DIMENSIONS = 32; // FORMAT.md, "Limits"
+const PACKED_ARRAY = {
+  name: "u32", packed: "u32", packedBytes: "u64", bytes: "u64", nameBytes: "u32", kind: "u32", size: "u32", dimensions: "u32",
+};
+const PACKED_ARRAY_SIZE = 168, SHAPE = 40; // offset of the shape
+const PACKED_TEXT = { packed: "u32", packedBytes: "u64", bytes: "u64", isPacked: "i32" };
+const PACKED_TEXT_SIZE = 32;
 // The arrays that hold the elements of each kind, by their bytes. Halves are widened, and texts become strings.
 const [FLOATS, TEXTS] = [3, 4], ELEMENTS = [
   { 1: Uint8Array },
@@ -294,17 +299,6 @@ function asOut(out, length, types) {
 // ---- static data ----
 
 const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
-
-// Returns {window, size} of the frame's header: 0 for no window beside the content, -1 for a size that is not stated; null: this is no frame.
-function zstdHeader(frame) {
-  if (frame.length < 6 || frame[0] !== 0x28 || frame[1] !== 0xb5 || frame[2] !== 0x2f || frame[3] !== 0xfd) return null;
-  const descriptor = frame[4], single = (descriptor >> 5) & 1, window = single ? 0 : (8 + (frame[5] & 7)) * 2 ** (7 + (frame[5] >> 3));
-  const bytes = [single, 2, 4, 8][descriptor >> 6], at = 5 + (single ? 0 : 1) + [0, 1, 2, 4][descriptor & 3];
-  if (bytes === 0 || at + bytes > frame.length) return { window, size: -1 };
-  let size = 0;
-  for (let i = bytes - 1; i >= 0; i--) size = size * 256 + frame[at + i];
-  return { window, size: bytes === 2 ? size + 256 : size };
-}
 
 // Puts planes of bytes back into elements of `size` bytes.
 function unshuffle(planes, count, size) {
@@ -697,65 +691,41 @@ export class AthFile {
     return this.#core.error(code, what, { chunk: index });
   }
 
-  // Returns what a frame holds. size: the bytes that it has to have; null: up to `most`, as it states.
-  #unpack(index, frame, size, most) {
-    const header = zstdHeader(frame);
-    if (!header || header.size <= 0 || (size !== null && header.size !== size))
-      throw this.#wrong(index, `chunk ${index}: got a zstd frame of ${header?.size ?? "no"} bytes, expected ${size ?? "its size"}`);
-    if (header.size > most || header.window > Math.max(MOST_WINDOW, size ?? 0))
-      throw this.#wrong(index, `chunk ${index}: got ${header.size} bytes in a zstd frame, expected at most ${most}`, LIMIT_EXCEEDED);
+  // What the frame of a chunk holds, whose head the core has checked.
+  #unpacked(index, { packed, packedBytes, bytes }) {
     let content = null;
     try {
-      content = zstd.decompress(frame);
+      content = zstd.decompress(this.#core.copy(Uint8Array, packed, packedBytes));
     } catch {
       // A frame that is damaged gives no content.
     }
-    if (content?.length === header.size) return content;
-    throw this.#wrong(index, `chunk ${index}: got a damaged zstd frame, expected ${header.size} bytes in it`);
-  }
-
-  #text(index, bytes, what) {
-    try {
-      return utf8.decode(bytes);
-    } catch {
-      throw this.#wrong(index, `${what}: got bytes that are no UTF-8`);
-    }
-  }
-
-  // The bytes of a chunk, which has to be here.
-  #here(index) {
-    const bytes = this.chunkBytes(index);
-    if (bytes) return bytes;
-    const { offset, length } = this.#chunks[index];
-    throw this.#core.error(MISSING, `chunk ${index}: got none of its bytes, expected ${length} from ${offset} on`, { chunk: index });
+    if (content?.length === bytes) return content;
+    throw this.#wrong(index, `chunk ${index}: got a damaged zstd frame, expected ${bytes} bytes in it`);
   }
 
   metadata() {
-    const index = this.#chunks.findIndex(({ kind }) => kind === METADATA);
+    const index = this.#chunks.findIndex(({ kind }) => kind === METADATA), core = this.#core;
     if (index < 0) return {};
-    const bytes = this.#here(index), body = bytes.subarray(1);
-    if (bytes.length < 1 || bytes[0] > 1) throw this.#wrong(index, `metadata: got form ${bytes[0]}, expected 0 or 1`);
-    const text = this.#text(index, bytes[0] === 1 ? this.#unpack(index, body, null, MOST_TEXT) : body, "metadata");
+    const text = core.with(PACKED_TEXT_SIZE, (at) => {
+      this.#checkFault((fault) => this.#c.ath_metadata_of(this.#at, at, fault));
+      return core.struct(PACKED_TEXT, at);
+    });
+    const bytes = text.isPacked ? this.#unpacked(index, text) : core.copy(Uint8Array, text.packed, text.packedBytes);
     try {
-      return JSON.parse(text);
+      return JSON.parse(utf8.decode(bytes));
     } catch {
-      throw this.#wrong(index, "metadata: got something else, expected a JSON object");
+      throw this.#wrong(index, "metadata: got something else, expected a JSON object in UTF-8");
     }
   }
 
-  // The head of a static array, and its packed body.
+  // The static array of a chunk: its head, and where its frame stands.
   #array(index) {
-    const bytes = this.#here(index), view = new DataView(bytes.buffer), wrong = (what) => this.#wrong(index, `static array: got ${what}`);
-    if (bytes.length < 8) throw wrong(`${bytes.length} bytes, expected a head of at least 8`);
-    const [kind, dimensions] = bytes, start = 8 + 4 * dimensions, nameEnd = start + view.getUint16(2, true), size = view.getUint32(4, true);
-    if (nameEnd > bytes.length || nameEnd === start || dimensions > MOST_DIMENSIONS) throw wrong(`no head in ${bytes.length} bytes`);
-    if (kind > TEXTS || !(kind === TEXTS ? size >= 1 && size <= MOST_TEXT : ELEMENTS[kind][size])) throw wrong(`kind ${kind} of ${size} bytes`);
-    if (nameEnd - start > MOST_NAME) throw this.#wrong(index, `static array: got a name of ${nameEnd - start} bytes`, LIMIT_EXCEEDED);
-    const name = this.#text(index, bytes.subarray(start, nameEnd), "name of a static array");
-    const shape = Array.from({ length: dimensions }, (_, d) => view.getUint32(8 + 4 * d, true));
-    if (shape.reduce((product, n) => product * (n || 1), size) > MOST_ARRAY)
-      throw this.#wrong(index, `static array ${name}: got a shape of ${shape.join(" x ")}, expected at most ${MOST_ARRAY} bytes`, LIMIT_EXCEEDED);
-    return { name, kind, size, shape, body: bytes.subarray(nameEnd) };
+    const core = this.#core;
+    return core.with(PACKED_ARRAY_SIZE, (at) => {
+      this.#checkFault((fault) => this.#c.ath_array_of(this.#at, index, at, fault));
+      const array = core.struct(PACKED_ARRAY, at), shape = [...core.view(Uint32Array, at + SHAPE, array.dimensions)];
+      return { ...array, name: utf8.decode(core.copy(Uint8Array, array.name, array.nameBytes)), shape };
+    });
   }
 
   // The chunks of static arrays, as {index, fed}.
@@ -768,14 +738,7 @@ export class AthFile {
   }
 
   attributeRanges() {
-    const ranges = [];
-    for (const { index, fed } of this.#arrays()) {
-      const { offset, length } = this.#chunks[index], last = ranges.at(-1);
-      if (fed) continue;
-      if (last && last.offset + last.size === offset) last.size += length;
-      else ranges.push({ offset, size: length });
-    }
-    return ranges;
+    return this.#ranges((at, capacity) => this.#c.ath_array_ranges(this.#at, at, capacity));
   }
 
   attribute(name) {
@@ -797,9 +760,8 @@ export class AthFile {
   }
 
   #elements(index) {
-    const { name, kind, size, shape, body } = this.#array(index), count = shape.reduce((product, n) => product * n, 1);
-    if (count === 0 && body.length > 0) throw this.#wrong(index, `static array ${name}: got ${body.length} bytes of no elements`);
-    const bytes = count > 0 ? unshuffle(this.#unpack(index, body, count * size, MOST_ARRAY), count, size) : new Uint8Array(0);
+    const head = this.#array(index), { kind, size, shape } = head, count = head.bytes / size;
+    const bytes = count > 0 ? unshuffle(this.#unpacked(index, head), count, size) : new Uint8Array(0);
     if (kind === TEXTS) return { array: stringsOf(bytes, size), shape };
     const whole = bytes.byteOffset % size ? bytes.slice() : bytes, array = new ELEMENTS[kind][size](whole.buffer, whole.byteOffset, count);
     return { array: kind === FLOATS && size === 2 ? widened(array) : array, shape };
@@ -916,6 +878,11 @@ export class AthFile {
     whole(after, -1, level, "after");
     const list = (at, capacity) => (after < 0 ? c.ath_ranges(this.#at, level, first, last, all ? 1 : 0, at, capacity)
       : c.ath_onward_ranges(this.#at, after, level, first, last, all ? 1 : 0, at, capacity));
+    return this.#ranges(list);
+  }
+
+  // list: as ath_ranges.
+  #ranges(list) {
     const count = list(0, 0);
     return this.#core.with(count * RANGE_SIZE, (at) => {
       list(at, count);

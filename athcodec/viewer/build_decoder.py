@@ -45,6 +45,7 @@ SMALL = (
     "refine.c",
     "refuse.c",
     "rest.c",
+    "static.c",
     "store.c",
 )
 """Run once per file, or little: compiled for size, all else for speed."""

@@ -14,6 +14,12 @@ _Static_assert(offsetof(ath_chunk, level) == 30 && sizeof(ath_chunk) == 32, "CHU
 _Static_assert(offsetof(ath_branch, ring) == 40 && sizeof(ath_branch) == 44, "BRANCH");
 _Static_assert(offsetof(ath_part, index) == 12 && sizeof(ath_part) == 16, "PART");
 _Static_assert(offsetof(ath_polygons, is_derived) == 13 && sizeof(ath_polygons) == 16, "POLYGONS");
+_Static_assert(offsetof(ath_array, packed_bytes) == 8 && offsetof(ath_array, name_bytes) == 24
+                   && offsetof(ath_array, shape) == 40 && sizeof(ath_array) == 168,
+               "PACKED_ARRAY");
+_Static_assert(offsetof(ath_metadata, stored_bytes) == 8 && offsetof(ath_metadata, is_packed) == 24
+                   && sizeof(ath_metadata) == 32,
+               "PACKED_TEXT");
 _Static_assert(offsetof(ath_range, size) == 8 && sizeof(ath_range) == 16, "RANGE_SIZE");
 _Static_assert(sizeof(ath_gpu_room) == 28, "GPU_ROOM_SIZE");
 _Static_assert(offsetof(ath_fade, level) == 4 && offsetof(ath_fade, weight) == 24 && offsetof(ath_fade, passed) == 56
