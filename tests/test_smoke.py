@@ -346,6 +346,10 @@ def test_the_builder_of_releases_compiles_the_whole_core_and_looks_for_files_tha
     assert {CORE / word for word in recipe if word.endswith(".c")} >= set(targets.decoder_sources())
     assert "-ffp-contract=off" in recipe and "-O3" in recipe
     assert all((ROOT / "athcodec" / name).exists() for name in release["HELD"])
+    # The file for pkg-config and the one for find_package take their version from here.
+    assert (
+        f"CMAKE_PROJECT_VERSION:STATIC={athcodec.__version__}\n" in (tmp_path / "cmake" / "CMakeCache.txt").read_text()
+    )
 
 
 def test_the_media_type_is_known_by_the_first_bytes_of_a_file(small_ath):

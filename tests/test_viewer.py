@@ -192,6 +192,7 @@ def test_the_bundles_are_small_and_their_licences_are_there():
     licences = (WEB / "LICENSES.txt").read_text("utf-8")
     assert re.search(r"three 0\.187\.0.*The MIT License.*three\.js authors", licences, re.DOTALL)
     assert "fzstd" in licences
+    assert (ROOT / "LICENSE").read_text("utf-8") in licences  # npm packs this file, and no other with the licence
 
 
 def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_imported():

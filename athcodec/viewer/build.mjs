@@ -94,5 +94,7 @@ for (const name of ["viewer.css", "forest.css", "gallery.css", "index.html", "fo
 copyFileSync(join(here, "src/index.d.ts"), join(out, "ATHLoader.d.ts"));
 copyFileSync(join(here, "src/element.d.ts"), join(out, "ath-viewer.d.ts"));
 copyFileSync(join(here, "src/webgpu.d.ts"), join(out, "ATHForestGPU.d.ts"));
-writeFileSync(join(out, "LICENSES.txt"), [["three", "three.js, three.webgpu.js, OrbitControls.js, model.js"], ["fzstd", "zstd.js, in ath_worker.js and ath_decoder.mjs"]]
-  .map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`).join(`\n${"-".repeat(80)}\n\n`));
+const packages = [["three", "three.js, three.webgpu.js, OrbitControls.js, model.js"], ["fzstd", "zstd.js, in ath_worker.js and ath_decoder.mjs"]];
+const licences = [`athcodec (all that is not named below)\n\n${readFileSync(join(here, "../../LICENSE"), "utf8")}`,
+  ...packages.map(([name, where]) => `${name} ${version(name)} (${where})\n\n${licence(name)}\n`)];
+writeFileSync(join(out, "LICENSES.txt"), licences.join(`\n${"-".repeat(80)}\n\n`));
