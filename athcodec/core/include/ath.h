@@ -92,7 +92,7 @@ ATH_API const char *ath_result_name(int result);
 
 /* A decoder of format 0.x reads files of its own version only, one of format 1.x those of every 1.y. ATH_FEATURES has a
  * bit for each known feature. */
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 15, ATH_FEATURES = 0 };
+enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 16, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. A decoder skips unknown kinds with the bit ATH_OPTIONAL. */
 enum {

@@ -7,7 +7,7 @@
 #include "bits/numbers.inl"
 #include "model/plan.h"
 
-enum { FRONT_GUESS = 5, OTHER_FRONT, GUESSES };
+enum { FRONT_GUESS = 6, OTHER_FRONT, GUESSES };
 enum { RUNS = 8 };
 
 /* The state of a vertex from frame to frame. */
@@ -208,18 +208,19 @@ ATH_INLINE void guess_axis(const predicted_vertex *vertex, const predicted_frame
 {
     const double *now = frames->now, *was = frames->was[0], *was2 = frames->was[1];
     size_t at = 3 * v + k;
-    double x = was[at], before = 0.0, before2 = 0.0, stem = 0.0, waits = 0.0;
+    double x = was[at], before = 0.0, before2 = 0.0, joined = 0.0, stem = 0.0, waits = 0.0;
     if (vertex->before >= 0) {
         size_t u = 3 * (size_t)vertex->before + k;
         before = now[u] - was[u];
         before2 = was[u] - was2[u];
+        joined = now[u] - x;
     }
     if (vertex->base >= 0) {
         size_t u = 3 * (size_t)vertex->base + k;
         stem = (now[u] - x) + scale * (frames->rest[at] - frames->rest[u]);
         waits = frames->rest[u] - x;
     }
-    double guesses[FRONT_GUESS] = {0.0, before, (x - was2[at]) + (before - before2), stem, waits};
+    double guesses[FRONT_GUESS] = {0.0, before, (x - was2[at]) + (before - before2), joined, stem, waits};
     for (int32_t i = 0; i < FRONT_GUESS; i++) p->guess[i][k] = guesses[i];
 }
 

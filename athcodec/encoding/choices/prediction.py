@@ -138,14 +138,19 @@ def best_prediction(
         for share in _still_shares(relative, smoothness):
             still = best(share, most)
             if still.bytes < most:
-                return still
+                found = still
+                if not (still.twitches and smoothness == "motion"):
+                    break
     return found if found.bytes < most_bytes else None
 
 
 def _still_shares(relative: float, smoothness: str) -> list[float]:
-    """Return the shares of the limit that errors may be held to, from small to large."""
+    """Return the shares of the limit that errors may be held to, as they are tried: from small to large until one is
+    not too dear, or for the calmest motion from large to small until nothing twitches."""
     least = _still_share(relative)
-    return [least] if smoothness == "motion" else [least, *(share for share in CALMER if share > least)]
+    if smoothness == "motion":
+        return [least, *(share for share in (FINE_STILL,) if share < least and relative >= FINE)]
+    return [least, *(share for share in CALMER if share > least)]
 
 
 def _still_share(relative: float) -> float:
