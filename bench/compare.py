@@ -159,12 +159,17 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
     parts = {
         "Measured with athcodec": versions,
         "Processor seconds of other codecs for a file:": limits,
-        f"Of {compared} sizes of athcodec another codec's is smaller in {len(smaller)}:": smaller or ["nowhere"],
+        _count_in_words(compared, len(smaller)): smaller or ["none"],
         "With all arrays the file is larger than its source:": larger,
         "The largest error of a level exceeds that of the level before:": coarser,
         "Without a file:": [f"{name} {count} times" for name, count in failed.items()],
     }
     return " ".join(f"{words} {', '.join(some)}." for words, some in parts.items() if some)
+
+
+def _count_in_words(compared: int, smaller: int) -> str:
+    words = f"Of {compared} sizes of athcodec, another codec's is smaller in"
+    return f"{words} {smaller}:" if smaller else words
 
 
 def _percent(one: int, other: int) -> str:
