@@ -12,7 +12,7 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.decoding.clip_view import ClipView
     from athcodec.decoding.decoder import Decoder
     from athcodec.encoding import Summary
-    from athcodec.encoding.survey import Ath, build_ath
+    from athcodec.encoding.clip.survey import Ath, build_ath
     from athcodec.exporters import write, write_hdf5
     from athcodec.finding import find_branches
     from athcodec.motion.branches.result import Found
@@ -60,7 +60,7 @@ __all__ = [
 # Names by module. Importing the package loads none of them, so that a command or a program pays for what it uses.
 _LAZY = {
     "binding": ("OntoMesh", "OntoReport", "onto"),
-    "encoding.survey": ("Ath", "build_ath"),
+    "encoding.clip.survey": ("Ath", "build_ath"),
     "motion.thresholds": ("Thresholds",),
     "decoding.ath_file": ("AthFile",),
     "motion.clip": ("MotionClip",),

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from athcodec.arrays import OF_ARRAYS, OF_PATHS, Source, clip_of
 from athcodec.encoding import Summary, encode_clip
-from athcodec.encoding.progress import Progress
+from athcodec.encoding.search.progress import Progress
 from athcodec.exporters import check_ath_name
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike

@@ -25,7 +25,7 @@ from typing import Any
 from unittest.mock import patch
 
 import athcodec
-from athcodec.encoding import progress
+from athcodec.encoding.search import progress
 from bench.clips import add_number, add_rel_error
 from bench.store import Store
 from bench.suite import cases

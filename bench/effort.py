@@ -2,8 +2,8 @@
 
 A choice saves bytes and takes counted work. On the clips of one half of the makers the order is built from nothing: at
 each place stands the choice that then saves most for its work, over all of these clips. Files in that order and in the
-encoder's (athcodec/encoding/order.py) are compared on both halves, and with those of effort "best". Every figure is
-stored as it is measured, and is not measured again.
+encoder's (athcodec/encoding/search/order.py) are compared on both halves, and with those of effort "best". Every figure
+is stored as it is measured, and is not measured again.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from typing import Any
 from unittest.mock import patch
 
 import athcodec
-from athcodec.encoding import order
-from athcodec.encoding.progress import allowed_work
-from athcodec.encoding.search import BY_NAME, Search, settled
-from athcodec.encoding.settings import Settings
-from athcodec.encoding.trials import Trials
+from athcodec.encoding.search import order
+from athcodec.encoding.search.progress import allowed_work
+from athcodec.encoding.search.search import BY_NAME, Search, settled
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
 from bench.clips import POSITIONS, add_rel_error
 from bench.store import Store
 from bench.suite import Case, cases

@@ -1,8 +1,8 @@
 """What each feature of the format saves: files of many clips that do without it, one feature at a time.
 
-The encoder searches its settings anew without the feature (athcodec.encoding.features), so that others may stand in for
-it. A feature that a file does not use costs nothing when it is left out; that file is not made again. Every figure is
-saved as it is measured, and is not measured again.
+The encoder searches its settings anew without the feature (athcodec.encoding.options.features), so that others may
+stand in for it. A feature that a file does not use costs nothing when it is left out; that file is not made again.
+Every figure is saved as it is measured, and is not measured again.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import numpy as np
 import athcodec
 from athcodec._native import SHEET
 from athcodec.encoding import Draft, code_segments, draft, write
-from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.features import Feature
-from athcodec.encoding.progress import Work
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.branch_trials import best_branches
+from athcodec.encoding.search.progress import Work
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
 from bench.clips import add_ladder, measure

@@ -1,7 +1,7 @@
 """Levels of detail: bytes, errors and gaps at the joints, compared with the paper's approximation A^d.
 
 Both sides use the same nodes. The paper's side (Song, Yang and Peng 2011, sections 3 and 4) is
-athcodec.encoding.survey: one independent least-squares affine map per piece and frame, as exact matrices, never
+athcodec.encoding.clip.survey: one independent least-squares affine map per piece and frame, as exact matrices, never
 quantised. Ours is the decoder's output for the bytes of that level.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 import athcodec
 from athcodec._native import LOOSE
 from athcodec.decoding.file_tables import Level
-from athcodec.encoding.survey import Ath, Gaps
+from athcodec.encoding.clip.survey import Ath, Gaps
 from athcodec.metrics import ErrorMeter, MotionMeter, level_meters
 from bench import data
 from bench.clips import Encoded, add_clips, add_ladder, add_rel_error, encoded

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.encoding.segmentation import split_segments
+from athcodec.encoding.segments.segmentation import split_segments
 from athcodec.exporters.hdf5 import Hdf5Writer
 from athcodec.options import MIN_SEGMENT
 from bench.clips import add_clips, add_number, add_rel_error

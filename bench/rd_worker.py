@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 import athcodec
-from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import best_branches
-from athcodec.encoding.progress import Work
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.branch_trials import best_branches
+from athcodec.encoding.search.progress import Work
 from athcodec.metrics import ErrorMeter, bits_per_vertex_frame
 from athcodec.motion.branches.result import with_branches
 from bench.codec_registry import OURS, chosen

@@ -23,7 +23,7 @@ import scipy.spatial  # noqa: F401
 
 import athcodec
 import athcodec.encoding.encoder
-from athcodec.encoding import sample
+from athcodec.encoding.search import sample
 from bench import data
 from bench.clips import add_clips, add_rel_error
 from bench.tables import table

@@ -22,7 +22,7 @@ import numpy as np
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.encoding.places import find_places
+from athcodec.encoding.clip.places import find_places
 from athcodec.motion.frames import Frames
 from bench.clips import add_clips, add_number, add_rel_error
 from bench.memory import peak_bytes

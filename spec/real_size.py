@@ -182,8 +182,8 @@ def encoded(name: str) -> bytes:
     """As athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest pose,
     and one moves about its exact rest pose."""
     import athcodec
-    from athcodec.encoding import start
-    from athcodec.encoding.search import Search
+    from athcodec.encoding.search import start
+    from athcodec.encoding.search.search import Search
 
     best, share = Search.about_best_reference, start.AT_ONCE_SHARE
     if name == "all":

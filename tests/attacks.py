@@ -20,7 +20,7 @@ from plants import subtree
 import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec.decoding.container import SOURCE_REST
-from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
+from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
 from athcodec.errors import BoundError
 from athcodec.motion.clip import LARGEST_COORDINATE
 

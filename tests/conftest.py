@@ -19,8 +19,8 @@ from s3 import S3Server
 import athcodec
 from athcodec import encoding
 from athcodec.decoding import core_file, segment_decoder
-from athcodec.encoding import start
-from athcodec.encoding.features import Feature
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search import start
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import read_hdf5, sample_path
 
@@ -134,7 +134,7 @@ def opened_file(opened):
 @pytest.fixture
 def any_unit(monkeypatch):
     """Lets encoding store whatever unit and up axis a clip has, as encoders of other versions did."""
-    for module in ("encoder", "assembly"):
+    for module in ("encoder", "assembly.assembly"):
         monkeypatch.setattr(f"athcodec.encoding.{module}.stated_scene", lambda metadata: {})
 
 

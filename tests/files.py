@@ -18,10 +18,10 @@ import athcodec
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
-from athcodec.encoding import streams, writing
-from athcodec.encoding.motion import LevelStream, Plan, SegmentMotion
-from athcodec.encoding.segmentation import balanced_segments
-from athcodec.encoding.time_bases import MOST_SAMPLE
+from athcodec.encoding.model.motion import LevelStream, Plan, SegmentMotion
+from athcodec.encoding.segments.segmentation import balanced_segments
+from athcodec.encoding.segments.time_bases import MOST_SAMPLE
+from athcodec.encoding.streams import streams, writing
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # for spec, which is not installed
 

@@ -17,8 +17,8 @@ from plants import awkward
 import athcodec
 from athcodec._native import BRANCH
 from athcodec.decoding import container as ct
-from athcodec.encoding import streams, writing
-from athcodec.encoding.motion import Plan
+from athcodec.encoding.model.motion import Plan
+from athcodec.encoding.streams import streams, writing
 
 SHEET, WHOLE = 1, 4
 

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from athcodec import MotionClip
-from athcodec.encoding.quantise import least_bound
+from athcodec.encoding.model.quantise import least_bound
 from athcodec.motion.clip import source_stem_index
 
 

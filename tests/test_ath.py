@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from plants import clip_of
 
-from athcodec.encoding import survey as ath_module
-from athcodec.encoding.survey import Ath, Gaps, build_ath, survey
+from athcodec.encoding.clip import survey as ath_module
+from athcodec.encoding.clip.survey import Ath, Gaps, build_ath, survey
 from athcodec.errors import ClipError
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.thresholds import Thresholds
@@ -305,8 +305,8 @@ def test_several_roots_are_nodes_of_depth_zero():
 )
 def test_the_result_does_not_depend_on_how_the_frames_are_read(sample_clip, monkeypatch, thresholds):
     whole = build_ath(sample_clip, *thresholds)
-    monkeypatch.setattr("athcodec.encoding.survey._READ_VALUES", 3 * 1001 * 7)
-    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 3 * 1001)
+    monkeypatch.setattr("athcodec.encoding.clip.survey._READ_VALUES", 3 * 1001 * 7)
+    monkeypatch.setattr("athcodec.encoding.clip.survey._WORK_VERTICES", 3 * 1001)
     portions = build_ath(sample_clip, *thresholds)
     assert 1 < whole.node_count < sample_clip.branch_count
     np.testing.assert_array_equal(whole.node_branch, portions.node_branch)
@@ -348,7 +348,7 @@ def tam(distances: list[np.ndarray], thresholds: Thresholds) -> list[bool]:
 @pytest.mark.parametrize(("xi", "lam"), [(np.inf, 0), (0.36, 0), (0.25, 2), (0.2, 6), (0.1, 48)])
 def test_a_survey_accepts_what_tam_accepts_by_its_definition(xi, lam, monkeypatch):
     # The frames come in several portions, with the worst one within.
-    monkeypatch.setattr("athcodec.encoding.survey._WORK_VERTICES", 5 * 48)
+    monkeypatch.setattr("athcodec.encoding.clip.survey._WORK_VERTICES", 5 * 48)
     clip = bushy_clip(noise=0.1)
     swell = np.sin(np.linspace(0, np.pi, FRAMES))
     clip.positions[:] = clip.rest + (clip.positions - clip.rest) * swell[:, None, None]

@@ -21,8 +21,9 @@ from plants import STEADY, clip_of, plant
 
 import athcodec
 from athcodec import cli
-from athcodec.encoding import decisions, streams
-from athcodec.encoding import quantise as qz
+from athcodec.encoding import decisions
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.streams import streams
 from athcodec.errors import BoundError, ClipError, CoarseWarning
 from athcodec.metrics import ErrorMeter
 

@@ -13,8 +13,8 @@ import pytest
 from athcodec import _native, errors
 from athcodec._native import lib
 from athcodec.decoding import container, core_file
-from athcodec.encoding import layers
-from athcodec.encoding.segmentation import decoding_bytes
+from athcodec.encoding.segments import layers
+from athcodec.encoding.segments.segmentation import decoding_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE, VIEWER = ROOT / "athcodec" / "core", ROOT / "athcodec" / "viewer"

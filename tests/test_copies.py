@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from athcodec._native import BRANCH
-from athcodec.encoding import streams
+from athcodec.encoding.streams import streams
 
 STEP = 0.02
 REACH = 0.6989 * STEP  # of a lattice point at most

@@ -19,9 +19,9 @@ from plants import awkward
 import athcodec
 from athcodec import errors
 from athcodec.decoding import container as ct
-from athcodec.encoding import search, start
-from athcodec.encoding.settings import Settings
-from athcodec.encoding.trials import Trials
+from athcodec.encoding.search import search, start
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
 
 VERSION = f"{ct.MAJOR}.{ct.MINOR}"
 

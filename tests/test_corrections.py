@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import athcodec
-from athcodec.encoding import quantise as qz
-from athcodec.encoding import segment, streams
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.segments import segment
+from athcodec.encoding.streams import streams
 
 VERTICES, FRAMES = 40, 96
 NOWHERE = np.zeros(3)

@@ -20,8 +20,8 @@ from athcodec import Thresholds
 from athcodec._native import LOOSE
 from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
-from athcodec.encoding import streams, writing
-from athcodec.encoding.motion import Plan
+from athcodec.encoding.model.motion import Plan
+from athcodec.encoding.streams import streams, writing
 from athcodec.errors import BadChunk, FormatError, LevelUnavailable
 from athcodec.motion.hierarchy import branches_from_edges
 

@@ -14,10 +14,10 @@ from plants import plant, ring_quads, runs_of_points, turns
 import athcodec
 from athcodec import MotionClip
 from athcodec.cli import main
-from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.branch_trials import best_branches
 from athcodec.encoding.decisions import FileDecisions
-from athcodec.encoding.progress import Work, allowed_work
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.branch_trials import best_branches
+from athcodec.encoding.search.progress import Work, allowed_work
 from athcodec.errors import ClipError
 from athcodec.motion.branches import finding, saving, seen
 from athcodec.motion.clip import Skin, source_stem_index

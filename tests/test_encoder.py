@@ -14,14 +14,14 @@ from plants import chain_plant, clip_of, plant
 import athcodec
 from athcodec import MotionClip
 from athcodec.decoding.container import MAGIC, Limits
-from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.coded_clip import CodedClip
-from athcodec.encoding.file_options import EncodingOptions
-from athcodec.encoding.motion import SegmentMotion
-from athcodec.encoding.places import PlacedClip
-from athcodec.encoding.preparation import surveyed
-from athcodec.encoding.progress import silent
-from athcodec.encoding.segmentation import decoding_bytes, split_segments
+from athcodec.encoding.clip.coded_clip import CodedClip
+from athcodec.encoding.clip.places import PlacedClip
+from athcodec.encoding.model.motion import SegmentMotion
+from athcodec.encoding.options.file_options import EncodingOptions
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.preparation import surveyed
+from athcodec.encoding.search.progress import silent
+from athcodec.encoding.segments.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
 from athcodec.motion import clip as clip_module
 

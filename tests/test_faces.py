@@ -11,7 +11,7 @@ from test_rest import cards, simple_bytes, terrain, tubes
 
 import athcodec
 from athcodec.decoding import container as ct
-from athcodec.encoding import polygons
+from athcodec.encoding.streams import polygons
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
 from spec.document import File, rules

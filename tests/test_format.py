@@ -27,7 +27,7 @@ import athcodec
 from athcodec import errors
 from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
-from athcodec.encoding import streams, writing
+from athcodec.encoding.streams import streams, writing
 from spec.document import TEXT, File, rules, section, table
 from spec.dump import lines as dump_lines
 from spec.scripted import Script, write

@@ -11,7 +11,7 @@ from files import Parts
 import athcodec
 from athcodec.decoding import core_file, segment_decoder
 from athcodec.decoding.container import Limits
-from athcodec.encoding.choices import joins
+from athcodec.encoding.segments import joins
 from athcodec.errors import BadChecksum, LimitExceeded
 from athcodec.motion.joining import looped
 from athcodec.sources import read_hdf5, sample_path

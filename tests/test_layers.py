@@ -11,8 +11,8 @@ from plants import chain_plant, plant
 import athcodec
 from athcodec import Thresholds
 from athcodec.decoding import container as ct
-from athcodec.encoding.layers import layer_ratios
-from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
+from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
+from athcodec.encoding.segments.layers import layer_ratios
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)

@@ -13,7 +13,7 @@ from test_document import assert_same_bits
 
 import athcodec
 from athcodec.decoding import container as ct
-from athcodec.encoding.choices.levels import chosen_levels
+from athcodec.encoding.segments.levels import chosen_levels
 from athcodec.errors import BadChunkTable, BadHeader, LevelUnavailable
 from athcodec.metrics import SmoothnessMeter
 from spec.document import File

@@ -10,8 +10,8 @@ from moving_meshes import leafed_tree
 from plants import bound_for, diagonal, plant, ring_quads, tube
 
 import athcodec
-from athcodec.encoding.features import Feature
-from athcodec.encoding.places import PlacedClip, find_places
+from athcodec.encoding.clip.places import PlacedClip, find_places
+from athcodec.encoding.options.features import Feature
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
 

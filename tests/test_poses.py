@@ -11,9 +11,9 @@ from plants import diagonal, distance
 
 import athcodec
 from athcodec.decoding import container as ct
-from athcodec.encoding.choices import learned_pieces
-from athcodec.encoding.quantise import SOURCE_REST_TOLERANCE
-from athcodec.encoding.search import Search
+from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
+from athcodec.encoding.search.choices import learned_pieces
+from athcodec.encoding.search.search import Search
 from athcodec.errors import BadChecksum, Truncated
 from bench.odd.bending import scanned_tree
 from bench.odd.grass import grass

@@ -17,7 +17,7 @@ from plants import STEADY, awkward, awkward_plants, bound_for, clip_of, grow, pl
 
 import athcodec
 from athcodec import encoding
-from athcodec.encoding import search
+from athcodec.encoding.search import search
 from athcodec.metrics import SmoothnessMeter
 from bench.odd.growing import unfolding_leaves
 from spec.document import File

@@ -12,7 +12,7 @@ from plants import diagonal
 
 import athcodec
 from athcodec._native import BRANCH
-from athcodec.encoding import streams
+from athcodec.encoding.streams import streams
 from bench.odd.others import still_mesh
 
 

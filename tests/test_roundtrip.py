@@ -27,8 +27,8 @@ from plants import (
 import athcodec
 from athcodec import MotionClip, Thresholds
 from athcodec.decoding import container as ct
-from athcodec.encoding import streams, writing
-from athcodec.encoding.assembly import time_chunk
+from athcodec.encoding.assembly.assembly import time_chunk
+from athcodec.encoding.streams import streams, writing
 from athcodec.motion.clip import NOT_KEPT
 from athcodec.motion.hierarchy import derived_edges, hierarchy_of
 

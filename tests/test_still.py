@@ -9,7 +9,7 @@ import pytest
 from plants import blown_tree, turns
 
 from athcodec.encoding.encoder import encode_clip
-from athcodec.encoding.trials import Trials
+from athcodec.encoding.search.trials import Trials
 from athcodec.motion.branches.common_motion import carried, without_common_motion
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.still import still_parts

@@ -11,10 +11,11 @@ from test_document import assert_same_bits
 import athcodec
 from athcodec import encoding
 from athcodec.decoding.container import BASIS_IN_WAVES, STEMS
-from athcodec.encoding import layers, search
-from athcodec.encoding.choices import learned_bases
-from athcodec.encoding.features import Feature
-from athcodec.encoding.segment import CodedPrelude
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search import search
+from athcodec.encoding.search.choices import learned_bases
+from athcodec.encoding.segments import layers
+from athcodec.encoding.segments.segment import CodedPrelude
 from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from spec.document import File

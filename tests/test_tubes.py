@@ -9,8 +9,8 @@ from files import coded
 from moving_meshes import leafed_tree
 from plants import clip_of, ring_quads, tube
 
-from athcodec.encoding import streams
-from athcodec.encoding.choices.rings import ring_sizes
+from athcodec.encoding.search.choices.rings import ring_sizes
+from athcodec.encoding.streams import streams
 from athcodec.motion.clip import MotionClip
 
 SIDES, RINGS, TWIGS = 6, 12, 9

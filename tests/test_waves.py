@@ -7,7 +7,7 @@ import pytest
 from plants import blown_tree
 
 import athcodec
-from athcodec.encoding.motion import Waves, waves_over_time
+from athcodec.encoding.model.motion import Waves, waves_over_time
 from spec.document import File, rules
 
 FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256, 270)

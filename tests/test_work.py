@@ -8,8 +8,8 @@ from plants import plant
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.encoding import progress
 from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.search import progress
 from bench import odd
 
 

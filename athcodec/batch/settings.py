@@ -21,7 +21,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from athcodec.encoding.shape import RestPrecision
+from athcodec.encoding.options.shape import RestPrecision
 from athcodec.errors import ClipError
 from athcodec.files.atomic import is_url
 from athcodec.files.plain import FilePath

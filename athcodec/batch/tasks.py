@@ -24,7 +24,7 @@ from athcodec.batch.inputs import Item, download, identity, is_telling, sha256, 
 from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.decoding import container as ct
 from athcodec.encoding import CodedSegment, Draft
-from athcodec.encoding.segmentation import split_segments
+from athcodec.encoding.segments.segmentation import split_segments
 from athcodec.errors import AthError, ClipError, GuessWarning, SourceWarning
 from athcodec.files.atomic import check_target, is_url, keeping
 from athcodec.files.shown import redacted

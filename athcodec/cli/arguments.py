@@ -755,7 +755,7 @@ def _positive_length(text: str) -> Length:
 
 def _rest_error(text: str) -> float | str:
     """A fraction, a length with its unit, or OF_BOUND."""
-    from athcodec.encoding.shape import RestPrecision  # heavy, as all that encodes is
+    from athcodec.encoding.options.shape import RestPrecision  # heavy, as all that encodes is
 
     option = float(text) if re.fullmatch(r"[\d.]+([eE][+-]?\d+)?", text) else text
     RestPrecision.of(option)

@@ -67,7 +67,7 @@ from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
 
 if TYPE_CHECKING:
     from athcodec.binding import OntoMesh
-    from athcodec.encoding.summary import Summary
+    from athcodec.encoding.assembly.summary import Summary
     from athcodec.exporters import Written
 
 ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what float32 adds to it.

@@ -1,8 +1,8 @@
 """The front of an .ath file (FORMAT.md, "File"), as it is written, and its static data, as they are read.
 
 A file is its front, which says what it holds, then the chunks in table order without gaps, so that offsets are never
-stored and cannot disagree. encoding/writing.py makes the chunks. The C core parses files; only static arrays and
-metadata, which it hands over as stored, are parsed here.
+stored and cannot disagree. encoding/streams/writing.py makes the chunks. The C core parses files; only static arrays
+and metadata, which it hands over as stored, are parsed here.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What is decided about a file: search or prediction, layers, and the length of segments.
 
-Settings are searched for by search.py. Segments are coded (segment_coding.py) and whole files are put together
-(assembly.py) only where their bytes decide. What a file promises is checked on what a decoder will output.
+Settings are searched for by search/. Segments are coded and whole files are put together (assembly/) only where their
+bytes decide. What a file promises is checked on what a decoder will output.
 """
 
 from __future__ import annotations
@@ -13,15 +13,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from athcodec.decoding import container as ct
-from athcodec.encoding import quantise as qz
-from athcodec.encoding.assembly import FileAssembly
-from athcodec.encoding.choices.prediction import FoundPrediction, best_prediction, one_map_each
-from athcodec.encoding.coded_clip import CodedClip
-from athcodec.encoding.decided import Decided, Draft
-from athcodec.encoding.features import Feature
-from athcodec.encoding.file_options import EncodingOptions
-from athcodec.encoding.layers import MOST_LAYERS, MOST_LEVELS, Layer, Layers, layer_ratios, layers_of, step_factors
-from athcodec.encoding.progress import (
+from athcodec.encoding.assembly.assembly import FileAssembly
+from athcodec.encoding.assembly.decided import Decided, Draft
+from athcodec.encoding.assembly.segment_coding import SegmentCoder
+from athcodec.encoding.clip.coded_clip import CodedClip
+from athcodec.encoding.clip.survey import Ath, Survey
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.options.file_options import EncodingOptions
+from athcodec.encoding.search.choices.prediction import FoundPrediction, best_prediction, one_map_each
+from athcodec.encoding.search.progress import (
     FILE_BYTE,
     LEVEL_MOTION,
     MOTION,
@@ -33,15 +34,22 @@ from athcodec.encoding.progress import (
     allowed_work,
     silent,
 )
-from athcodec.encoding.sample import is_small
-from athcodec.encoding.search import Search
-from athcodec.encoding.segment import CodedPrelude, Source
-from athcodec.encoding.segment_coding import SegmentCoder
-from athcodec.encoding.segment_samples import typical_segments
-from athcodec.encoding.settings import Choice
-from athcodec.encoding.start import still_choice
-from athcodec.encoding.still import SplitSource
-from athcodec.encoding.survey import Ath, Survey
+from athcodec.encoding.search.sample import is_small
+from athcodec.encoding.search.search import Search
+from athcodec.encoding.search.segment_samples import typical_segments
+from athcodec.encoding.search.start import still_choice
+from athcodec.encoding.search.still import SplitSource
+from athcodec.encoding.segments.layers import (
+    MOST_LAYERS,
+    MOST_LEVELS,
+    Layer,
+    Layers,
+    layer_ratios,
+    layers_of,
+    step_factors,
+)
+from athcodec.encoding.segments.segment import CodedPrelude, Source
+from athcodec.encoding.segments.settings import Choice
 from athcodec.errors import BoundError, ClipError
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, LADDERS

@@ -1,8 +1,7 @@
 """The entry points of encoding: a motion clip becomes one .ath file, in one call or in three.
 
 `encode_clip` does all of it. `draft`, `code_segments` and `write` are its three steps, for several processes that work
-on one clip. A clip is made ready (preparation.py), decided about (decisions.py), coded (segment_coding.py) and put
-together (assembly.py).
+on one clip. A clip is made ready (preparation/), decided about (decisions.py), coded and put together (assembly/).
 """
 
 from __future__ import annotations
@@ -18,19 +17,19 @@ from os import PathLike
 from typing import Any, BinaryIO, cast
 
 from athcodec.decoding import container as ct
-from athcodec.encoding.assembly import SPOOL_BYTES, FileAssembly
-from athcodec.encoding.bounds import BoundOption
-from athcodec.encoding.decided import CodedSegment, Decided, Draft
+from athcodec.encoding.assembly.assembly import SPOOL_BYTES, FileAssembly
+from athcodec.encoding.assembly.decided import CodedSegment, Decided, Draft
+from athcodec.encoding.assembly.segment_coding import SegmentCoder
+from athcodec.encoding.assembly.summary import Summary
+from athcodec.encoding.clip.places import PlacedClip
 from athcodec.encoding.decisions import FileDecisions
-from athcodec.encoding.file_options import EncodingOptions
-from athcodec.encoding.layers import layer_ratios
-from athcodec.encoding.places import PlacedClip
-from athcodec.encoding.preparation import placed_clip, prepared, resumed
-from athcodec.encoding.progress import Progress, WeightedProgress, stage_weights
-from athcodec.encoding.segment_coding import SegmentCoder
-from athcodec.encoding.segment_samples import SAMPLES
-from athcodec.encoding.segmentation import split_segments
-from athcodec.encoding.summary import Summary
+from athcodec.encoding.options.file_options import EncodingOptions
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.preparation import placed_clip, prepared, resumed
+from athcodec.encoding.search.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.search.segment_samples import SAMPLES
+from athcodec.encoding.segments.layers import layer_ratios
+from athcodec.encoding.segments.segmentation import split_segments
 from athcodec.errors import CoarseWarning, SourceWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.clip import ClipRange, MotionClip

@@ -20,7 +20,7 @@ from itertools import product
 
 import numpy as np
 
-from athcodec.encoding import quantise
+from athcodec.encoding.model import quantise
 from bench.codecs import Source
 from bench.codecs.coder import Reader, Writer, compiler, read_corrections, write_corrections
 from bench.codecs.tree import VertexOrder, ordered

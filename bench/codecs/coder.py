@@ -25,7 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from athcodec._native import BRANCH, SEGMENT_FRAMES
-from athcodec.encoding import quantise, streams
+from athcodec.encoding.model import quantise
+from athcodec.encoding.streams import streams
 from athcodec.motion.hierarchy import Hierarchy
 
 ROOT = Path(__file__).resolve().parents[2]

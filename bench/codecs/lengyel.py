@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.encoding.motion import waves_over_time
+from athcodec.encoding.model.motion import waves_over_time
 from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised

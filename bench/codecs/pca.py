@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec.encoding.motion import waves_over_time
+from athcodec.encoding.model.motion import waves_over_time
 from bench.codecs import Source, blocks
 from bench.codecs.baseline import Baseline, Choice, Ladder, Settings, Split, quantised
 from bench.codecs.coder import Reader, Writer

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from athcodec._native import BRANCH
-from athcodec.encoding import quantise
+from athcodec.encoding.model import quantise
 from athcodec.motion.hierarchy import Hierarchy
 from bench.codecs import Source
 from bench.codecs.coder import Reader, Writer, core_branches

@@ -18,7 +18,7 @@ from plants import awkward, bush, clip_of, plant, tube
 import athcodec
 from athcodec import MotionClip
 from athcodec.decoding import container as ct
-from athcodec.encoding import streams
+from athcodec.encoding.streams import streams
 from athcodec.sources import read_hdf5, sample_path
 
 CORPUS = Path(__file__).resolve().parent.parent / "corpus"

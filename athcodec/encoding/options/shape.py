@@ -1,0 +1,132 @@
+"""How precise a rest pose has to be: as the bound is, as someone asks for, or as its faces need it to keep their shape.
+
+A bound taken from the whole plant is more than a leaf is large: at such a step its edges are noise, and its normals
+point anywhere. So every branch may have a largest step of its own (FORMAT.md, Detail).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from athcodec.encoding.model.quantise import half_octaves
+from athcodec.errors import BoundError
+from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.polygons import sides
+from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
+
+OF_BOUND = "bound"
+EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # Largest step of a branch, over the lengths of edges and heights of faces.
+SMALL_FACES = 0.05  # Share of a branch's faces that may be smaller than those that its step is made for.
+LEAST_SIZE = 1e-5  # Least size, in diagonals, of edges and heights that count.
+LENGTH_STEP = 0.85  # Largest step over the error that is asked for.
+WHOLE_DETAIL, MOST_DETAIL = 128, 255  # Detail of a step of 1, and the largest (FORMAT.md, Detail).
+
+
+@dataclass(frozen=True)
+class RestPrecision:
+    """The option `rest_error` of `encode`, checked: None, what faces need; OF_BOUND; else a length, or a fraction of
+    the diagonal. Raises ValueError, BoundError."""
+
+    length: Length | None = None
+    fraction: float | None = None
+    of_bound: bool = False
+
+    @classmethod
+    def of(cls, option: LengthLike | None) -> RestPrecision:
+        if option is None:
+            return cls()
+        if isinstance(option, str) and option == OF_BOUND:
+            return cls(of_bound=True)
+        length = length_of(option, "rest_error")
+        precision = cls(length=length) if length.unit else cls(fraction=length.value)
+        if not (math.isfinite(length.value) and length.value > 0):
+            raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
+        return precision
+
+    def error(self, metadata: Mapping[str, Any], diagonal: float) -> float:
+        """Return the largest error that is asked for, in the scene units of some metadata; infinite: none is."""
+        if self.length is not None:
+            return self.length.in_scene_units(scene_unit(metadata))
+        return math.inf if self.fraction is None else self.fraction * diagonal
+
+    def details(
+        self, faces: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the detail of every branch, (B,) int32, and whether its faces are to keep their shape, (B,) bool, in
+        file order. An error that is asked for is that of all branches, so that they need no detail. faces: as
+        `MotionClip.polygons`, of vertices of a rest pose, (N, 3), in the same order."""
+        none = np.zeros(hierarchy.branch_count, np.int32)
+        if self.of_bound:
+            return none, none > 0
+        details = detail_of(shape_steps(faces, rest, hierarchy, diagonal))
+        is_asked = self.length is not None or self.fraction is not None
+        return none if is_asked else details, details > 0
+
+
+def detail_of(steps: np.ndarray) -> np.ndarray:
+    """Return the details of the nearest steps; infinite ones, and those of a plant without extent, have none."""
+    octaves = np.log2(steps, out=np.full(len(steps), np.inf), where=np.isfinite(steps) & (steps > 0))
+    nearest = np.clip(np.rint(2 * np.where(np.isfinite(octaves), octaves, 0)) + WHOLE_DETAIL, 1, MOST_DETAIL)
+    return np.where(np.isfinite(octaves), nearest, 0).astype(np.int32)
+
+
+def finer_than(details: np.ndarray, step: float) -> np.ndarray:
+    """Return the details of branches whose largest step is below `step`; 0 for others."""
+    return np.where((details > 0) & (_most(details) < step), details, 0).astype(np.int32)
+
+
+def _most(details: np.ndarray) -> np.ndarray:
+    return half_octaves(details - WHOLE_DETAIL)
+
+
+def rest_steps(branches: np.ndarray, step: float) -> np.ndarray:
+    """Return the step of the rest pose of branches, (B,); step: that of branches without detail."""
+    return np.where(branches["detail"] > 0, np.minimum(_most(branches["detail"]), step), step)
+
+
+def shape_steps(
+    polygons: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float
+) -> np.ndarray:
+    """Return the largest step at which the faces of each branch keep their shape, (B,) in file order."""
+    steps = np.full(hierarchy.branch_count, np.inf)
+    if polygons is None or not len(polygons[0]):
+        return steps
+    counts, corners = polygons
+    faces = np.repeat(np.arange(len(counts)), counts)
+    points = np.asarray(rest, np.float64)
+    start, stop = sides(counts, corners).T
+    edges = points[stop] - points[start]
+    lengths = np.linalg.norm(edges, axis=1)
+    sizes = np.minimum(EDGE_STEP * lengths, HEIGHT_STEP * _heights(edges, lengths, faces, len(counts), corners, points))
+    counted = np.where(lengths > LEAST_SIZE * diagonal, np.maximum(sizes, EDGE_STEP * LEAST_SIZE * diagonal), np.inf)
+    branch = hierarchy.vertex_branch()[np.argsort(hierarchy.vertex_source)]  # In the order of the source's vertices.
+    return _low_quantiles(branch[corners], counted, hierarchy.branch_count)
+
+
+def _heights(
+    edges: np.ndarray, lengths: np.ndarray, faces: np.ndarray, count: int, corners: np.ndarray, points: np.ndarray
+) -> np.ndarray:
+    """Return the area of every corner's face over its longest edge."""
+    doubled, longest = np.zeros((count, 3)), np.zeros(count)
+    centre = np.zeros((count, 3))
+    np.add.at(centre, faces, points[corners])
+    centre /= np.maximum(np.bincount(faces, minlength=count), 1)[:, None]
+    np.add.at(doubled, faces, np.cross(points[corners] - centre[faces], edges))
+    np.maximum.at(longest, faces, lengths)
+    return (0.5 * np.linalg.norm(doubled, axis=1) / np.maximum(longest, 1e-300))[faces]
+
+
+def _low_quantiles(group: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Return the value that a small share of each group's finite values fall short of, (count,); infinite: none."""
+    group, values = group[np.isfinite(values)], values[np.isfinite(values)]
+    order = np.lexsort((values, group))
+    numbers = np.bincount(group, minlength=count)
+    at = np.cumsum(numbers) - numbers + (SMALL_FACES * numbers).astype(int)
+    quantiles = np.full(count, np.inf)
+    quantiles[numbers > 0] = values[order][at[numbers > 0]]
+    return quantiles

@@ -1,0 +1,140 @@
+"""Which of the branches that motion/branches proposes make the smallest file; each is tried on a few frames."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from itertools import chain
+
+import numpy as np
+
+from athcodec.encoding.clip.coded_clip import CodedClip
+from athcodec.encoding.clip.places import PlacedClip
+from athcodec.encoding.clip.survey import survey
+from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.options.file_options import EncodingOptions
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.search.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
+from athcodec.encoding.search.still import STILL_SHARE
+from athcodec.encoding.segments.segment import Source
+from athcodec.errors import BoundError
+from athcodec.motion.branches.finding import candidates, named_labels
+from athcodec.motion.branches.result import Found, with_branches
+from athcodec.motion.branches.still import clip_among, joined, still_parts
+from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.hierarchy import branch_orders, hierarchy_of
+from athcodec.options import DEFAULT_SEGMENT
+
+TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
+FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
+TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
+ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
+LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
+
+
+def best_branches(
+    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False, is_compared: bool = False
+) -> tuple[Found, float]:
+    """Return the branches that make the smallest file, as `_best_candidate` finds them. What stands still has branches
+    of its own, which no frame is tried for, unless the source names branches."""
+    least = option.least(clip)
+    is_named = clip.skin is not None or named_labels(clip) is not None
+    still = None if is_named or host_rest else still_parts(clip, STILL_SHARE * least)
+    if still is None:
+        return _best_candidate(clip, option, work, host_rest, is_compared)
+    if least > 0:  # The bound of the parts is that of the whole.
+        option = BoundOption(max_error=least)
+    moving, standing = (clip_among(clip, np.flatnonzero(some), some is still) for some in (~still, still))
+    branches, size = _best_candidate(moving, option, work, host_rest, is_compared)
+    others, still_size = _best_candidate(standing, option, Work(), host_rest, is_compared)
+    return joined(clip, still, branches, others), size + (still_size if is_compared else 0.0)
+
+
+def _best_candidate(
+    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
+) -> tuple[Found, float]:
+    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
+    about its bytes, infinite where nothing had to be tried; of those that are about as small the one of the lowest
+    order, but roots alone last, which have no levels. Predicted motion hardly depends on branches: if two
+    candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
+    by_points = work.fits(FINDING * clip.vertex_count)
+    proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
+    best, least, predicted = next(proposals), math.inf, 0
+    tried: list[tuple[float, Found]] = []
+    finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
+    work.add(finding)
+    second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
+    if second is None:
+        return best, trial.size(best)[0] if is_compared else least
+    for number, branches in enumerate(chain([best, second], proposals), start=1):
+        size, is_predicted = trial.size(branches)
+        predicted += is_predicted
+        tried.append((size, branches))
+        if number > 1:
+            work.add(finding)
+            if predicted == number or not work.fits(finding + trial.least_work):
+                break
+    fewest = min(size for size, _ in tried)
+    alike = [one for one in tried if one[0] <= ALIKE * fewest]
+    least, best = min(alike, key=_order_and_size)
+    if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
+        return best, least
+    unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
+    size = trial.size(unordered)[0]
+    return (unordered, size) if size < least else (best, least)
+
+
+def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
+    size, branches = tried
+    order = int(branch_orders(branches.branch_parent).max())
+    return order == 0, order, size
+
+
+class Trial:
+    """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
+
+    def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):
+        start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
+        stop = min(clip.frame_count, start + TRIAL_FRAMES)
+        self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
+        self._clip.rest_given = clip.rest_given
+        self._frames_ratio = clip.frame_count / (stop - start)
+        self._option, self._host_rest, self._work = option, host_rest, work
+        self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
+
+    def size(self, branches: Found) -> tuple[float, bool]:
+        """Return about the bytes of the whole clip's file on these branches, and whether its motion is predicted;
+        infinite if the bound cannot be kept."""
+        clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
+        hierarchy = hierarchy_of(clip)
+        self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
+        coded = CodedClip(
+            PlacedClip.of(clip),
+            clip,
+            hierarchy,
+            clip.rest,
+            clip.rest_dtype,
+            clip.rest_given,
+            exact_rest=lossless or host_rest,
+            host_rest=host_rest,
+        )
+        source = Source(coded, survey(clip, hierarchy), DEFAULT_SEGMENT)
+        options = EncodingOptions(attributes="none", lossless=lossless)
+        decisions = FileDecisions(source, options, predicts_as_usual=True)
+        if self._option.target_size is not None:
+            self._option = self._bound_of_target(decisions)
+        with self._work.trying("branches", TRIAL_SHARE):
+            bound = self._option.in_scene_units(source, decisions.file_size)
+            return decisions.tried(bound, self._work, self._frames_ratio)
+
+    def _bound_of_target(self, decisions: FileDecisions) -> BoundOption:
+        """Return the bound at which the branches tried first meet the target size; all are tried at it."""
+        work = Work()
+
+        def size(bound: float) -> float:
+            return decisions.tried(bound, work, self._frames_ratio)[0]
+
+        try:
+            return BoundOption(max_error=self._option.in_scene_units(decisions.source, size, FILLED))
+        except BoundError:
+            return BoundOption()

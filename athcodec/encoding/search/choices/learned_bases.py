@@ -1,0 +1,57 @@
+"""Time bases: which levels have one learned from their tracks, and whether waves are periodic (FORMAT.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from athcodec.encoding.model.quantise import single
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
+
+FINER = 0.5  # Step at which learned time bases are tried too: an error of one of their numbers lasts over all frames.
+PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
+
+
+def candidates(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with learned time bases at all levels: each level's own or one for all; layers have one."""
+    if trials.without(Feature.TIME_BASES):
+        return []
+    each = settings.in_learned_bases()
+    common = [] if trials.without(Feature.COMMON_BASIS) else [replace(each, common_basis=True)]
+    return common if common and trials.is_layered else [each, *common]
+
+
+def best_bases(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with a learned time basis for all levels, or where it is shorter, or with waves."""
+    if trials.without(Feature.TIME_BASES):
+        return settings
+    waves = settings.in_waves()
+    each, *common = candidates(settings, trials)
+    if math.inf in trials.costs([waves, each, *common]):
+        return trials.cheapest([settings, waves, each, *common])
+    shorter = trials.level_costs(each) < trials.level_costs(waves)
+    mixed = replace(each, learned_bases=tuple(shorter.tolist()))
+    best = trials.cheapest([waves, each if each.common_basis else mixed, *common])
+    if best is not waves or not shorter.any() or not trials.work.fits(2 * trials.work_of_trial):
+        return best
+    return trials.cheapest([best, replace(each, step=single(FINER * each.step))])  # They may lose by their step alone.
+
+
+def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with waves if learned time bases no longer pay at the final steps. They are learned again at
+    these steps, as for the file: a component that is just left out may be kept at another step."""
+    if not any(settings.learned_bases) or not trials.work.fits(2 * trials.work_of_trial):
+        return settings
+    trials.forget(settings)
+    return trials.cheapest([settings, settings.in_waves()])
+
+
+def best_waves(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with periodic waves for loops of one segment, unless the motion jumps across the seam."""
+    if trials.without(Feature.PERIODIC) or not any(sample.whole_loop for sample in trials.samples):
+        return settings
+    periodic = replace(settings, periodic=True)
+    of_periodic, of_free = trials.costs([periodic, settings])
+    return periodic if of_periodic <= PERIODIC_WORTH * of_free else settings

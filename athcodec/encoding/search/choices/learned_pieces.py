@@ -1,0 +1,89 @@
+"""Learned modes: which pieces have modes learned from their motion in place of a beam's (FORMAT.md, "SHAPES")."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.learned_modes import estimated_bits
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search import progress
+from athcodec.encoding.search.choices.forms import in_each_basis
+from athcodec.encoding.search.choices.steps import walked
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
+
+REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
+FINER_REST = 0.36  # Factor on the step of a rest pose whose rounding learned modes no longer describe.
+
+
+def candidates(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with learned modes for the pieces that take fewer bits with them."""
+    work = trials.work_of(2 * progress.ANALYSIS)
+    if trials.without(Feature.SHAPES) or not trials.work.fits(work):
+        return []
+    trials.work.add(work)
+    plain = replace(settings, learned_pieces=None)
+    pieces = pieces_that_save(plain, trials, REQUIRED_SAVINGS)
+    return [
+        replace(plain, learned_pieces=some, learned_saving=saving)
+        for saving, (some, _) in zip(REQUIRED_SAVINGS, pieces)
+        if some.any()
+    ]
+
+
+def best_pieces(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with learned modes, or without if the file as a whole gets no shorter."""
+    plain = replace(settings, learned_pieces=None, learned_saving=None)
+    return plain if trials.without(Feature.SHAPES) else trials.cheapest([plain, *candidates(plain, trials)])
+
+
+def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with learned modes beside what was chosen without them, or in its place: on stems of few
+    vertices learned modes serve the motion that rotations and affine functions serve."""
+    starts = in_each_basis(settings, trials)
+    if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
+        starts.append(settings.in_waves())
+    return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
+
+
+def learned_anew(settings: Settings, trials: Trials, rest_factor: float = 1.0) -> Settings:
+    """Return the settings with modes learned about the rest pose as it is coded, whose rounding they then describe, or
+    before that, whichever is smaller. rest_factor: on the step of a rest pose whose rounding they do not describe."""
+    if settings.learned_pieces is None or trials.is_layered or trials.source.reference_is_exact:
+        return settings
+    step = settings.rest_step * rest_factor if settings.learned_coded else trials.start.rest_step
+    other = replace(settings, learned_coded=not settings.learned_coded, rest_step=qz.single(step))
+    return trials.cheapest([settings, other])
+
+
+def learned_about_other_pose(settings: Settings, trials: Trials) -> Settings:
+    """Return the same at the best steps: those of the other way to learn are walked to again."""
+    best = learned_anew(settings, trials, FINER_REST)
+    return settings if best is settings else walked(best, trials)
+
+
+def pieces_that_save(
+    plain: Settings, trials: Trials, required_savings: Sequence[float]
+) -> list[tuple[np.ndarray, float]]:
+    """Return for each required saving the pieces whose estimated bits shrink by that factor, (P,) bool, and what share
+    of all bits they save."""
+    plan = trials.prelude(plain).plan
+    modes = trials.learned_modes(plan, plain, everywhere=True)
+    piece_count = len(modes.counts)
+    piece_of_row = np.repeat(np.arange(piece_count), plan.ranks)
+    bits_without, bits_with = (
+        sum(
+            estimated_bits(trials.analysed(plain, number, tried, bent=True).coefficients, piece_of_row, piece_count)
+            * sample.scale
+            for number, sample in enumerate(trials.samples)
+        )
+        for tried in (None, modes)
+    )
+    price = estimated_bits(modes.integers, np.repeat(np.arange(piece_count), modes.counts), piece_count)
+    chosen = [(modes.counts > 0) & ((bits_with + price) * saving < bits_without) for saving in required_savings]
+    saved = bits_without - bits_with - price
+    return [(pieces, float(saved[pieces].sum() / max(bits_without.sum(), 1.0))) for pieces in chosen]

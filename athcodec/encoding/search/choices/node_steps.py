@@ -1,0 +1,154 @@
+"""Steps of the maps of inner nodes, which show the coarse levels (FORMAT.md, Affines stream)."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding.clip.survey import Ath
+from athcodec.encoding.model.motion import Plan, SegmentMotion, position_errors
+from athcodec.encoding.search import progress
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.segment import CodedPrelude, Source
+from athcodec.encoding.segments.settings import Settings
+from athcodec.encoding.streams import streams
+
+# Steps that are tried, over the error of a level.
+QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)
+# Qualities for up to so many roots, whose maps are mostly a few bytes.
+FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)
+FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
+SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
+ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
+FRAMES = 8  # Frames by which the error of a level is measured.
+USUAL_TRIALS = 6  # Steps that are usually tried.
+
+
+def work_of_steps(trials: Trials) -> float:
+    """Return about the work of choosing steps, which is done however little is left."""
+    levels, vertices = trials.levels, trials.source.clip.vertex_count
+    if levels == 1:
+        return 0.0
+    return (
+        trials.work_of(progress.ANALYSIS + USUAL_TRIALS * progress.MAPS * levels) + progress.LEVEL * vertices * levels
+    )
+
+
+def best_node_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with maps that keep to their share of the file, no finer than the levels' errors ask for."""
+    prelude = trials.prelude(settings)
+    errors = _level_errors(trials, prelude.plan, settings.bound)
+    sample = trials.samples[trials.middle].positions
+    segment = _analysed(settings, trials)
+    allowed = _allowed_bytes(settings, trials)
+    tried = [quality * errors for quality in _qualities(trials)]
+
+    def analyse(number: int) -> np.ndarray:
+        segment.clear_nodes()
+        trials.work.add(trials.work_of(progress.MAPS * trials.levels))
+        segment.analyse_nodes(sample, tried[number], settings.rounding)
+        return tried[number]
+
+    def fits(number: int) -> bool:
+        analyse(number)
+        return _map_bytes(segment, trials) <= allowed
+
+    finest = bisect_left(range(len(tried) - 1), True, key=fits)
+    chosen, limits = analyse(finest), np.array(list(_errors_of_maps(prelude, segment, sample)))
+    limits[1:] = np.minimum(ERROR_TOLERANCE * limits[1:], limits[:-1])  # Deeper levels stay better.
+    for number in range(finest + 1, len(tried)):
+        steps = analyse(number)
+        if any(error > limit for error, limit in zip(_errors_of_maps(prelude, segment, sample), limits)):
+            break
+        chosen = steps
+    return replace(settings, node_steps=chosen)
+
+
+def cost_with_maps(settings: Settings, trials: Trials) -> float:
+    """Return the bytes of a whole file with maps of nodes as fine as their levels' errors; of layers without, because
+    others choose their steps."""
+    if trials.is_layered:
+        return trials.cost(settings)
+    segment = _analysed(settings, trials)
+    steps = _level_errors(trials, segment.plan, settings.bound)
+    segment.analyse_nodes(trials.samples[trials.middle].positions, steps, settings.rounding)
+    trials.work.add(trials.work_of(progress.MAPS * trials.levels))
+    return trials.cost(settings) + min(_map_bytes(segment, trials), _allowed_bytes(settings, trials))
+
+
+def _allowed_bytes(settings: Settings, trials: Trials) -> float:
+    """Return the bytes that maps may take."""
+    rest = trials.level_costs(settings).sum() + trials.prelude_bytes(settings)
+    least = min(FEW_BYTES, SMALL_FILE_SHARE * rest) if _is_played_whole(trials) else FEW_BYTES
+    return max(least, FILE_SHARE / (1 - FILE_SHARE) * rest)
+
+
+def _analysed(settings: Settings, trials: Trials) -> SegmentMotion:
+    """Return the sample that maps are tried on, which has none yet."""
+    modes = trials.learned_modes(trials.prelude(settings).plan, settings)
+    trials.work.add(trials.work_of(progress.ANALYSIS))
+    return trials.analysed(settings, trials.middle, modes)
+
+
+def inner_nodes(source: Source, ath: Ath, levels: int) -> np.ndarray:
+    """Return the number of nodes of more than one branch, per level."""
+    hierarchy, branches = source.hierarchy, ath.node_branch
+    branches = branches[hierarchy.subtree_branches[branches] > 1]
+    return np.bincount(hierarchy.branch_depth[branches], minlength=levels)
+
+
+def _level_errors(trials: Trials, plan: Plan, bound: float) -> np.ndarray:
+    """Return the error in all vertices of a node together that would double the error of its level, (levels,). A level
+    errs by the RMS that independent least-squares maps leave in a few frames, or by the bound if that is more."""
+    source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
+    some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
+    frames = np.empty((len(some), *sample.shape[:2]))
+    frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
+    nodes = np.bincount(plan.nodes["level"], plan.nodes["coded"], trials.levels)
+    errors = np.full(trials.levels, bound)
+    for level in np.flatnonzero(nodes).tolist():
+        if level not in trials.map_errors:
+            away = ath.approximation(frames, level) - frames
+            trials.map_errors[level] = math.sqrt((away**2).sum() / (frames.size / 3))
+            trials.work.add(progress.LEVEL * source.clip.vertex_count)
+        whole = max(bound, trials.map_errors[level])
+        errors[level] = whole * math.sqrt(source.clip.vertex_count / nodes[level])
+    return errors
+
+
+def _map_bytes(segment: SegmentMotion, trials: Trials) -> float:
+    """Return the bytes of the maps of nodes in a whole file whose segments are like this one."""
+    nodes = trials.extrapolation.nodes
+    size = sum(len(streams.encode_affines(segment, level)) * nodes[level] for level in _map_levels(segment.plan))
+    return size * trials.source.coded_frames / segment.frames
+
+
+def _is_played_whole(trials: Trials) -> bool:
+    """Return whether the file has one layer and segment: its coarse levels are hardly shown and need not meet."""
+    return not trials.is_layered and not trials.source.has_seams
+
+
+def _qualities(trials: Trials) -> list[np.ndarray]:
+    """Return the qualities to try, (levels,) each, from fine to coarse. That of a few roots rises last, if at all."""
+    qualities = [np.full(trials.levels, quality) for quality in QUALITIES]
+    if (trials.source.hierarchy.branch_parent < 0).sum() > FEW_ROOTS:
+        return qualities
+    fine, *coarser = ROOT_QUALITIES if _is_played_whole(trials) else ROOT_QUALITIES[:1]
+    roots, coarsest = [fine] * len(qualities) + coarser, qualities[-1:] * len(coarser)
+    return [np.append(root, quality[1:]) for root, quality in zip(roots, qualities + coarsest)]
+
+
+def _map_levels(plan: Plan) -> list[int]:
+    return [level for level in range(plan.level_count) if plan.has_affines(level)]
+
+
+def _errors_of_maps(prelude: CodedPrelude, segment: SegmentMotion, sample: np.ndarray) -> Iterator[float]:
+    """Yield the RMS error, at each level that has maps, of the segment against its source positions `sample`."""
+    room = np.empty(sample.shape)
+    for level in _map_levels(prelude.plan):
+        pose = segment.pose(level, prelude.origin, prelude.dtype, room)
+        yield position_errors(pose, sample, prelude.origin, prelude.plan.pool)[2]

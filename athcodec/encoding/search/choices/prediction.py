@@ -1,0 +1,269 @@
+"""Predicted motion, the other way to code a clip: every vertex of every frame about what is decoded (FORMAT.md).
+
+It suits what waves and modes do not: growth, few frames, noise, jumps, rests. `best_prediction` finds its settings,
+`code_predicted_segment` makes the chunks of a segment.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from athcodec._native import Rounding
+from athcodec.decoding import container as ct
+from athcodec.encoding.clip.survey import Ath, Survey
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.search.choices.rest import with_best_rest
+from athcodec.encoding.search.progress import PREDICTION, REST, Work
+from athcodec.encoding.search.segment_samples import SegmentSample, typical_segments
+from athcodec.encoding.segments.levels import MOST_AWAY, SourceFrames
+from athcodec.encoding.segments.segment import CodedPrelude, Source, plain_settings
+from athcodec.encoding.segments.settings import Choice, Settings
+from athcodec.encoding.streams import streams, writing
+from athcodec.errors import BoundError
+from athcodec.files.threads import ranges
+from athcodec.motion.algebra import length
+from athcodec.motion.thresholds import Thresholds
+from athcodec.options import SMOOTHNESS
+
+REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
+USUAL_REST_RATIO = 0.5
+REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
+STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
+TRIAL_SEGMENTS = 3  # Segments of a trial.
+TRIAL_FRAMES, TOO_MANY = 64, 1.2  # Predicted motion is given up if so many frames promise so many times the bytes
+FEW_FRAMES, FAR_TOO_MANY = 8, 3.0  # allowed, or in long segments, in which a look at these costs little, these.
+STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
+CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
+FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
+FINE = 9e-4  # Bound, in diagonals, below which second differences are held to one limit.
+UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
+TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
+HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
+MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.
+MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
+LESS_ERROR = 0.9  # Largest error of level 0 with maps, over that without, that is worth their bytes.
+
+
+def one_map_each(seen: Survey) -> Ath:
+    """Return the ATH in which each root's subtree moves as one."""
+    epsilon, xi = (float(errors.max(initial=0.0)) for errors in (seen.largest_gads, seen.largest_distance))
+    return replace(seen, xi=None).ath(Thresholds(epsilon, 0, xi, 0))
+
+
+def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
+    settings = plain_settings(source, ath.height + 2, bound, _largest_step(source.limit(bound)), rest_step)
+    return with_best_rest(source, ath, settings)
+
+
+class Way(NamedTuple):
+    """How motion is predicted: the step of the rest pose, in bounds, and the largest error, over the limit."""
+
+    rest_ratio: float
+    error_share: float = 1.0
+
+
+@dataclass(frozen=True)
+class FoundPrediction:
+    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have."""
+
+    way: Way
+    choice: Choice
+    bytes: float
+    twitches: bool
+
+
+def best_prediction(
+    source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default", usual: bool = False
+) -> FoundPrediction | None:
+    """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound. usual: the usual way
+    alone is tried."""
+    ath = one_map_each(source.seen)
+    limit = source.rest_limit(source.smallest_bound(bound))
+    samples, vertices = _samples(source), source.clip.vertex_count
+
+    @cache
+    def by_ratio(ratio: float) -> Settings:
+        work.add(REST * vertices)
+        return _settings(source, ath, bound, ratio * limit)
+
+    @cache
+    def prelude_of(ratio: float) -> CodedPrelude:
+        return CodedPrelude(source, ath, by_ratio(ratio), predicted=True)
+
+    def coded(way: Way) -> FoundPrediction:
+        settings = by_ratio(way.rest_ratio)
+        stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
+        choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
+        work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
+        try:
+            prelude = prelude_of(way.rest_ratio)
+            parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+        except BoundError:
+            return FoundPrediction(way, choice, math.inf, False)
+        motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
+        twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
+        return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
+
+    def best(share: float, most: float) -> FoundPrediction:
+        """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
+        ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
+        found = coded(Way(ratios[0], error_share=share))
+        if found.bytes > HOPELESS * most:
+            return found
+        tried = [found, *(coded(Way(ratio, error_share=share)) for ratio in ratios[1:])]
+        return min(tried, key=lambda one: one.bytes)
+
+    if usual:
+        found = coded(Way(USUAL_REST_RATIO))
+        return found if found.bytes < most_bytes else None
+    some, are_long = by_ratio(USUAL_REST_RATIO), max(one.positions.shape[2] for one in samples) >= 2 * TRIAL_FRAMES
+    try:
+        for frames, too_many in [(FEW_FRAMES, FAR_TOO_MANY)] * are_long + [(TRIAL_FRAMES, TOO_MANY)]:
+            work.add(PREDICTION * vertices * sum(min(frames, sample.positions.shape[2]) for sample in samples))
+            if sum(_begun(prelude_of(USUAL_REST_RATIO), some, one, frames) for one in samples) > too_many * most_bytes:
+                return None
+    except BoundError:
+        return None
+    found = best(1.0, math.inf)
+    if found.twitches and smoothness != "bytes":
+        relative = source.smallest_bound(bound) / source.seen.diagonal
+        most = min(most_bytes, SMOOTHNESS[smoothness] * found.bytes)
+        for share in _still_shares(relative, smoothness):
+            still = best(share, most)
+            if still.bytes < most:
+                found = still
+                if not (still.twitches and smoothness == "motion"):
+                    break
+    return found if found.bytes < most_bytes else None
+
+
+def _still_shares(relative: float, smoothness: str) -> list[float]:
+    """Return the shares of the limit that errors may be held to, as they are tried: from small to large until one is
+    not too dear, or for the calmest motion from large to small until nothing twitches."""
+    least = _still_share(relative)
+    if smoothness == "motion":
+        return [least, *(share for share in (FINE_STILL,) if share < least and relative >= FINE)]
+    return [least, *(share for share in CALMER if share > least)]
+
+
+def _still_share(relative: float) -> float:
+    """Return the share of the limit for errors that do not twitch. It grows by less than the bound falls."""
+    if relative >= FINE:
+        return STILL
+    unseen = math.log(UNSEEN / relative) / math.log(UNSEEN / INVISIBLE)
+    return FINE_STILL ** (1.0 - min(max(unseen, 0.0), 1.0))
+
+
+def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | float) -> bool:
+    """Return whether second differences of the error over frames, (N, 3, T), are visibly above the limit: those of many
+    vertices in some frames only, or of vertices that hardly jerk themselves."""
+    if positions.shape[2] < 3:
+        return False
+    limits, counts = np.broadcast_to(limit, len(positions)), np.zeros((2, positions.shape[2] - 2), np.int64)
+    for start, stop in ranges(len(positions), positions[0].size):
+        rows = shown[start:stop] - positions[start:stop], positions[start:stop]
+        error, moved = (np.linalg.norm(np.diff(some, 2, axis=2), axis=1) for some in rows)
+        above = error > limits[start:stop, None]
+        counts += above.sum(axis=0), (above & (error > moved)).sum(axis=0)
+    share, seen = counts / len(positions)
+    return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
+
+
+def _largest_step(limit: np.ndarray | float) -> float:
+    """Return the largest step that reaches every place within the limit."""
+    return qz.single(qz.SAFE_REST_CAP * float(np.min(limit)))
+
+
+def _samples(source: Source) -> list[SegmentSample]:
+    """Return a few segments spread over a clip, or the typical segments of several clips."""
+    if len(source.clip_range_segments) > 1:
+        return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
+    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
+    positions = [source.positions(segment) for segment in some]
+    scale = source.coded_frames / sum(block.shape[2] for block in positions)
+    return [SegmentSample(block, scale * block.shape[2]) for block in positions]
+
+
+def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample, frames: int) -> float:
+    """Return the bytes of the frames that a sample stands for, without first frames, as far as its first ones tell."""
+    some = sample.positions[:, :, :frames]
+    choice = Choice(settings, settings, None, predicted=True)
+    coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
+    return (coded - first) / some.shape[2] * sample.frames
+
+
+def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
+    """Return PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    settings = choice.settings
+    source = np.ascontiguousarray(positions.transpose(2, 0, 1))
+    limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
+    for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
+        for factor in STEPS:
+            step = qz.single(factor * _largest_step(share * limits))
+            coded = streams.encode_predicted(prelude.plan, prelude.origin, source, share * limits, step, prelude.dtype)
+            if coded is not None:
+                return writing.pack_predicted(step, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+    raise BoundError(
+        f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
+    )
+
+
+def code_predicted_segment(
+    prelude: CodedPrelude,
+    choice: Choice,
+    positions: np.ndarray,
+    exact: np.ndarray | None,
+    shown_times: np.ndarray,
+    box: np.ndarray,
+) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
+    """Return what CodedMotion.joined_to does. Predicted motion is not joined, and may jerk."""
+    plan, settings = prelude.plan, choice.settings
+    payload, decoded = _predicted(prelude, choice, positions)
+
+    def error(shown: np.ndarray) -> tuple[float, ...]:
+        return position_errors(shown, positions, prelude.origin, plan.pool, shown_times, prelude.shares)
+
+    last = plan.level_count - 1
+    chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
+    source = SourceFrames(positions, shown_times, None, box, settings.bound, plan.pool)
+    coarse = level_0.pose(0, prelude.origin, prelude.dtype)
+    errors, away = [error(coarse)], source.flaws(coarse, None)[0]
+    for moved in _with_maps(prelude, positions, errors[0][-1]):
+        maps = streams.encode_affines(moved, 0)
+        pose = moved.pose(0, prelude.origin, prelude.dtype)
+        with_maps, map_away = error(pose), source.flaws(pose, None)[0]
+        stays = map_away <= max(away, MOST_AWAY * length(box[1] - box[0]))
+        if stays and len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
+            chunks[0, ct.AFFINES], errors[0], away = maps, with_maps, map_away
+            break
+    errors.append(error(decoded))
+    if errors[-1][0] > settings.largest_bound:
+        raise AssertionError(f"decoded error {errors[-1][0]} is beyond the bound {settings.largest_bound}")
+    if exact is not None:
+        chunks[last + 1, ct.EXACT] = streams.encode_exact(decoded, exact)
+        errors.append((0.0, 0.0, 0.0))
+    flaws = [(away, 0.0)] + [(0.0, 0.0)] * (len(errors) - 1)
+    return chunks, np.array(errors), np.zeros(len(errors), int), np.array(flaws)
+
+
+def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
+    """Return a segment that shows the rest pose where no maps move it."""
+    return SegmentMotion(prelude.plan, frames, [LevelStream(1.0)] * prelude.plan.level_count)
+
+
+def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
+    """Yield segments with maps of the roots, from fine to coarse; error: RMS of the rest pose standing still."""
+    plan = prelude.plan
+    for part in MAP_STEPS:
+        moved = _still(prelude, positions.shape[2])
+        step = part * error * (plan.vertex_count / len(plan.nodes)) ** 0.5
+        if step > 0:
+            moved.analyse_nodes(positions, np.full(plan.level_count, step), Rounding(qz.DEAD_ZONE), level=0)
+            yield moved

@@ -1,0 +1,37 @@
+"""Reference poses: what motion may be coded about in place of the source's rest pose.
+
+The mean pose has the mean tracks of the motion, each seen from where its piece is attached: stems keep their lengths,
+as they would not in the mean of positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.encoding.clip.survey import Ath
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.motion import SegmentMotion
+from athcodec.encoding.segments.segment import FINER, Source, analyse_finely, level_streams, uncoded_plan
+from athcodec.encoding.segments.settings import Settings
+
+SEGMENTS = 4  # Largest number of segments whose mean is taken.
+
+
+def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
+    """Return the mean pose, (N, 3) float64 less the origin, in file order. settings: the start of a search."""
+    settings = replace(settings, forms=source.sheet_like.astype(np.int32), layer=0)
+    plan = uncoded_plan(source, ath, settings)
+    some = np.unique(np.linspace(0, len(source.segments) - 1, SEGMENTS).astype(int))
+    coefficients, tracks, frames = 0.0, 0.0, 0
+    for segment in some:
+        motion = analyse_finely(plan, settings, source.positions(segment))
+        of_sum = np.sqrt(motion.frames)  # Factor from the coefficient of the mean wave to the sum over frames.
+        coefficients = coefficients + of_sum * motion.coefficients[:, :, 0]
+        tracks = tracks + of_sum * motion.tracks[:, :, :, 0]
+        frames += motion.frames
+    fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
+    mean = SegmentMotion(plan, 1, level_streams(fine, plan.level_count, {}))
+    mean.coefficients[:, :, 0], mean.tracks[:, :, :, 0] = np.rint(coefficients / frames), np.rint(tracks / frames)
+    return mean.pose(plan.level_count - 1, np.zeros(3), np.float64)[:, :, 0]

@@ -1,0 +1,72 @@
+"""Tubes: which branches are made of rings that move alike (FORMAT.md, Ring).
+
+Bark is a tube around a stem, ring after ring in the order of its vertices. Its rings hardly change their shape,
+whatever the stem does, so its motion is that of their centres, and coded so it keeps its thickness at any bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from athcodec.encoding.model.quantise import bits
+
+LEAST_RING, LARGEST_RING = 2, 32  # Vertices of a ring.
+LEAST_RINGS = 4  # Rings of a tube.
+FINE = 1e-3  # Unit, in lengths of a stem, of the differences by which a period is found.
+WITHIN = 0.1  # Largest share of the squared motion of a tube that is within its rings.
+FRAMES = 12  # Frames of a segment by which rings are judged.
+
+
+def ring_sizes(
+    first: np.ndarray, count: np.ndarray, wanted: np.ndarray, rest: np.ndarray, samples: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return the vertices of the rings of each branch, (B,) int32; 0: it has no rings that move alike.
+
+    first, count, wanted: (B,) vertices of the branches, and which may have rings; rest: (N, 3); samples: (N, 3, T)
+    each.
+    """
+    rings = np.zeros(len(count), np.int32)
+    for size in np.unique(count[wanted & (count >= LEAST_RINGS * LEAST_RING)]).tolist():
+        branches = np.flatnonzero(wanted & (count == size))
+        vertices = first[branches, None] + np.arange(size)
+        rings[branches] = periods = _periods(rest[vertices])
+        for ring in np.unique(periods[periods > 0]).tolist():
+            some = periods == ring
+            rings[branches[some]] *= _move_alike(rest[vertices[some]], vertices[some], samples, ring)
+    return rings
+
+
+def _periods(stems: np.ndarray) -> np.ndarray:
+    """Return after how many vertices the steps of (B, n, 3) stems repeat best, (B,); 0: they do not, or the last ring
+    would have more than a tip and less than the others."""
+    size = stems.shape[1]
+    steps = np.diff(stems, axis=1)
+    unit = FINE * np.linalg.norm(np.ptp(stems, axis=1), axis=1)
+    unit = np.where(unit > 0, unit, 1.0)[:, None, None]
+    lags = range(1, min(LARGEST_RING, size // LEAST_RINGS) + 1)
+    costs = [_cost(steps, lag, unit) for lag in lags]
+    best = 1 + np.argmin(costs, axis=0)
+    return np.where((best >= LEAST_RING) & (size % best <= 1), best, 0)
+
+
+def _cost(steps: np.ndarray, lag: int, unit: np.ndarray) -> np.ndarray:
+    residual = steps.copy()
+    residual[:, lag:] -= steps[:, :-lag]
+    return bits(np.abs(residual) / unit).sum(axis=(1, 2))
+
+
+def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.ndarray], ring: int) -> np.ndarray:
+    """Return (B,) bool: whether the vertices of each ring almost move as one."""
+    starts = np.arange(0, stems.shape[1], ring)
+    sizes = np.diff(np.append(starts, stems.shape[1]))
+    within, all_in_all = np.zeros(len(stems)), np.zeros(len(stems))
+    for sample in samples:
+        for t in np.unique(np.linspace(0, sample.shape[2] - 1, FRAMES).astype(int)):
+            moved = sample[:, :, t][vertices] - stems
+            moved -= moved.mean(axis=1, keepdims=True)
+            centres = np.add.reduceat(moved, starts, axis=1) / sizes[:, None]
+            within += np.square(moved - np.repeat(centres, sizes, axis=1)).sum(axis=(1, 2))
+            all_in_all += np.square(moved).sum(axis=(1, 2))
+    return within < WITHIN * all_in_all

@@ -1,0 +1,125 @@
+"""Rotations: whether stems are predicted as turned with what they are attached to, and how finely (FORMAT.md)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from athcodec.decoding.container import ROTATION_FACTORS
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search.choices import learned_bases
+from athcodec.encoding.search.segment_samples import SegmentSample
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.segment import Source
+from athcodec.encoding.segments.settings import Settings
+from athcodec.motion.algebra import decompose, determinant
+
+HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
+HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
+
+FRAMES = 12  # Frames of a segment by which it is known that plants turn.
+LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
+MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre that is then no turn.
+
+
+def first_rotations(
+    source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray, levels: int
+) -> tuple[int, ...]:
+    """Return the factor of each level that a search starts with: none turn, or the roots do where most of what stands
+    on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. rigid:
+    (B,) of branches that turn in any case if it is not 0."""
+    turns = Feature.ROTATIONS not in source.without and not rigid[source.hierarchy.branch_parent < 0].all()
+    turns = turns and _turn_as_wholes(source, samples)
+    count = min(2, levels) if turns else 0
+    return (ROTATION_FACTORS[-1],) * count + (0,) * (levels - count)
+
+
+def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
+    """Return whether the trees that stand on roots turn by much more than they bend."""
+    roots = np.flatnonzero(source.hierarchy.branch_parent < 0)
+    first = source.hierarchy.first_vertex[roots]
+    rest = _about_centres(source.rest, first)
+    size2 = _sums(np.square(rest), first).sum(axis=1)
+    moved, bent, turned = (np.zeros(len(roots)) for _ in range(3))
+    for sample in samples:
+        for frame in np.unique(np.linspace(0, sample.positions.shape[2] - 1, FRAMES).astype(int)).tolist():
+            pose = _about_centres(sample.positions[:, :, frame], first)
+            moments = _sums((pose[:, :, None] * rest[:, None]).reshape(-1, 9), first).reshape(-1, 3, 3)
+            left, stretch, right = decompose(moments)
+            stretch[:, 2] *= np.sign(determinant(left) * determinant(right))
+            both, along = size2 + _sums(np.square(pose), first).sum(axis=1), stretch.sum(axis=1)
+            way = both - 2 * np.trace(moments, axis1=1, axis2=2)
+            moved, bent, turned = moved + way, bent + np.maximum(both - 2 * along, 0), np.maximum(turned, way)
+    is_far = turned >= LEAST_TURN**2 * size2 / 2  # What turns about its longest axis has hardly any levers.
+    turning = is_far & (bent <= MOST_BENT * moved)
+    return bool(size2[turning].sum() > size2.sum() / 2)
+
+
+def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) -> list[Settings]:
+    """Return the settings with each rotation factor at all levels."""
+    return [settings.with_rotations(factor) for factor in factors]
+
+
+def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
+    few tracks only in frames that do not turn."""
+    if trials.without(Feature.STILL):
+        return settings
+    in_waves, *in_bases = turned_over(settings, trials)
+    if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
+        return settings
+    tried = [settings, in_waves]
+    if trials.work.fits(2 * trials.work_of_trial):  # One time basis alone would win against waves.
+        tried += [*learned_bases.candidates(settings, trials)[:1], *in_bases[:1]]
+    return replace(settings, still=trials.cheapest(tried).still)
+
+
+def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings with the other kind of branches, in each time basis."""
+    if trials.without(Feature.STILL):
+        return []
+    other = replace(settings, still=not settings.still, learned_pieces=None)
+    return [other.in_waves(), *learned_bases.candidates(other, trials)]
+
+
+def fast_rotations(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the best of a few factors."""
+    return best_rotations(settings, trials, ROTATION_FACTORS[:2])
+
+
+def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
+    """Return the settings with the best factor: one for all levels, one for each level, or one for the roots alone."""
+    if trials.without(Feature.ROTATIONS):
+        return settings
+    uniform = candidates(settings, factors)
+    unturned, *turned = costs = trials.costs(uniform)
+    if max(costs) == math.inf or min(turned) > HOPELESS_RATIO * unturned:
+        return trials.cheapest([settings, *uniform])
+    per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
+    mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
+    return trials.cheapest([settings, mixed, *_turning_roots(settings, trials, factors), *uniform])
+
+
+def _turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
+    """Return the settings with each rotation factor at the roots alone, which turn what turns as a whole. A root has
+    its stem at level 0 if it moves as one, else at level 1."""
+    has_stems = [trials.prelude(settings).plan.has_stems(level) for level in range(settings.levels)]
+    levels = [level for level in (1, 2) if any(has_stems[:level]) and level < settings.levels]
+    tried = [(factor,) * level + (0,) * (settings.levels - level) for level in levels for factor in factors if factor]
+    return [replace(settings, rotation_step_factors=factors) for factors in tried]
+
+
+def _sums(values: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return the sums of rows, (N, k), of runs that begin at `first`."""
+    sums: np.ndarray = np.add.reduceat(values, first)
+    return sums
+
+
+def _about_centres(positions: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return positions, (N, 3), less the mean of their run."""
+    count = np.diff(np.append(first, len(positions)))
+    away: np.ndarray = positions - np.repeat(_sums(positions, first) / count[:, None], count, axis=0)
+    return away

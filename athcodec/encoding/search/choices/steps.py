@@ -1,0 +1,75 @@
+"""Steps: how coarsely motion and rest pose are quantised, walked on geometric grids to the smallest file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.search.choices.forms import in_each_basis
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
+
+WALKS = 3  # Largest number of walks of both steps.
+LONGEST_WALK = 10  # Grid points that a walk moves at most.
+STEP_FACTOR, REST_STEP_FACTOR = 1.15, 1.4  # Ratios of neighbouring grid points.
+FINE_FACTOR, FINE_REST_FACTOR = 1.04, 1.12  # Factors of a search at effort "best".
+WEIGHT_PARTS = (0.0, 0.05, 0.2)  # Shares of a level's vertices that may have weights below that of the level's step.
+WEIGHT_POWERS = (0.5, 1.0)  # Powers of a level's weight that are tried as the factor on its step.
+
+
+def best_level_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with coarser steps for levels whose vertices and those below have larger weights."""
+    if trials.source.weights is None:
+        return settings
+    weights = [trials.source.level_weights(settings.levels, part) for part in WEIGHT_PARTS]
+    tried = [replace(settings, level_steps=least**power) for least in weights for power in WEIGHT_POWERS]
+    return trials.cheapest([settings, *tried])
+
+
+def best_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the best steps. On short stems each basis is tried with steps of its own, because affine
+    functions are best at finer steps than modes."""
+    return trials.cheapest([walked(start, trials) for start in in_each_basis(settings, trials)])
+
+
+def finer_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with steps from a finer grid."""
+    return walked(settings, trials, FINE_FACTOR, FINE_REST_FACTOR)
+
+
+def walked(
+    settings: Settings, trials: Trials, factor: float = STEP_FACTOR, rest_factor: float = REST_STEP_FACTOR
+) -> Settings:
+    """Walk step and rest step in turn to the cheapest."""
+    for again in range(WALKS):
+        # Where the nearest steps do not pay, a much coarser step, or a much finer rest pose, still may.
+        coarser, finer = ([], []) if again else ([2], [-4])
+        before, settings = settings, _walk(settings, trials, "step", factor, math.inf, coarser)
+        if trials.source.reference_is_exact:
+            break
+        cap = trials.extrapolation.rest_cap * trials.source.rest_limit(settings.bound)
+        settings = _walk(settings, trials, "rest_step", rest_factor, cap, finer)
+        if (settings.step, settings.rest_step) == (before.step, before.rest_step):
+            break
+    return settings
+
+
+def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: float, ahead: list[int]) -> Settings:
+    """Walk one of the steps, up to a cap. ahead: exponents of the factor that are tried beside the nearest."""
+
+    def moved(exponent: int) -> Settings:
+        return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
+
+    def costs_at(exponents) -> dict[int, float]:
+        return dict(zip(exponents, trials.costs([moved(exponent) for exponent in exponents])))
+
+    costs = costs_at([-1, 0, 1])
+    if min(costs, key=costs.get) == 0:
+        costs |= costs_at(ahead)
+    while True:
+        best = min(costs, key=costs.get)
+        wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= LONGEST_WALK]
+        if not wanted:
+            return moved(best)
+        costs |= costs_at(wanted)

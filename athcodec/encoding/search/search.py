@@ -1,0 +1,422 @@
+"""The order in which the choices about a file are made, so that it becomes the smallest.
+
+Each choice (choices/) is made by trials on a sample of the segments, and of the plant if that is large (trials.py).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from athcodec.encoding.clip.survey import Ath
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search import order
+from athcodec.encoding.search.choices import forms, learned_bases, learned_pieces, rotations
+from athcodec.encoding.search.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes, work_of_steps
+from athcodec.encoding.search.choices.reference import mean_pose
+from athcodec.encoding.search.choices.rest import best_slack, with_slack
+from athcodec.encoding.search.choices.rigid import best_freedom, calm_parts
+from athcodec.encoding.search.choices.steps import best_level_steps, best_steps, finer_steps, walked
+from athcodec.encoding.search.progress import ANALYSIS, LEARNING, START, TRIAL, Work, expected_trials
+from athcodec.encoding.search.sample import ExtrapolationFactors, is_small, sample_plant
+from athcodec.encoding.search.segment_samples import samples_of, spread_samples
+from athcodec.encoding.search.start import first_settings
+from athcodec.encoding.search.trials import Trials, distinct
+from athcodec.encoding.segments.segment import CodedPrelude, Source, branch_records
+from athcodec.encoding.segments.settings import OF_SAMPLE, Choice, Settings
+from athcodec.options import MIN_SEGMENT
+
+LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
+REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
+SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
+NEAREST = 3  # Steps are walked for so many other choices.
+NEAR_RATIO = 1.1  # Bytes of these, over the least.
+SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
+
+STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
+SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
+OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
+CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
+POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
+
+Choose = Callable[[Settings, Trials], Settings]
+
+
+def settled(settings: Settings, trials: Trials) -> Settings:
+    """Return settings that no other choice of one kind makes smaller, each with steps of its own. Earlier choices were
+    made at other steps, and sizes jump from bound to bound if the worse one of two stays."""
+    saving = settings.learned_saving
+    for _ in range(SETTLING_ROUNDS):
+        plain = replace(settings, learned_pieces=None)
+        turned = rotations.candidates(plain)
+        in_forms = [candidate for start in (plain, turned[0]) for candidate in forms.candidates(start, trials)]
+        starts = [plain, *_nearest(plain, turned + in_forms, trials)]
+        learned = [candidate for start in starts for candidate in learned_pieces.candidates(start, trials)]
+        in_time = [settings.in_waves(), *learned_bases.candidates(settings, trials)]
+        others = _nearest(settings, starts + learned + in_time + rotations.turned_over(settings, trials), trials)
+        best = trials.cheapest([settings, *(walked(other, trials) for other in others)])
+        if best is settings:
+            break
+        settings = best
+    return replace(settings, learned_saving=saving)  # All of a sampled plant goes by the saving chosen before.
+
+
+def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list[Settings]:
+    """Return the few of the others that are the cheapest, and hardly dearer than the cheapest of all."""
+    others = [other for other in distinct(others) if other.key != settings.key]
+    costs = trials.costs(others)
+    most = NEAR_RATIO * min([trials.cost(settings), *costs])
+    return [others[i] for i in np.argsort(costs, kind="stable")[:NEAREST] if costs[i] <= most]
+
+
+def _learned_cost(trials: Trials) -> float:
+    """Return the bytes of a file at first settings, or with learned time bases or modes if it is smaller with them."""
+    start = trials.start
+    with_bases = trials.cheapest([start, *learned_bases.candidates(start, trials)])
+    return min(trials.costs([with_bases, *learned_pieces.candidates(with_bases, trials)]))
+
+
+CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
+    best_level_steps: "steps of levels",
+    best_freedom: "freedom of rigid parts",
+    forms.best_forms: "forms",
+    forms.best_forms_again: "forms",
+    rotations.still_if_smaller: "branches whose bending turns nothing",
+    rotations.best_rotations: "rotations",
+    rotations.fast_rotations: "rotations",
+    learned_bases.best_bases: "time bases",
+    learned_bases.best_waves: "periodic waves",
+    learned_bases.waves_if_smaller: "time bases",
+    learned_pieces.best_pieces: "learned modes",
+    learned_pieces.best_pieces_in_any_basis: "learned modes",
+    best_steps: "steps",
+    learned_pieces.learned_about_other_pose: "learned modes",
+    finer_steps: "finer steps",
+    calm_parts: "calm parts",
+    best_slack: "precision of the rest pose",
+    best_node_steps: "maps of coarse levels",
+    settled: "all choices again",
+}
+BY_NAME = {choose.__name__: choose for choose in CHOICES}
+
+
+@dataclass(eq=False)
+class Search:
+    """Finds the settings of a file; ratios: of the steps of its layers to that of the last, descending to 1."""
+
+    trials: Trials
+    effort: str
+    ratios: Sequence[int] = (1,)
+
+    def __post_init__(self) -> None:
+        source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
+        self._forms: np.ndarray | None = None
+        self.makes_all_again = is_small(source.clip.vertex_count, source.segments, self.effort) and not keeps_shape
+
+    @classmethod
+    def of(
+        cls,
+        source: Source,
+        ath: Ath,
+        bound: float,
+        effort: str,
+        work: Work,
+        jobs: int | None = None,
+        ratios: Sequence[int] = (1,),
+    ) -> Search:
+        """Return the search for a whole plant."""
+        samples = samples_of(source)
+        start = first_settings(source, ath, bound, samples, ratios)
+        work.add(START * source.clip.vertex_count)
+        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)._in_mid_turn()
+        if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
+            plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
+            other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
+            search = other if other.first_cost() <= search.first_cost() else search
+        trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
+        expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
+        work.expected = work.expected or min(expected, work.allowed)
+        return search
+
+    def shorter_segments(self) -> list[tuple[int, float]]:
+        """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
+        settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
+        smaller. What is learned may do as well in longer ones: the last half is the smallest with it, too, and stands
+        before the power of two that is next to it."""
+        trials = (self.of_sample or self).trials
+        lengths = [max(stop - start for start, stop in trials.source.segments)]
+        tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
+        while (length := -(-lengths[-1] // 2)) >= MIN_SEGMENT:
+            halves = trials.source.in_segments(length)
+            if halves.coded_frames < MIN_SEGMENT * len(halves.segments):  # Most frames are held.
+                break
+            other = trials.in_segments(halves, spread_samples(halves))
+            if other.cost(other.start) >= tried[-1].cost(tried[-1].start):
+                break
+            lengths.append(length)
+            tried.append(other)
+        if len(tried) == 1:
+            return []
+        costs = [_learned_cost(one) for one in tried]
+        best = int(np.argmin(costs))
+        shorter = list(zip(lengths, costs))[1 : best + 1]
+        usual = 1 << round(math.log2(lengths[best]))
+        return [*shorter, (usual, costs[best])] if shorter and usual != lengths[best] else shorter
+
+    def levels_need_own_bases(self) -> bool:
+        """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
+        can."""
+        trials = (self.of_sample or self).trials
+        start, own = trials.start, trials.start.in_learned_bases()
+        if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
+            return False
+        others = start, replace(own, common_basis=True)
+        return all(trials.costs([own])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
+
+    def keep_work_of_maps(self) -> None:
+        """Leave the work of choosing maps of coarse levels, which comes last and is always done."""
+        self.trials.work.allowed -= work_of_steps((self.of_sample or self).trials)
+
+    def first_cost(self) -> float:
+        """Return the bytes of a whole file at the settings that the search starts with."""
+        trials = (self.of_sample or self).trials
+        return trials.cost(trials.start)
+
+    @property
+    def cost_of_best(self) -> float:
+        """Bytes of a file of one layer."""
+        search = self.of_sample or self
+        return search.trials.cost(search.best)
+
+    def tried(self, frames_ratio: float) -> float:
+        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
+        search = self.of_sample or self
+        return search._cost_of_frames(search.at_best_step, frames_ratio)
+
+    def expected(self, frames_ratio: float) -> float:
+        """Return about the same from the settings that the search starts with, without searching."""
+        search = self.of_sample or self
+        trials = search.trials
+        start = trials.cheapest([trials.start, *rotations.turned_over(trials.start, trials)[:1]])
+        return search._cost_of_frames(start, SEARCHED_SHARE * frames_ratio)
+
+    def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
+        return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
+
+    def decide(self) -> tuple[list[Choice], CodedPrelude]:
+        """Return settings to choose from, and hierarchy and poses as coded with them."""
+        of_first_layer = FIRST_LAYER_TRIALS * self.trials.is_layered
+        with self.trials.work.trying("reference pose", (self.of_sample or self)._share_beside(of_first_layer)):
+            search = self.about_best_reference()
+            self.cost = search.cost_of_best
+        trials, (first_layer, candidates) = search.trials, search.candidates()
+        prelude = trials.prelude(candidates[0])
+        choices = [
+            Choice(settings, first_layer, trials.learned_modes(prelude.plan, settings), trials.source.reference)
+            for settings in candidates
+        ]
+        trials.forget_modes()
+        return choices, prelude
+
+    def candidates(self) -> tuple[Settings, list[Settings]]:
+        """Return the settings of the first layer, and those to choose from for refinements; the best settings alone if
+        there is a single layer. For a large plant they are those of a sample of it."""
+        if self.of_sample:
+            first, candidates = self._candidates_of_sample(self.of_sample)
+        else:
+            candidates = list(self.refinements())  # Refinements come first: components are of the step that asks first.
+            first = self.first_layer()
+        self.trials.work.finish()
+        return first, candidates
+
+    @cached_property
+    def at_first_step(self) -> Settings:
+        """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
+        if self.effort == "fast":
+            fast = [best_level_steps, rotations.fast_rotations, learned_bases.best_waves]
+            return self._after(fast, self.trials.start)
+        choices = [BY_NAME[name] for name in order.BEFORE_STEPS]
+        last = [learned_pieces.best_pieces_in_any_basis, learned_bases.best_waves]
+        with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
+            return self._after([best_level_steps, *choices, *last], self.trials.start)
+
+    @cached_property
+    def at_best_step(self) -> Settings:
+        """The same at the best steps."""
+        if self.effort == "fast":
+            return self.at_first_step
+        return self._after([best_steps, learned_pieces.learned_about_other_pose], self.at_first_step)
+
+    @cached_property
+    def best(self) -> Settings:
+        """Settings of a file of one layer."""
+        names = () if self.effort == "fast" else order.AFTER_STEPS
+        choices = [BY_NAME[name] for name in names if self.makes_all_again or name != settled.__name__]
+        if self.effort == "best" and self.trials.source.weights is None:
+            choices.append(finer_steps)
+        if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
+            choices = [*choices, best_node_steps]
+        return self._after(choices, self.at_best_step)
+
+    def _share_beside(self, trials: int) -> float:
+        """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
+        left = self.trials.work.allowed - self.trials.work.done
+        return max(0.5, 1 - trials * self.trials.work_of_trial / left) if left > 0 else 1.0
+
+    def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
+        for choose in choices:
+            with self.trials.work.trying(CHOICES[choose]):
+                settings = choose(settings, self.trials)
+        return settings
+
+    def first_layer(self) -> Settings:
+        """Return the settings of the first layer: the best ones if that is the only layer."""
+        if not self.trials.is_layered:
+            return self.best
+        turned = [rotations.best_rotations] * any(self.best.rotation_step_factors)  # Coarser steps turn no more.
+        choices: list[Choose] = [] if self.effort == "fast" else [*turned, learned_pieces.best_pieces]
+        first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
+        return self._after([*choices, best_node_steps], first)
+
+    def refinements(self) -> Iterator[Settings]:
+        """Yield settings that may suit refinements, each of which has one stream: with rotations and without."""
+        settings, trials = self.best, self.trials
+        if not trials.is_layered or not any(settings.rotation_step_factors):
+            yield settings
+            if trials.is_layered and self.makes_all_again and settings.learned_pieces is not None:
+                yield replace(settings, learned_pieces=None)
+            return
+        main, least = settings.rotation_step_factors[trials.prelude(settings).plan.main_level], math.inf
+        for factor in dict.fromkeys((main, 0)):
+            candidate = settings.with_rotations(factor)
+            if self.effort != "fast":
+                if trials.cost(replace(candidate, learned_pieces=None)) > LEARNED_MODES_MAX_GAIN * least:
+                    continue
+                candidate = learned_pieces.best_pieces(candidate, trials)
+                least = min(least, trials.cost(candidate))
+                if trials.cost(candidate) > REFINEMENTS_MAX_GAIN * least:
+                    continue
+            yield candidate
+
+    def _in_mid_turn(self) -> Search:
+        """Return the search about a pose in the middle of the turns of what turns as a whole, if that is cheaper: a
+        rotation by a full turn has no numbers, and jumps before."""
+        if not any(self.trials.start.rotation_step_factors) or not self._may_have_mean_pose:
+            return self
+        self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
+        other = self.about_mean_pose()
+        return other if other.first_cost() < self.first_cost() else self
+
+    @property
+    def _may_have_mean_pose(self) -> bool:
+        source = self.trials.source
+        if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
+            return False
+        return not source.keeps_shape.any()  # The mean of what turns is smaller than what turns.
+
+    def about_best_reference(self) -> Search:
+        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: the
+        mean pose if it is far ahead at first settings, else it is tried with what was chosen about the rest pose, and
+        goes on from there. In small clips both are searched up to their steps."""
+        if not self._may_have_mean_pose:
+            return self
+        work, tried = self.trials.work, (self.of_sample or self).trials
+        maps = 0.0 if tried.is_layered else 2 * work_of_steps(tried)
+        with work.trying("mean pose"):
+            if not work.fits((POSE_TRIALS + STEP_TRIALS) * tried.work_of_trial + maps):
+                return self
+        work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
+        other = self.about_mean_pose()
+        about_rest, about_mean = self.of_sample or self, other.of_sample or other
+        if not self.makes_all_again:
+            at_first = ((one, one.start) for one in (about_rest.trials, about_mean.trials))
+            of_rest, of_mean = (np.array([one.cost(start), one.level_costs(start).sum()]) for one, start in at_first)
+            if (of_rest > CLEAR_RATIO * of_mean).all():
+                return other
+        cost = about_rest._cost_to_compare()
+        if not self.makes_all_again:
+            about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
+        return other if about_mean._cost_to_compare() < cost else self
+
+    def _cost_to_compare(self) -> float:
+        """Return what is compared with the cost about another reference pose."""
+        return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
+
+    def about_mean_pose(self) -> Search:
+        """Return a search about the mean pose of the motion, which has chosen nothing yet."""
+        trials = self.trials
+        source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
+        ath = replace(trials.ath, rest=source.rest + source.origin)
+        start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
+        return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
+
+    def _like(self, other: Search, settings: Settings) -> Settings:
+        """Return settings that were chosen about another reference pose, about this one."""
+        trials, start = self.trials, self.trials.start
+        like = replace(
+            settings,
+            forms=forms.forms_like(settings.forms, other.trials.source, trials),
+            rest_step=start.rest_step,
+            coarsest_rest_step=start.coarsest_rest_step,
+            lags=start.lags,
+            connected_rest=start.connected_rest,
+            shape_of=start.shape_of,
+            learned_pieces=None,
+            learned_coded=False,
+        )
+        if settings.learned_pieces is None:
+            return like
+        [(pieces, _)] = learned_pieces.pieces_that_save(like, trials, [settings.learned_saving])
+        return learned_pieces.learned_anew(replace(like, learned_pieces=pieces), trials)
+
+    @cached_property
+    def of_sample(self) -> Search | None:
+        """The search on a sample of a large plant."""
+        trials, start = self.trials, self.trials.start
+        sample = sample_plant(trials.source, trials.ath, self.effort)
+        if sample is None:
+            return None
+        some = sample.like(replace(start, shape_of=None))
+        extrapolation = ExtrapolationFactors.of(
+            branch_records(trials.source.hierarchy, trials.ath, start),
+            branch_records(sample.source.hierarchy, sample.ath, some),
+        )
+        samples = [segment.of_plant(sample) for segment in trials.samples]
+        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.work, extrapolation)
+        return Search(of_sample, self.effort, self.ratios)
+
+    def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:
+        """Return the candidates of a sample for all of the plant. Pieces with learned modes are chosen in all of it."""
+        start = self.trials.start
+        candidates = [self._from_sample(sample, settings, start) for settings in sample.refinements()]
+        if not self.trials.is_layered:
+            return candidates[0], candidates
+        return self._from_sample(sample, sample.first_layer(), start.coarser(self.ratios[0])), candidates
+
+    def _from_sample(self, sample: Search, chosen: Settings, start: Settings) -> Settings:
+        """Return what was chosen for a sample, for all of the plant; start: what does not depend on that."""
+        trials, of_sample = self.trials, sample.trials
+        inner, all_inner = (inner_nodes(some.source, some.ath, some.levels) for some in (of_sample, trials))
+        fewer = np.sqrt(of_sample.extrapolation.vertices * inner / np.maximum(all_inner, 1))
+        settings = replace(
+            start,
+            **{name: getattr(chosen, name) for name in OF_SAMPLE},
+            forms=forms.forms_like(chosen.forms, of_sample.source, trials),
+            node_steps=chosen.node_steps * np.where(inner > 0, fewer, 1.0),
+        )
+        if self._forms is None:  # The forms of all of the plant are chosen once.
+            self._forms = settings.forms if self.effort == "fast" else forms.best_of_plant(settings, trials)
+        settings = replace(settings, forms=self._forms)
+        if chosen.rest_slack > 0:
+            settings = with_slack(trials.source, trials.ath, settings, chosen.rest_slack)
+        if chosen.learned_saving is None:
+            return settings
+        [(pieces, saved)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
+        learned = replace(settings, learned_pieces=pieces)
+        if saved >= SURE_SAVING or not trials.work.fits(2 * trials.work_of_trial):
+            return learned
+        return trials.cheapest([learned, settings])  # A sample errs by more than some savings.

@@ -1,0 +1,195 @@
+"""Parts of a plant that stand still beside others that move: terrain, pots, fences. No setting of motion is tried on
+them. A search sees the branches that move alone; what it chooses is then extended to all branches, and the rest pose of
+what stands still is as coarse as in a file without motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from athcodec.encoding.clip.survey import Ath, Survey
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.motion import LearnedModes, Plan
+from athcodec.encoding.options.shape import detail_of, finer_than
+from athcodec.encoding.search.sample import PlantSample
+from athcodec.encoding.search.start import still_choice
+from athcodec.encoding.segments.segment import Source, branch_records, poses_size
+from athcodec.encoding.segments.settings import OF_BRANCHES, Choice, Settings
+from athcodec.motion.branches.still import LEAST_STILL
+from athcodec.motion.thresholds import Thresholds
+
+STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
+
+
+def still_branches(source: Source, bound: float) -> np.ndarray | None:
+    """Return which branches belong to trees that stand still, (B,) bool; None: too few do, or all."""
+    hierarchy = source.hierarchy
+    stays = source.seen.largest_ways <= STILL_SHARE * source.smallest_bound(bound)
+    roots = np.flatnonzero(hierarchy.branch_parent < 0)
+    still = np.repeat(stays, np.diff(np.append(roots, hierarchy.branch_count)))
+    vertices = int(hierarchy.stem_count[still].sum())
+    return still if LEAST_STILL <= vertices < hierarchy.vertex_count else None
+
+
+@dataclass(frozen=True)
+class SplitSource:
+    """A source of which some branches stand still, and what moves and what stands still as sources of their own."""
+
+    source: Source
+    ath: Ath
+    still: np.ndarray  # (B,) bool
+    moving_source: Source
+    still_source: Source
+
+    @classmethod
+    def of(cls, source: Source, ath: Ath, bound: float) -> SplitSource | None:
+        """Return the parts of a source; None: it has nothing that stands still, or nothing else."""
+        if source.still or source.still_branches is not None or source.reference_is_exact:
+            return None
+        still = still_branches(source, bound)
+        if still is None:
+            return None
+        moving, others = (_part(source, ath, np.flatnonzero(some)) for some in (~still, still))
+        if moving.seen.ath(ath.thresholds).height != ath.height:
+            return None
+        return cls(source, ath, still, moving, _standing(others))
+
+    @property
+    def marked(self) -> Source:
+        """The source, whose branches that stand still are not looked at when motion is coded."""
+        return self.source.marking(self.still)
+
+    def choice(self, chosen: Choice, thresholds: Thresholds, bound: float) -> Choice:
+        """Return a choice for the branches that move, made for an ATH of some thresholds, for all branches."""
+        return replace(self, ath=self.source.seen.ath(thresholds))._choice(chosen, bound)
+
+    def _choice(self, chosen: Choice, bound: float) -> Choice:
+        stillness = self._still_settings(bound)
+        is_predicted = chosen.predicted
+        settings = self._settings(chosen.settings, stillness, is_predicted)
+        connected = [replace(settings, connected_rest=flag) for flag in (False, True)]
+        if chosen.settings.connected_rest != stillness.connected_rest:
+            settings = min(connected, key=lambda one: poses_size(self.about(chosen.reference), self.ath, one))
+        first = self._settings(chosen.first_layer, stillness, is_predicted)
+        first = replace(first, connected_rest=settings.connected_rest)
+        return replace(
+            chosen,
+            settings=settings,
+            first_layer=first,
+            learned_modes=self._modes(chosen.learned_modes, settings),
+            reference=self._reference(chosen.reference),
+        )
+
+    def about(self, reference: np.ndarray | None) -> Source:
+        """Return the source about a reference pose of the branches that move."""
+        return self.source.about(self._reference(reference))
+
+    def _still_settings(self, bound: float) -> Settings:
+        source = self.still_source
+        ath = source.seen.ath(self.ath.thresholds)
+        return still_choice(source, ath, (1 - STILL_SHARE) * bound, 1).settings
+
+    def _settings(self, moving: Settings, still: Settings, is_predicted: bool) -> Settings:
+        details, step, slack = self._joined(moving.details, still.details), moving.rest_step, moving.rest_slack
+        own_step = qz.single(step)
+        is_coarser = still.rest_slack > 0 and slack == 0 and still.rest_step > step
+        if is_coarser and not is_predicted and not self.source.exact_rest and (still.details == 0).any():
+            step, slack = still.rest_step, still.rest_slack
+            of_step = int(detail_of(np.array([own_step]))[0])
+            finer = finer_than(moving.details, own_step)
+            details[~self.still] = np.where(finer > 0, finer, of_step)
+        arrays = {
+            name: self._joined(getattr(moving, name), getattr(still, name)) for name in OF_BRANCHES if name != "details"
+        }
+        shape_of = None
+        if moving.shape_of is not None or still.shape_of is not None:
+            shape_of = self._joined(*(self._numbered(one, some) for one, some in self._shapes(moving, still)))
+        settings = replace(
+            moving,
+            **arrays,
+            details=details,
+            limit=moving.limit if np.isscalar(moving.limit) else self.source.limit(moving.bound),
+            rest_step=step,
+            rest_slack=slack,
+            coarsest_rest_step=0.0,  # Then what stands still has one pose in all layers, and is never refined.
+            shape_of=shape_of,
+        )
+        if moving.learned_pieces is None:
+            return settings
+        moves = self._moving_pieces(settings)
+        pieces = np.zeros(len(moves), bool)
+        pieces[moves] = moving.learned_pieces
+        return replace(settings, learned_pieces=pieces)
+
+    def _joined(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
+        joined = np.empty(len(self.still), moving.dtype)
+        joined[~self.still], joined[self.still] = moving, still
+        return joined
+
+    def _shapes(self, moving: Settings, still: Settings) -> list[tuple[np.ndarray | None, np.ndarray]]:
+        return [(moving.shape_of, np.flatnonzero(~self.still)), (still.shape_of, np.flatnonzero(self.still))]
+
+    @staticmethod
+    def _numbered(shape_of: np.ndarray | None, branches: np.ndarray) -> np.ndarray:
+        if shape_of is None:
+            return np.full(len(branches), -1, np.int32)
+        return np.where(shape_of < 0, -1, branches[shape_of]).astype(np.int32)
+
+    def _moving_pieces(self, settings: Settings) -> np.ndarray:
+        hierarchy = self.source.hierarchy
+        plan = Plan(branch_records(hierarchy, self.ath, settings), hierarchy.vertex_count, layer=settings.layer)
+        return ~self.still[plan.pieces["branch"]]
+
+    def _modes(self, modes: LearnedModes | None, settings: Settings) -> LearnedModes | None:
+        if modes is None:
+            return None
+        moves = self._moving_pieces(settings)
+        counts = np.zeros(len(moves), modes.counts.dtype)
+        counts[moves] = modes.counts
+        return replace(modes, counts=counts, first=(np.cumsum(counts) - counts).astype(modes.first.dtype))
+
+    def _reference(self, reference: np.ndarray | None) -> np.ndarray | None:
+        if reference is None:
+            return self.source.reference
+        whole = self.source.rest.copy()
+        moves = np.repeat(~self.still, self.source.hierarchy.stem_count)
+        whole[moves] = reference + (self.moving_source.origin - self.source.origin)
+        return whole
+
+
+def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
+    """Return some branches of a source, with all that these are on, as a source of their own."""
+    sample = PlantSample(source, ath, branches, with_faces=True)
+    part = replace(
+        sample.source,
+        seen=_seen(source.seen, sample),
+        shapes=(source.details[branches], source.keeps_shape[branches]),
+        reference=None if source.reference is None else sample.source.reference + source.origin - sample.source.origin,
+        whole=None,
+    )
+    part.segments, part.clip_range_segments = source.segments, source.clip_range_segments
+    return part
+
+
+def _seen(seen: Survey, sample: PlantSample) -> Survey:
+    """Return the survey of some branches, in the box of all."""
+    chosen = np.isin(seen.branches, sample.branches)
+    roots = np.flatnonzero(seen.hierarchy.branch_parent < 0)
+    return replace(
+        seen,
+        hierarchy=sample.source.hierarchy,
+        rest=seen.rest[sample.vertices],
+        branches=np.searchsorted(sample.branches, seen.branches[chosen]),
+        largest_gads=seen.largest_gads[:, chosen],
+        largest_distance=seen.largest_distance[chosen],
+        most_beyond_xi=None if seen.most_beyond_xi is None else seen.most_beyond_xi[chosen],
+        largest_ways=seen.largest_ways[np.isin(roots, sample.branches)],
+    )
+
+
+def _standing(source: Source) -> Source:
+    """Return a source that stands still, in one frame."""
+    seen = replace(source.seen, frame_count=1, steps=np.array([np.inf]))
+    return replace(source, clip=source.clip.standing(), seen=seen, held=None)

@@ -1,0 +1,321 @@
+"""Trials: candidates code samples of the segments, and the bytes of the whole file are estimated from theirs.
+
+`Trials` remembers what every candidate costs. It is all that a coding choice (choices/) sees of a search.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from threading import Lock
+
+import numpy as np
+
+from athcodec.encoding.clip.survey import Ath
+from athcodec.encoding.model.learned_modes import Components, components, learn
+from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.search import progress
+from athcodec.encoding.search.progress import Work
+from athcodec.encoding.search.sample import ExtrapolationFactors
+from athcodec.encoding.search.segment_samples import SegmentSample, usual_change
+from athcodec.encoding.segments.segment import (
+    Coded,
+    CodedPrelude,
+    Source,
+    StreamBasis,
+    analyse_finely,
+    basis_ratio,
+    code_stems,
+    level_bases,
+    level_streams,
+    thread_count,
+    time_components,
+)
+from athcodec.encoding.segments.settings import Settings
+from athcodec.encoding.segments.time_bases import TimeComponents
+from athcodec.encoding.streams import streams
+from athcodec.errors import BoundError
+from athcodec.files.threads import ThreadPool
+
+LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are learned from.
+PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
+
+
+@dataclass(eq=False)
+class Trials:
+    """Trials of settings on one plant, or on a sample of it."""
+
+    source: Source
+    ath: Ath
+    start: Settings  # Settings that the search starts with.
+    samples: Sequence[SegmentSample]  # From calm to wild.
+    jobs: int | None = None
+    work: Work = field(default_factory=Work)  # Work that the whole search may take.
+    extrapolation: ExtrapolationFactors | None = (
+        None  # Factors from the sample to the plant; None: the sample is the plant.
+    )
+    map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by level.
+    _work_done: int = field(init=False, default=0)  # Work of all trials.
+    _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
+    _components: dict[tuple, Components] = field(init=False, default_factory=dict)
+    _last_modes: tuple[tuple, LearnedModes] | None = field(init=False, default=None)
+    _time_components: dict[tuple, tuple[float, list]] = field(init=False, default_factory=dict)
+    _preludes: dict[tuple, CodedPrelude] = field(init=False, default_factory=dict)
+    _seen_preludes: set[tuple] = field(init=False, default_factory=set)
+    _lock: Lock = field(init=False, default_factory=Lock)  # Threads that try candidates share the preludes.
+
+    def __post_init__(self) -> None:
+        self.levels = self.start.levels
+        self.extrapolation = self.extrapolation or ExtrapolationFactors.everything(self.levels)
+
+    @property
+    def is_layered(self) -> bool:
+        """Whether the file has several layers of precision."""
+        return self.start.layer > 0
+
+    @property
+    def middle(self) -> int:
+        """Number of the sample between the calm and the wild ones."""
+        return len(self.samples) // 2
+
+    def in_segments(self, source: Source, samples: Sequence[SegmentSample]) -> Trials:
+        """Return trials on the same plant in other segments, which are these if they are on the same positions. Rest
+        poses are coded once for both."""
+        if [id(sample.positions) for sample in samples] == [id(sample.positions) for sample in self.samples]:
+            return self
+        change = usual_change(samples) if source.has_seams else math.inf
+        other = replace(self, source=source, start=replace(self.start, usual_change=change), samples=samples)
+        other._preludes, other._seen_preludes = self._preludes, self._seen_preludes
+        return other
+
+    def apart(self) -> Trials:
+        """Return trials that know what these know and count their work from zero, without a limit."""
+        other = replace(self, work=Work())
+        for name in ("_known", "_components", "_time_components", "_preludes", "_seen_preludes"):
+            setattr(other, name, getattr(self, name).copy())
+        return other
+
+    def without(self, feature: Feature) -> bool:
+        """Return whether the file does without a feature."""
+        return feature in self.source.without
+
+    @property
+    def frames(self) -> int:
+        """Number of frames of all samples."""
+        return sum(sample.positions.shape[2] for sample in self.samples)
+
+    def work_of(self, each: float) -> float:
+        """Return the work of something that takes so much for each vertex in each frame of the samples."""
+        return each * self.source.clip.vertex_count * self.frames
+
+    @property
+    def work_of_trial(self) -> float:
+        """The work of a usual trial."""
+        usual = progress.TRIAL + self.work_of(progress.ANALYSIS + progress.TURNS)
+        return self._work_done / len(self._known) if self._known else usual
+
+    def cost(self, settings: Settings) -> float:
+        """Return the bytes of a whole file, without maps of nodes; infinite if the bound cannot be kept."""
+        return self._tried(settings)[0]
+
+    def level_costs(self, settings: Settings) -> np.ndarray:
+        """Return the bytes of each level's streams in a whole file, (levels,)."""
+        return self._tried(settings)[1]
+
+    def costs(self, candidates: Sequence[Settings]) -> list[float]:
+        """Return what each candidate costs; several are tried at once. What no longer fits the work that is allowed
+        costs infinitely much."""
+        keys = [settings.key for settings in candidates]
+        fitting = self._fitting(keys)
+        tried = list({key: settings for settings, key in zip(candidates, keys) if key in fitting}.values())
+        by_prelude = {settings.prelude_key: settings for settings in tried}
+        pool = ThreadPool(thread_count(self.jobs, self.source))
+        list(pool.ordered(self._keeps_bound, by_prelude.values(), pool.jobs))
+        # Learning is done in order, because the first candidate of a kind decides what all like it learn.
+        for settings in filter(self._keeps_bound, tried):
+            if any(settings.learned_bases):
+                self._learn_time(settings)
+            if settings.learned_pieces is not None:
+                self._learn_modes(settings)
+        for _ in pool.ordered(self.cost, tried, pool.jobs):
+            self.work.report()
+        return [self._known[key][0] if key in fitting else math.inf for key in keys]
+
+    def _fitting(self, keys: Sequence[tuple]) -> set[tuple]:
+        """Return the keys of those candidates whose cost is known, or whose trials fit the work that is allowed."""
+        known = {key for key in keys if key in self._known}
+        for key in keys:
+            if key not in known and self.work.fits((1 + len(known - self._known.keys())) * self.work_of_trial):
+                known.add(key)
+        return known
+
+    def cheapest(self, candidates: Sequence[Settings]) -> Settings:
+        """Return the candidate that makes the smallest file, the first of several."""
+        return candidates[int(np.argmin(self.costs(candidates)))]
+
+    def prelude(self, settings: Settings) -> CodedPrelude:
+        """Return hierarchy and rest pose as coded, from an earlier trial if there was one. Raises BoundError."""
+        key = settings.prelude_key
+        with self._lock:
+            prelude = self._preludes.pop(key, None)
+            if prelude is not None:
+                self._preludes[key] = prelude  # The prelude used last stands last.
+                return prelude
+        prelude = CodedPrelude(self.source, self.ath, settings)
+        with self._lock:
+            if key not in self._seen_preludes:  # A prelude that was dropped depends on the order of threads.
+                self._seen_preludes.add(key)
+                squares = float(np.square(prelude.plan.pieces["count"]).sum())
+                self.work.add(progress.POSE * self.source.clip.vertex_count + progress.PIECE * squares)
+            self._preludes[key] = prelude
+            while len(self._preludes) > PRELUDES_KEPT:
+                self._preludes.pop(next(iter(self._preludes)))
+        return prelude
+
+    def prelude_bytes(self, settings: Settings) -> float:
+        """Return the bytes of hierarchy and rest pose of the whole plant."""
+        return self.prelude(settings).prelude_bytes * self.extrapolation.vertices
+
+    def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
+        """Return the modes of the pieces that the settings name, or of all pieces."""
+        if settings.learned_pieces is None and not everywhere:
+            return None
+        seen, pieces = self._learn_modes(settings), None if everywhere else settings.learned_pieces
+        key = id(seen), settings.step, pieces if pieces is None else pieces.tobytes()
+        last = self._last_modes  # Other rest poses are tried with the same modes, by several threads.
+        if last is None or last[0] != key:
+            self._last_modes = last = key, learn(plan, seen, settings.step, pieces)
+        return last[1]
+
+    def analysed(
+        self, settings: Settings, number: int, modes: LearnedModes | None, bent: bool = False
+    ) -> SegmentMotion:
+        """Return a sample in its integers. bent: as SegmentMotion.analyse has it."""
+        plan, sample = self.prelude(settings).plan, self.samples[number]
+        of_sample = settings.of_segment(sample.whole_loop)
+        levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
+        segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
+        segment.analyse(sample.positions, of_sample.rounding, bent=bent)
+        return segment
+
+    def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
+        """Return the streams of a sample."""
+        sample = self.samples[number]
+        of_sample = settings.of_segment(sample.whole_loop)
+        return code_stems(self.prelude(settings), of_sample, sample.positions, modes, self._bases(settings, number))
+
+    def forget(self, settings: Settings) -> None:
+        """Forget all learned time bases and what the settings cost, so that they are learned at their own step."""
+        self._time_components.clear()
+        self._known.pop(settings.key, None)
+
+    def forget_modes(self) -> None:
+        """Free the components of learned modes, which take as much memory as a segment."""
+        self._components.clear()
+        self._last_modes = None
+
+    def _tried(self, settings: Settings) -> tuple[float, np.ndarray]:
+        key = settings.key
+        if key not in self._known:
+            self._known[key] = self._try(settings)
+        return self._known[key]
+
+    def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
+        try:
+            plan = self.prelude(settings).plan
+            modes = self.learned_modes(plan, settings)
+            coded = [self.coded(settings, number, modes) for number in range(len(self.samples))]
+            levels = sum(self._level_bytes(one, sample) for one, sample in zip(coded, self.samples))
+        except BoundError:
+            self._count(progress.TRIAL)
+            return math.inf, np.full(self.levels, math.inf)
+        coding = sum(
+            progress.BYTE * sum(map(len, one.stems.values())) + progress.CORRECTION * len(one.corrections.rows)
+            for one in coded
+        )
+        each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
+        self._count(progress.TRIAL + self.work_of(each) + coding)
+        stored = streams.encode_learned_modes(plan, modes)
+        mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
+        return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels
+
+    def _count(self, work: float) -> None:
+        """Count the work of a trial."""
+        self.work.add(work)
+        with self._lock:
+            self._work_done += int(work)
+
+    def _level_bytes(self, coded: Coded, sample: SegmentSample) -> np.ndarray:
+        """Return the bytes of the streams of all that a sample stands for, (levels,)."""
+        levels, heads = np.zeros(self.levels), np.zeros(self.levels)
+        for level, stream in coded.stems.items():
+            levels[level], heads[level] = len(stream), coded.heads[level]
+        corrections = len(coded.corrections.chunk) / coded.sample_share
+        if corrections:
+            level_of_vertex = np.repeat(coded.segment.plan.base_level, coded.segment.plan.pieces["count"])
+            counts = np.bincount(level_of_vertex[coded.corrected], minlength=self.levels)
+            levels += corrections * (counts / counts.sum())
+        levels += (levels - heads) * (self.extrapolation.rows - 1)
+        return levels * sample.scale
+
+    def _keeps_bound(self, settings: Settings) -> bool:
+        """Return whether a rest pose keeps the bound; its prelude is there for later calls."""
+        try:
+            self.prelude(settings)
+        except BoundError:
+            return False
+        return True
+
+    def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
+        """Return the time bases of the levels that learn theirs."""
+        if not any(settings.learned_bases):
+            return {}
+        step, learned = self._learn_time(settings)
+        plan = self.prelude(settings).plan
+        return level_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
+
+    def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int | None, TimeComponents]]]:
+        """Return the components of the samples over time, of each level and of all, and the step of the trial that
+        asked first for them: they hardly depend on the step."""
+        only_common = self.is_layered and settings.common_basis
+        key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic, only_common
+        if key not in self._time_components:
+            prelude = self.prelude(settings)  # Layers learn about the coded pose of the last one.
+            plan = prelude.plan if self.is_layered else prelude.uncoded_plan
+            levels = [*(level for level in range(self.levels) if plan.has_stems(level) and not only_common), None]
+            longest = max(sample.positions.shape[2] for sample in self.samples)
+            self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
+            self.work.add(progress.EIGENVECTOR * longest**3 * len(levels) * len(self.samples))
+            learned = [
+                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
+                for sample in self.samples
+            ]
+            self._time_components[key] = settings.step, learned
+        return self._time_components[key]
+
+    def _learn_modes(self, settings: Settings) -> Components:
+        """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
+        coded, count = settings.learned_coded, len(self.source.segments)
+        key = _before_modes(settings) + (settings.prelude_key if coded else ())
+        if key not in self._components:
+            prelude = self.prelude(settings)
+            plan = prelude.plan if coded else prelude.uncoded_plan
+            chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            frames = sum(self.source.frames_of(segment) for segment in chosen)
+            self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)
+            self._components[key] = components(
+                plan, (analyse_finely(plan, settings, self.source.positions(segment), bent=True) for segment in chosen)
+            )
+        return self._components[key]
+
+
+def distinct(candidates: Iterable[Settings]) -> list[Settings]:
+    """Return the candidates without those that are the same as others."""
+    return list({settings.key: settings for settings in candidates}.values())
+
+
+def _before_modes(settings: Settings) -> tuple:
+    """Return what decides the motion that is left for the modes of a piece."""
+    return settings.rotation_step_factors, settings.forms.tobytes(), settings.still

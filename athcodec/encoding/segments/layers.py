@@ -1,0 +1,697 @@
+"""Layers of precision: the plant at a coarse step, and refinements of it down to the step of the file's bound.
+
+The first layer has the levels of the branch hierarchy; each further one is one level of the file that refines all of
+it, motion, rest pose and learned modes. A refinement is coded about the positions of the layer before (FORMAT.md,
+"Layers").
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from athcodec._native import MEASURES
+from athcodec.decoding import container as ct
+from athcodec.encoding.clip.survey import Ath
+from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.learned_modes import nested
+from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion, position_errors, release_memory, zeros
+from athcodec.encoding.options.features import Feature
+from athcodec.encoding.options.shape import rest_steps
+from athcodec.encoding.segments.joins import (
+    END_FRAMES,
+    NO_CORRECTIONS,
+    SLOPED,
+    CorrectionPrice,
+    End,
+    ErrorPrice,
+    SourceStart,
+    apply_join,
+    best_join,
+    end_corrections,
+    end_of,
+    seen,
+)
+from athcodec.encoding.segments.levels import MOST_JERK, SourceFrames
+from athcodec.encoding.segments.segment import (
+    CodedPrelude,
+    Corrections,
+    Source,
+    StreamBasis,
+    analyse,
+    basis_ratio,
+    code_source_rest,
+    correction_step,
+    find_corrections,
+    learned_bases,
+    stem_streams,
+    stems_head,
+    time_components,
+)
+from athcodec.encoding.segments.settings import Choice, Settings
+from athcodec.encoding.streams import streams, writing
+from athcodec.errors import BoundError
+
+# Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
+# holds. Where there are leaves, corrections take more bytes than finer steps.
+STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.25), (0.8, 0.8)
+FEW_ROOTS = 4  # Up to so many roots a scene counts as one plant.
+MOTION_STEP = 2.0  # Largest step of the first layer of more roots, over the RMS motion of all vertices.
+SURFACE_MOTION_STEP = 1.0  # The same where they have faces or leaves.
+LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
+MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
+ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
+MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
+LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
+LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
+LARGEST = MEASURES.index("max")
+RMS = MEASURES.index("rms")
+LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
+FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
+MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.
+EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
+TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
+LEVEL_0_SHARE, LEVEL_0_BYTES = 1.03, 24  # Factor and bytes that a rest pose of level 0 may add to the first layer's.
+
+
+@dataclass
+class Layer:
+    """One layer of precision. Without a rest pose it has that of the layer before; the first layer that of level 0."""
+
+    plan: Plan  # On the rest pose of the layer.
+    settings: Settings  # Settings of the file, with the layer's step and limit.
+    modes: LearnedModes | None
+    ratio: int = 1  # The layer's step over that of the last layer.
+    rest: streams.CodedRest | None = None  # The content of REFINED_REST.
+    holds_error: bool = True  # Whether corrections hold its error even where a level jerks with them.
+
+
+@dataclass
+class Layers:
+    """The layers of a file, and the contents of REST and SOURCE_REST (empty: none)."""
+
+    rest: writing.Rest
+    source_rest: bytes
+    level_0: Plan  # On the pose of REST, which level 0 is shown with.
+    each: list[Layer]
+
+    @property
+    def level_count(self) -> int:
+        """Number of levels without that of the source's own numbers."""
+        return self.level_0.level_count + len(self.each) - 1
+
+    def of_segment(self, whole_loop: bool) -> Layers:
+        """Return the layers of a segment, which is all of a loop or not."""
+        return replace(
+            self, each=[replace(layer, settings=layer.settings.of_segment(whole_loop)) for layer in self.each]
+        )
+
+    @property
+    def first_rest_bytes(self) -> int:
+        """Bytes of the streams up to the rest pose of the first layer."""
+        refined = self.each[0].rest
+        return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
+
+
+def step_factors(source: Source, ladder: Sequence[float], bound: float) -> tuple[float, float]:
+    """Return the steps of the first layer and of others before the last, over those of files of their errors. Plants
+    side by side move little for the diagonal of all: at the usual step of the first layer they hardly would."""
+    has_leaves = source.sheet_like.any()
+    first, others = LEAVES_STEP_FACTORS if has_leaves else STEP_FACTORS
+    coarsest = max(_in_bounds(ladder, bound, source.seen.diagonal), default=0.0)
+    if coarsest > 0 and (source.hierarchy.branch_parent < 0).sum() > FEW_ROOTS:
+        has_surface = has_leaves or source.polygons is not None
+        motion = SURFACE_MOTION_STEP if has_surface else MOTION_STEP
+        first = min(first, motion * source.seen.rms_motion / (coarsest * bound))
+    return first, others
+
+
+def layer_ratios(
+    ladder: Sequence[float], bound: float, diagonal: float, factors: tuple[float, float] = STEP_FACTORS
+) -> list[int]:
+    """Return the ratio of the step of each layer to that of the last, descending to 1.
+
+    ladder: largest errors over the diagonal, descending. Those close to the bound or to each other make no layer of
+    their own. Layers that are too far apart for one to refine the other have more between them. factors: step_factors.
+    """
+    errors: list[float] = []  # In bounds.
+    for bounds in _in_bounds(ladder, bound, diagonal):
+        if not errors or ROUNDED * errors[-1] >= LEAST_APART * bounds:
+            errors.append(bounds)
+    # Ratios are rounded down, so that layers hold what the ladder names.
+    ratios = [max(1, int(min(factors[i > 0] * bounds, MOST_RATIO**2))) for i, bounds in enumerate(errors)]
+    return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
+
+
+def _in_bounds(ladder: Sequence[float], bound: float, diagonal: float) -> list[float]:
+    """Return the errors of a ladder over the bound, without those too close to it for a layer."""
+    errors = [ROUNDED * error * diagonal / bound for error in ladder]
+    return [error for error in errors if error >= LEAST_ABOVE_BOUND]
+
+
+def _held_limit(source: Source, bound: float, factor: float, ratio: int) -> float | np.ndarray:
+    """Return what the positions of a layer before the last are held to: no error in the table exceeds the one that the
+    ladder names. factor: of its step."""
+    error = ct.short_float_within(ratio / factor * bound)
+    return np.minimum(source.limit(error), source.unweighted_limit(error))
+
+
+def _between(ratio: int, finer: int) -> list[int]:
+    """Return `ratio` and those before `finer`, each at most MOST_RATIO from the next one."""
+    if ratio <= MOST_RATIO * finer:
+        return [ratio]
+    middle = math.isqrt(ratio * finer)
+    return _between(ratio, middle) + _between(middle, finer)
+
+
+def layers_of(
+    source: Source,
+    prelude: CodedPrelude,
+    choice: Choice,
+    ratios: Sequence[int],
+    factors: tuple[float, float],
+    hold_errors: bool,
+) -> Layers:
+    """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as in Layer."""
+    settings = choice.settings
+    rest, level_0, rests = _rests(source, prelude, ratios, settings)
+    layers: list[Layer] = []
+    for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
+        before = layers[-1].plan if layers and pose is not prelude.plan.rest else prelude.plan
+        plan = prelude.plan if len(ratios) == 1 else _plan_on(pose, prelude, before, i)
+        of_layer = replace(
+            choice.first_layer if i == 0 else _uniform(prelude.plan, settings),
+            step=qz.single(settings.step * ratio),
+            limit=settings.limit if ratio == 1 else _held_limit(source, settings.bound, factors[i > 0], ratio),
+            layer=i,
+        )
+        modes = _modes(plan, choice, of_layer, ratio)
+        layers.append(Layer(plan, of_layer, modes, ratio, refined, hold_errors or ratio == 1))
+    source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
+    return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude, None), layers)
+
+
+def _plan_on(pose: np.ndarray, prelude: CodedPrelude, before: Plan | None, layer: int = 0) -> Plan:
+    plan = Plan(prelude.plan.branches.copy(), prelude.plan.vertex_count, prelude.plan.pool, layer > 0, layer=layer)
+    plan.still_branches = prelude.plan.still_branches
+    plan.set_rest(pose, like=before)
+    return plan
+
+
+def _modes(plan: Plan, choice: Choice, settings: Settings, ratio: int) -> LearnedModes | None:
+    """Return the learned modes of the pieces that a layer's settings name."""
+    if ratio == 1 or choice.learned_modes is None:
+        return choice.learned_modes
+    if settings.learned_pieces is None:
+        return None
+    return nested(plan, choice.learned_modes, settings.learned_pieces & ~plan.is_rigid, _binary_digits(ratio))
+
+
+def _binary_digits(ratio: int) -> int:
+    """Return how many binary digits integers lose at steps so many times as large."""
+    return ratio.bit_length() - 1
+
+
+def _uniform(plan: Plan, settings: Settings) -> Settings:
+    """Return settings for the single stream of a refinement: of the level with the most rows, at the finest step."""
+    main, factors = plan.main_level, settings.rotation_step_factors
+    finest = min(settings.level_steps[level] for level in range(plan.level_count) if plan.has_stems(level))
+    return replace(
+        settings,
+        level_steps=np.full(plan.level_count, finest),
+        rotation_step_factors=(factors[main],) * plan.level_count,
+        learned_bases=(settings.learned_bases[main],) * plan.level_count,
+    )
+
+
+def _rests(
+    source: Source, prelude: CodedPrelude, ratios: Sequence[int], settings: Settings
+) -> tuple[writing.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
+    """Return the content of REST, what it decodes to if the first layer refines it, and of each layer the decoded pose
+    and what refines the pose before."""
+    rest, at_once = prelude.rest_chunk, [(prelude.plan.rest, None)] * len(ratios)
+    if source.exact_rest or len(ratios) == 1 or Feature.REFINED_REST in source.without:
+        return rest, None, at_once
+    wanted = [qz.first_rest_step(rest.step, settings.bound, ratios[0])]
+    wanted += [qz.single(rest.step * max(1.0, ratio / 2)) for ratio in ratios[1:]]
+    first_step, *steps = (settings.rest_step_of(rest.step, step) for step in wanted)
+    if first_step == rest.step:
+        return rest, None, at_once
+    branches, mesh = prelude.plan.branches, rest.mesh
+    coded = _first_rests(prelude, first_step, source, settings)
+    for step in steps:
+        if np.array_equal(rest_steps(branches, step), rest_steps(branches, coded[-1].step)):
+            coded.append(coded[-1])
+            continue
+        coded.append(streams.encode_rest(branches, step, source.rest, coded[-1], mesh=mesh))
+    if max(np.linalg.norm(pose.decoded - source.rest, axis=1).max() for pose in coded) > source.rest_error:
+        return rest, None, at_once
+    stored, of_layers = coded[0], coded[-len(ratios) :]
+    rest = replace(rest, step=stored.step, stream=stored.stream)
+    level_0 = None if of_layers[0] is stored else stored.decoded
+    before = [coded[-len(ratios) - 1] if level_0 is not None else stored, *of_layers[:-1]]
+    return rest, level_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
+
+
+def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
+    """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
+    try:
+        prelude = CodedPrelude(source, ath, settings, bases=False)
+    except BoundError:
+        return math.inf
+    rest, _, rests = _rests(source, prelude, ratios, settings)
+    refined = sum(len(coded.stream) for _, coded in rests if coded is not None)
+    return len(prelude.hierarchy_stream) + len(rest.stream) + refined
+
+
+def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: Settings) -> list[streams.CodedRest]:
+    """Return the rest pose at the step of the first layer, and before it that of level 0 if that takes few bytes."""
+    plan, mesh = prelude.plan, prelude.rest_chunk.mesh
+
+    def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
+        shape_of = prelude.shape_of if before is None else None
+        return streams.encode_rest(plan.branches, step, source.rest, before, mesh=mesh, shape_of=shape_of)
+
+    at_once = encode(step)
+    is_out = Feature.LEVEL_0_REST in source.without or LEVEL_0_STEP * step > settings.coarsest_rest_step
+    if is_out or not plan.level_0_stands_alone:
+        return [at_once]
+    level_0 = encode(LEVEL_0_STEP * step)
+    refined = encode(step, level_0)
+    both = len(level_0.stream) + len(refined.stream)
+    takes_little = both <= LEVEL_0_SHARE * len(at_once.stream) + LEVEL_0_BYTES
+    return [level_0, refined] if takes_little else [at_once]
+
+
+def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
+    """Return what all segments share of the layers: {(level, kind): payload}."""
+    first, *finer = layers.each
+    chunks = {
+        (level, ct.SHAPES): stream for level, stream in streams.encode_learned_modes(first.plan, first.modes).items()
+    }
+    before = first
+    for level, layer in enumerate(finer, first.plan.level_count):
+        digits = _binary_digits(before.ratio) - _binary_digits(layer.ratio)
+        modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
+        if modes is not None:
+            chunks[level, ct.SHAPES] = writing.pack_refined_shapes(digits, modes)
+        before = layer
+    for level, layer in [(1, first), *enumerate(finer, first.plan.level_count)]:
+        if layer.rest is not None:
+            chunks[level, ct.REFINED_REST] = writing.pack_refined_rest(layer.rest.step, layer.rest.stream)
+    return chunks
+
+
+class _TimeBases:
+    """The time bases of the layers of one segment: each has as many rows as the one before, or more, of one that is
+    learned for the last layer."""
+
+    def __init__(self, last: Layer, positions: np.ndarray):
+        everything = [None] if last.settings.learned_bases[-1] else []
+        self._components = time_components(last.plan, last.settings, positions, everything).get(None)
+        self._before: tuple[int, StreamBasis] | None = None
+
+    def first(self, layer: Layer) -> dict[int, StreamBasis]:
+        """Return the bases of the levels of the first layer that learn theirs."""
+        bases: dict[int, StreamBasis] = {}
+        for level, learned in enumerate(layer.settings.learned_bases):
+            if learned and layer.plan.has_stems(level):
+                bases |= self.refined(layer, level, level)
+        return bases
+
+    def refined(self, layer: Layer, stream: int, level: int) -> dict[int, StreamBasis]:
+        """Return the basis of a stream of the layer's settings, which stands at a level of the file."""
+        if self._components is None or not layer.settings.learned_bases[stream]:
+            return {}
+        # Rigid parts of a coarse layer may need more rows than a finer one where they are not rigid.
+        least = 0 if self._before is None else len(self._before[1].stored.rows)
+        stored = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio), least=least)
+        if stored is None:
+            return {}
+        basis = StreamBasis(stored, level)
+        if self._before is not None:
+            base, before = self._before
+            basis = StreamBasis(stored, before.root, len(before.stored.rows), base)
+        self._before = level, basis
+        return {stream: basis}
+
+
+class Ends:
+    """The ends of the levels of a segment, for which the next segment may wait on another thread."""
+
+    def __init__(self, levels: int):
+        self._levels: list[Future[End]] = [Future() for _ in range(levels)]
+
+    def add(self, level: int, end: End) -> None:
+        self._levels[level].set_result(end)
+
+    def take(self, level: int) -> End:
+        """Return the end of a level as soon as it is known. Only its one caller holds it then."""
+        end = self._levels[level].result()
+        self._levels[level] = Future()
+        return end
+
+    @contextmanager
+    def failing(self) -> Iterator[None]:
+        """Let the segment that waits fail as this one does."""
+        try:
+            yield
+        except BaseException as error:
+            for level in self._levels:
+                if not level.done():
+                    level.set_exception(error)
+            raise
+
+
+class CodedMotion:
+    """The motion of one segment in layers. Each level is joined to the segment before and measured as soon as it is
+    coded, so that the positions of one level are in memory at a time.
+
+    chunks: {(level, kind): payload}. errors: those of stopping at each level, by each of MEASURES. joins: those to the
+    segment before. flaws: those of what each level shows (SourceFrames).
+
+    layers: with the settings of the segment (Layers.of_segment). exact: the source's own numbers (Source.exact), for
+    one more level. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
+    source, (2, 3). loops: whether the segment follows itself. before, after: the ends of the segment before, which this
+    one is joined to, and those of this one; None: nobody asks for them.
+    """
+
+    def __init__(
+        self,
+        prelude: CodedPrelude,
+        layers: Layers,
+        segment_count: int,
+        positions: np.ndarray,
+        exact: np.ndarray | None,
+        goes_on: bool,
+        shown_times: np.ndarray,
+        box: np.ndarray,
+        loops: bool,
+        before: Ends | None = None,
+        after: Ends | None = None,
+    ):
+        self._exact, self._goes_on, self._shown_times = exact, goes_on, shown_times
+        self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
+        self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
+        self._level_0, self._largest_bound = layers.level_0, layers.each[-1].settings.largest_bound
+        self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
+        self._prelude, self._bases = prelude, _TimeBases(layers.each[-1], positions) if self._layered else None
+        self.chunks: dict[tuple[int, int], bytes] = {}
+        self.errors: list[tuple[float, ...]] = []
+        self.flaws: list[tuple[float, float]] = []
+        self._decoded = np.empty(0)  # Positions of the last level.
+        self._met = streams.FREE_ENDS  # Met by the corrections of the last layer.
+        self._end_corrections = NO_CORRECTIONS  # Corrections of the last frame.
+        self._corrected: dict[int, Corrections] = {}  # What corrects levels.
+        self.joins = [0] * layers.level_count
+        self._source = SourceFrames(positions, shown_times, None, box, self._largest_bound, self._pool)
+        self._source_alone, self._source_end = self._source, self._source.last_shown(positions)
+        self._loops, self._before, self._after = loops, before, after
+        self._may_join = Feature.JOINS not in layers.each[-1].settings.without
+        self._layers = layers.each
+        with self._failing():
+            self._segment = self._first(layers.each[0])
+
+    def finish(self) -> None:
+        """Code what is left: the first layer is there once the object is made."""
+        segment = self._segment
+        del self._segment
+        with self._failing():
+            for level, (coarse, layer) in enumerate(pairwise(self._layers), self._level_0.level_count):
+                segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), level)
+        if self.errors[-1][0] > self._largest_bound:
+            raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
+        if self._exact is not None:
+            self.chunks[len(self.errors), ct.EXACT] = streams.encode_exact(self._decoded, self._exact)
+            self.errors.append((0.0,) * 3)
+            self.joins.append(0)
+            self.flaws.append((0.0, 0.0))
+
+    def _failing(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._after is None else self._after.failing()
+
+    def _first(self, layer: Layer) -> SegmentMotion:
+        """Code the levels of the branch hierarchy."""
+        plan, settings = layer.plan, layer.settings
+        if self._bases:
+            bases = self._bases.first(layer)
+        else:
+            bases = learned_bases(self._prelude.uncoded_plan, settings, self.positions)
+        segment, decoded = analyse(plan, self._output, settings, self.positions, layer.modes, bases)
+        stems, _ = stem_streams(segment, settings, bases)
+        self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
+        last = plan.level_count - 1
+        self._correct(decoded, layer, last)
+        segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
+        self._room = zeros(self.positions.shape)
+        shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
+        self.errors = _EvenLevels(self, shown, settings).errors
+        self._keep_last_level_best(layer, last, decoded)
+        del decoded  # Levels with maps are in memory before the last one is posed again.
+        for level, nodes in enumerate(shown):
+            if plan.has_affines(level):
+                self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
+        for level, nodes in enumerate(shown):
+            self._finish(level, self._pose_to_join(nodes, level))
+        self._finish(last, self.pose(segment, last), layer)
+        segment.forget_nodes()
+        del self._room
+        return segment
+
+    def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
+        """Add cheap corrections if the exact stems are worse than the maps before them."""
+        before, known = self.errors[level - 1][RMS], len(self.chunks.get((level, ct.CORRECTIONS), b""))
+        most = known + EVEN_SHARE * (self._bytes_up_to(level) + known)
+        for factor in TIGHTER_LIMITS:
+            if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
+                break
+            corrections = self._corrections(decoded, layer, factor)
+            if len(corrections.chunk) > most:
+                break
+            self.errors[level] = self._set_last(layer, level, decoded, corrections)
+
+    def _keep_smooth(self, layer: Layer, level: int, positions: np.ndarray) -> None:
+        """Leave out corrections without which a level before the last layer's does not jerk. It is then shown, with an
+        error that is above that of its layer. positions: not corrected."""
+        if level not in self._corrected or layer.holds_error:
+            return
+        with self._corrected_as_shown(level, positions):
+            jerk = self._source_alone.flaws(positions, None, 0.0)[1]
+        if jerk > MOST_JERK and self._source_alone.flaws(positions, None, 0.0)[1] <= MOST_JERK:
+            self.errors[level] = self._set_last(layer, level, positions, Corrections.none(positions.shape))
+
+    def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
+        """Return the segment as level 0 shows it, which may have a rest pose of its own."""
+        if self._level_0 is segment.plan:
+            return segment
+        shown = SegmentMotion(self._level_0, segment.frames, segment.streams, periodic=settings.periodic)
+        shown.analyse_nodes(self.positions, settings.node_steps, settings.rounding, level=0)
+        return shown
+
+    def _refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
+        """Code one further level; ratio: the step of the layer before over that of this one."""
+        settings, last = layer.settings, layer.plan.level_count - 1
+        self._corrected.clear()  # Levels before are finished.
+        release_memory()
+        bases = self._bases.refined(layer, last, level)
+        segment, decoded = analyse(
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio
+        )
+        if layer.ratio == 1:
+            segment.forget_caches()
+        head = stems_head(settings, last, bases)
+        self.chunks[level, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
+        segment.forget_before()
+        self._correct(decoded, layer, level)
+        self._finish(level, decoded, layer)
+        return segment
+
+    def _correct(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
+        """Set corrections and errors of the level that a layer ends with; decoded: positions without corrections."""
+        if layer.ratio == 1 and self._goes_on and decoded.shape[2] >= LEAST_MEETING:
+            self._end_corrections = self._corrections_of_end(layer, decoded)
+            self._met = streams.MetEnds(streams.LAST, self._end_corrections)
+        self.errors.append(self._finish_level(layer, level, decoded))
+
+    def _corrections_of_end(self, layer: Layer, decoded: np.ndarray) -> np.ndarray:
+        """Return corrections of the last frame, except of rigid parts, which keep their shape."""
+        away = decoded[:, :, -4:] - (self.positions[:, :, -4:] + self._origin[:, None])
+        limit, count = layer.settings.limit, layer.plan.pieces["count"]
+        rows = end_corrections(away, limit, correction_step(limit), decoded.shape[2] - 1)
+        return rows[~np.repeat(layer.plan.is_rigid, count)[rows[:, 0]]]
+
+    def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
+        return self._set_last(layer, level, decoded, self._corrections(decoded, layer))
+
+    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
+        """Set the corrections of the level that a layer ends with; return its errors. decoded: positions without."""
+        self.chunks.pop((level, ct.CORRECTIONS), None)
+        self._corrected.pop(level, None)
+        if corrections.chunk:
+            self.chunks[level, ct.CORRECTIONS] = corrections.chunk
+            self._corrected[level] = corrections
+        with self._corrected_as_shown(level, decoded):
+            if layer.ratio == 1 and self._exact is not None:
+                self._decoded = decoded.copy()
+            return self.error(decoded)
+
+    def _bytes_up_to(self, level: int) -> int:
+        """Return the bytes of this level and those before it, without its corrections."""
+        return sum(
+            len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
+        )
+
+    def _corrected_as_shown(self, level: int, positions: np.ndarray) -> AbstractContextManager[None]:
+        """Return a context in which the positions of a level have its corrections."""
+        return self._corrected[level].applied(positions) if level in self._corrected else nullcontext()
+
+    def _meet(self, start: np.ndarray) -> None:
+        """Close the start of the last level, in whose first frame the corrections of an end stand."""
+        rows = np.concatenate([start * np.array([1, 0, 1, 1, 1, 1], np.int32), self._end_corrections])
+        ordered = rows[np.lexsort(rows[:, 1::-1].T)]
+        self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
+
+    def _finish(self, level: int, positions: np.ndarray, layer: Layer | None = None) -> None:
+        """Add a level's end, join the level to the segment before if that is better, and add its flaws. positions: not
+        corrected, which change; layer: the one that ends with the level."""
+        if layer is not None and layer.ratio > 1:
+            self._keep_smooth(layer, level, positions)
+        if self._after is not None:
+            with self._corrected_as_shown(level, positions):
+                shown = self._source.last_shown(positions)
+            ends = end_of(positions, self._wanted_end, (shown, self._source_end), self._end_corrections)
+            self._after.add(level, ends)
+        end = None if self._before is None else self._before.take(level)
+        if level == 0:
+            known = self._source_end if self._loops else None
+            self._source = replace(self._source, before=known if end is None else end.shown[1])
+        if end is not None and self._may_join and positions.shape[2] > END_FRAMES == end.positions.shape[2]:
+            self._join_level(level, end, positions, layer)
+        with self._corrected_as_shown(level, positions):
+            own = self._source.last_shown(positions) if self._loops else None
+            shown = own if end is None else end.shown[0]
+            self.flaws.append(self._source.flaws(positions, shown, self.errors[level][0]))
+
+    @cached_property
+    def _wanted_end(self) -> np.ndarray:
+        return self.positions[:, :, -END_FRAMES:] + self._origin[:, None]
+
+    @cached_property
+    def _wanted_start(self) -> SourceStart:
+        return SourceStart(self.positions[seen(len(self.positions))], self._origin)
+
+    def _join_level(self, level: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
+        """Join one level, whose positions change; layer: the one that ends with it."""
+        some = seen(len(positions))
+        if layer is None:
+            most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
+            price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
+        else:
+            limit, share = layer.settings.limit, len(positions[some]) / len(positions)
+            bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
+            price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
+        largest = max(errors[0] for errors in self.errors[level - 1 : level + 1]) if level > 0 else math.inf
+        join = best_join(end.of(some), positions[some], self._wanted_start, price, largest)
+        if join == 0:
+            return
+        self.joins[level] = join
+        apply_join(end, positions, join)
+        if layer is None:
+            size = np.asarray(max(positions.max(), -positions.min()), self._output[1])
+            # A decoder joins maps and rounds what it shows, and slopes make last bits larger.
+            last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
+            self.errors[level] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
+        else:
+            if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
+                self._meet(end.corrections)
+            self.errors[level] = self._finish_level(layer, level, positions)
+        if level == self._level_0.level_count - 1:
+            self._keep_last_level_best(layer, level, positions)
+
+    def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:
+        """Return corrections that bring the positions within the limit times a factor."""
+        settings = replace(layer.settings, limit=layer.settings.limit * factor)
+        met = self._met if factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
+        met = met if layer.ratio == 1 else streams.FREE_ENDS
+        return find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
+
+    def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
+        """Return the output of a level, neither joined nor corrected."""
+        return shown.pose(level, *self._output, self._room)
+
+    def _pose_to_join(self, shown: SegmentMotion, level: int) -> np.ndarray:
+        """Return a level without corrections as float64, to be joined. What stems place is rounded before and after,
+        what maps place only after."""
+        origin, dtype = self._output
+        positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
+        is_stem = np.repeat(pieces["level"] <= level, pieces["count"])
+        for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
+            run[:] = run.astype(dtype)
+        return positions
+
+    def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:
+        shares = self._prelude.shares
+        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, shares, rounding)
+
+
+class _EvenLevels:
+    """Errors of the levels of the first layer. The steps of maps move until no level's RMS or largest error exceeds
+    that of the level before: finer if that helps, else coarser at the level before, which need not be better than what
+    follows.
+
+    shown: the segment with its maps, as each level but the last shows it.
+    """
+
+    def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
+        self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
+        self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
+        self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
+        for level in range(1, len(shown)):
+            self._move(level, level, level, 0.5**0.5, FINER_MAPS)
+        for level in range(len(shown), 0, -1):
+            for coarser in range(level - 1, -1, -1):
+                self._move(coarser, level, len(shown), 2.0**0.5, COARSER_MAPS)
+
+    def _is_worse(self, level: int) -> bool:
+        return self._excess(level, level) > 0
+
+    def _excess(self, first: int, last: int) -> float:
+        """Return how far the errors of the levels from `first` to `last` exceed those before them."""
+        pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
+        return sum(float(np.maximum(after - LEVEL_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
+
+    def _move(self, level: int, worse: int, last: int, factor: float, most: int) -> None:
+        """Move the steps of the maps of a level while `worse` exceeds the level before it and all levels from there to
+        `last` gain."""
+        if not self._shown[level].plan.has_affines(level):
+            return
+        for _ in range(most):
+            before = self.errors, self._steps
+            excess = self._excess(worse, last)
+            if self._poses <= 0 or not self._is_worse(worse):
+                return
+            self._set(level, factor)
+            if not self._excess(worse, last) < excess:
+                self.errors, self._steps = before
+                self._analyse(level)
+                return
+
+    def _set(self, moved: int, factor: float) -> None:
+        nodes = self._shown[moved].plan.nodes
+        last = int(nodes["last"][nodes["level"] == moved].max())
+        self._steps, self.errors = self._steps.copy(), [*self.errors]
+        self._steps[moved] *= factor
+        self._analyse(moved)
+        for level in range(moved, min(last + 1, len(self._shown))):
+            self.errors[level] = self._coder.error(self._coder.pose(self._shown[level], level))
+            self._poses -= 1
+
+    def _analyse(self, level: int) -> None:
+        self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)

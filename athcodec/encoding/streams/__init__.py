@@ -1,0 +1,1 @@
+"""From integers to bytes: streams, and the chunks that hold them."""

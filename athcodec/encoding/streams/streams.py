@@ -1,0 +1,404 @@
+"""From integers to the bytes of a stream: one function per kind of stream of FORMAT.md.
+
+The models run in the C core; this module knows which arrays each takes. Containers add steps and flags.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from athcodec._native import BRANCH, CoreMetEnds, address, encode_stream, lib
+from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion
+from athcodec.encoding.streams.polygons import Mesh
+from athcodec.files.threads import SERIAL, ThreadPool, ranges
+
+
+def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
+    """Return HIERARCHY. branches: (B,) of _native.BRANCH; sources: the int32 permutations of hierarchy.Hierarchy."""
+    return encode_stream(
+        "ath_encode_hierarchy",
+        1024 + 16 * len(branches) + 4 * len(vertex_source),
+        address(branches, BRANCH, 1),
+        len(branches),
+        len(vertex_source),
+        address(branch_source, np.int32, len(branches)),
+        address(vertex_source, np.int32, len(vertex_source)),
+    )
+
+
+@dataclass
+class CodedRest:
+    """A rest pose at one precision: the stream, what it decodes to, (N, 3) float64, and its integers, (N, 3) int32, if
+    another is coded about it."""
+
+    step: float
+    stream: bytes
+    decoded: np.ndarray
+    steps: np.ndarray | None = None
+    mesh: Mesh | None = None  # Faces that the pose goes by.
+
+
+def encode_rest(
+    branches: np.ndarray,
+    step: float,
+    rest: np.ndarray,
+    coarse: CodedRest | None = None,
+    slack: float = 0.0,
+    mesh: Mesh | None = None,
+    shape_of: np.ndarray | None = None,
+) -> CodedRest:
+    """Code a rest pose, (N, 3) float64 less the origin, about that of the layer before, if there is one.
+
+    slack: how far from its place a vertex may be put to save bits. mesh: faces that the pose goes by. shape_of: as
+    find_copies returns it; copies that are too far off are coded like other branches.
+    """
+    decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
+    with nullcontext() if mesh is None else mesh.lock:
+        data = encode_stream(
+            "ath_encode_rest",
+            1024 + 8 * rest.size,
+            address(branches, BRANCH, 1),
+            len(branches),
+            step,
+            slack,
+            None if mesh is None else mesh.address,
+            None if coarse is None else address(coarse.steps, np.int32, rest.size),
+            None if coarse is None else address(coarse.decoded, np.float64, rest.size),
+            None if shape_of is None else address(shape_of, np.int32, len(branches)),
+            address(steps, np.int32, rest.size),
+            address(rest, np.float64, rest.size),
+            address(moved, np.float64, rest.size),
+            address(decoded, np.float64, rest.size),
+        )
+    return CodedRest(step, data, decoded, steps, mesh)
+
+
+def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float) -> np.ndarray | None:
+    """Return the branch that each branch copies, (B,) int32: itself if others copy it, or -1. None: there are no
+    copies."""
+    shape_of, uses = np.empty((2, len(branches)), np.int32)
+    copies = lib.ath_find_copies(
+        address(branches, BRANCH, 1),
+        len(branches),
+        address(rest, np.float64, rest.size),
+        step,
+        slack,
+        address(uses, np.int32, len(branches)),
+        address(shape_of, np.int32, len(branches)),
+    )
+    return shape_of if copies else None
+
+
+def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
+    """Code the source's rest pose about the reference pose as decoded, both (N, 3) float64 less the origin."""
+    decoded, turns, moved = np.zeros_like(rest), np.empty((len(branches), 9)), np.empty_like(rest)
+    data = encode_stream(
+        "ath_encode_source_rest",
+        1024 + 8 * rest.size,
+        address(branches, BRANCH, 1),
+        len(branches),
+        step,
+        address(reference, np.float64, rest.size),
+        address(rest, np.float64, rest.size),
+        address(moved, np.float64, rest.size),
+        address(turns, np.float64, turns.size),
+        address(decoded, np.float64, rest.size),
+    )
+    return CodedRest(step, data, decoded)
+
+
+def encode_exact_rest(branches: np.ndarray, pose: np.ndarray, mesh: Mesh | None = None) -> bytes:
+    """Code a rest pose that comes back bit for bit, (N, 3) float32 or float64 with the origin. mesh: its faces."""
+    numbers = pose.astype(np.float64, order="C")
+    return encode_stream(
+        "ath_encode_exact_rest",
+        1024 + 10 * pose.size,
+        address(branches, BRANCH, 1),
+        len(branches),
+        None if mesh is None else mesh.address,
+        pose.dtype == np.float64,
+        address(numbers, np.float64, pose.size),
+    )
+
+
+def encode_times(time: np.ndarray) -> bytes:
+    """Code times in seconds, (T,) float64, bit for bit."""
+    return encode_stream("ath_encode_times", 1024 + 10 * time.size, time.size, address(time, np.float64, time.size))
+
+
+def encode_temporal(steps: np.ndarray) -> bytes:
+    """Code rows of a learned time basis as integers of 14 bits, (rows, frames) int32."""
+    rank, frames = steps.shape
+    return encode_stream(
+        "ath_encode_temporal", 1024 + 8 * steps.size, rank, frames, address(steps, np.int32, steps.size)
+    )
+
+
+def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
+    """Code rows of a learned time basis in waves: half octaves of their steps, (rows,) int32, and integers,
+    (rows, frames) int32."""
+    rank, frames = integers.shape
+    padded = np.concatenate([integers, np.zeros((-rank % 3, frames), np.int32)])
+    return encode_stream(
+        "ath_encode_basis",
+        1024 + 8 * integers.size,
+        rank,
+        frames,
+        address(exponents, np.int32, rank),
+        address(padded, np.int32, padded.size),
+    )
+
+
+def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
+    """Return the streams of learned modes by level."""
+    if learned_modes is None:
+        return {}
+    capacity, arrays = 4096 + 8 * learned_modes.integers.size, _addresses(plan, learned_modes)
+    return {
+        level: encode_stream("ath_encode_shapes", capacity, plan.core, *arrays, level)
+        for level in learned_modes.levels(plan).tolist()
+    }
+
+
+def _addresses(plan: Plan, modes: LearnedModes | None) -> tuple[int | None, int | None, int | None]:
+    if modes is None:
+        return None, None, None
+    return (
+        address(modes.counts, np.int32, len(plan.pieces)),
+        address(modes.first, np.int64, len(plan.pieces)),
+        address(modes.integers, np.int32, modes.integers.size),
+    )
+
+
+def encode_refined_modes(
+    plan: Plan, modes: LearnedModes | None, coarse: LearnedModes | None, shift: int
+) -> bytes | None:
+    """Code the learned modes of a refinement about those of the layer before; None: there are none."""
+    if modes is None:
+        return None
+    arrays = *_addresses(plan, modes), *_addresses(plan, coarse)
+    return encode_stream("ath_encode_refined_shapes", 4096 + 8 * modes.integers.size, plan.core, *arrays, shift)
+
+
+def encode_stems(segment: SegmentMotion, level: int) -> bytes:
+    """Code coefficients and tracks of one level."""
+    return _encode_level("ath_encode_stems", segment, level, segment.coefficients.size + segment.tracks.size)
+
+
+def encode_refinement(segment: SegmentMotion, level: int) -> bytes:
+    """Code coefficients and tracks of a refinement."""
+    return _encode_level("ath_encode_refinement", segment, level, segment.coefficients.size + segment.tracks.size)
+
+
+def encode_affines(segment: SegmentMotion, level: int) -> bytes:
+    """Code the maps of the nodes of one level."""
+    return _encode_level("ath_encode_affines", segment, level, 4 * segment.node_tracks.size)
+
+
+def _encode_level(name: str, segment: SegmentMotion, level: int, size: int) -> bytes:
+    return encode_stream(name, 4096 + size, segment.plan.core, segment.motion, segment.integers, level)
+
+
+def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) -> bytes:
+    """Code corrections: (K, 6) int32 rows of (vertex, frame, x, y, z, width), sorted by vertex, then frame."""
+    return encode_stream(
+        "ath_encode_corrections",
+        4096 + 16 * len(corrections),
+        vertex_count,
+        frames,
+        address(corrections, np.int32, 6 * len(corrections)),
+        len(corrections),
+    )
+
+
+def encode_predicted(
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype
+) -> tuple[bytes, np.ndarray] | None:
+    """Code predicted motion of a segment; return it and the positions that it decodes to, (T, N, 3) of `dtype`. None:
+    steps so large cannot keep the limits. source: (T, N, 3) float64 less the origin; limits: (N,)."""
+    frames, vertices, _ = source.shape
+    memory = np.empty(lib.ath_predicted_memory(vertices) // 16 + 1, np.complex128)
+    positions = np.empty(source.shape, dtype)
+    capacity = 1024 + source.size
+    while True:
+        buffer = np.empty(capacity, np.uint8)
+        size = lib.ath_encode_predicted(
+            memory.ctypes.data,
+            buffer.ctypes.data,
+            capacity,
+            plan.core,
+            address(origin, np.float64, 3),
+            frames,
+            positions.dtype == np.float64,
+            step,
+            address(source, np.float64, source.size),
+            address(limits, np.float64, vertices),
+            positions.ctypes.data,
+        )
+        if size >= 0:
+            return buffer[:size].tobytes(), positions
+        if size < -1:
+            return None
+        capacity *= 4
+
+
+def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
+    """Code what turns decoded positions, (N, 3, T) float32 or float64, into those of the source, bit for bit."""
+    vertices, _, frames = positions.shape
+    return encode_stream(
+        "ath_encode_exact",
+        4096 + 3 * positions.size,
+        vertices,
+        frames,
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        address(source, positions.dtype, positions.size),
+    )
+
+
+@dataclass(frozen=True)
+class MetEnds:
+    """How the corrections of a segment meet those of the segments beside it.
+
+    closed: the ends at which no footprint is cut off, FIRST and LAST. decided: (K, 6) int32 corrections in ascending
+    order, which stand in the first frame of one segment as in the last of the other, or move parts as a whole; no two
+    are of one vertex and frame.
+    """
+
+    closed: int = 0
+    decided: np.ndarray = field(default_factory=lambda: np.empty((0, 6), np.int32))
+
+    def with_moves(self, moves: np.ndarray) -> MetEnds:
+        """Return the ends with corrections that move parts as a whole, (K, 6), unless others stand there."""
+        places, moved = (rows[:, 0].astype(np.int64) << 32 | rows[:, 1] for rows in (self.decided, moves))
+        moves = moves[~np.isin(moved, places)]
+        return replace(self, decided=ascending(np.concatenate([self.decided, moves])))
+
+    def of_vertices(self, start: int, stop: int) -> MetEnds:
+        """Return the ends of some of the vertices, numbered from `start` on."""
+        first, last = np.searchsorted(self.decided[:, 0], (start, stop))
+        return MetEnds(self.closed, self.decided[first:last] - np.array([start, 0, 0, 0, 0, 0], np.int32))
+
+
+FIRST, LAST = 1, 2
+FREE_ENDS = MetEnds()
+
+
+def find_corrections(
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    limit: float | np.ndarray,
+    step: float,
+    pool: ThreadPool = SERIAL,
+    narrow: np.ndarray | bool = False,
+    ends: MetEnds = FREE_ENDS,
+) -> np.ndarray | None:
+    """Return corrections, (K, 6) int32, that bring every vertex of (N, 3, T) positions within its limit of the source;
+    None: this step cannot express them. narrow: vertices, (N,) bool, whose corrections are to be of one frame. ends:
+    how corrections meet those of the segments beside this one."""
+    vertices, _, frames = positions.shape
+    limits = np.array(np.broadcast_to(limit, vertices), np.float64)
+    of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
+
+    def find(start: int, stop: int) -> np.ndarray | None:
+        met, part = ends.of_vertices(start, stop), positions[start:stop]
+        decided = np.ascontiguousarray(met.decided, np.int32)
+        rows = _rows(
+            (stop - start) * frames,
+            lambda rows, capacity: lib.ath_find_corrections(
+                stop - start,
+                frames,
+                positions.dtype == np.float64,
+                address(part, part.dtype, part.size),
+                address(source[start:stop], np.float64, part.size),
+                address(origin, np.float64, 3),
+                address(limits[start:stop], np.float64, stop - start),
+                address(of_one_frame[start:stop], np.uint8, stop - start),
+                step,
+                CoreMetEnds(decided.ctypes.data, len(decided), met.closed),
+                rows,
+                capacity,
+            ),
+        )
+        if rows is not None:
+            rows[:, 0] += start
+        return rows
+
+    parts = pool.map(find, ranges(vertices, 3 * frames))
+    if any(rows is None for rows in parts):
+        return None
+    return np.concatenate(parts)
+
+
+def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: float) -> None:
+    """Move (N, 3, T) positions by corrections of a step."""
+    lib.ath_apply_corrections(
+        positions.shape[2],
+        positions.dtype == np.float64,
+        address(positions, positions.dtype, positions.size),
+        step,
+        address(corrections, np.int32, corrections.size),
+        len(corrections),
+    )
+
+
+def find_rigid_corrections(
+    parts: tuple[np.ndarray, np.ndarray],
+    positions: np.ndarray,
+    source: np.ndarray,
+    origin: np.ndarray,
+    limit: float | np.ndarray,
+    step: float,
+    pool: ThreadPool = SERIAL,
+    narrow: bool = False,
+    closed: int = 0,
+) -> np.ndarray:
+    """Return corrections, (K, 6), ascending, each of which moves all vertices of a part together, if one of `positions`
+    is beyond its limit and this brings all within. parts: first vertices and numbers of vertices; narrow: corrections
+    are to be of one frame; closed: as MetEnds has it."""
+    vertices, _, frames = positions.shape
+    limits = np.array(np.broadcast_to(limit, vertices), np.float64)
+    first, counts = (np.ascontiguousarray(numbers, np.int32) for numbers in parts)
+
+    def find(start: int, stop: int) -> np.ndarray:
+        return _rows(
+            int(counts[start:stop].sum()) * frames,
+            lambda rows, capacity: lib.ath_find_rigid_corrections(
+                stop - start,
+                address(first[start:stop], np.int32, stop - start),
+                address(counts[start:stop], np.int32, stop - start),
+                frames,
+                positions.dtype == np.float64,
+                address(positions, positions.dtype, positions.size),
+                address(source, np.float64, positions.size),
+                address(origin, np.float64, 3),
+                address(limits, np.float64, vertices),
+                narrow,
+                step,
+                closed,
+                rows,
+                capacity,
+            ),
+        )
+
+    per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
+    corrections = np.concatenate([np.empty((0, 6), np.int32), *pool.map(find, ranges(len(first), per_part))])
+    return ascending(corrections)
+
+
+def ascending(corrections: np.ndarray) -> np.ndarray:
+    """Return corrections sorted by vertex, then frame."""
+    return corrections[np.lexsort(corrections[:, 1::-1].T)]
+
+
+def _rows(most: int, find: Callable[[int, int], int]) -> np.ndarray | None:
+    """Return the corrections, (K, 6), that a function of the core finds; None: none serve. `find` takes an address and
+    how many corrections have room there, and returns how many it wrote."""
+    rows = np.empty((most, 6), np.int32)
+    count = find(rows.ctypes.data, most)
+    return None if count < 0 else rows[:count].copy()
