@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from athcodec.arrays import Source, clip_of
-from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.file_bytes import Openable
 from athcodec.errors import ClipError
 from athcodec.files.shown import Report, Table, counted
 from athcodec.metrics.blocks import paired

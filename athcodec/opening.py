@@ -7,9 +7,9 @@ from contextlib import suppress
 from typing import cast
 
 from athcodec.decoding.ath_file import AthFile
-from athcodec.decoding.chunk_file import Openable
 from athcodec.decoding.container import Limits
 from athcodec.decoding.decoder import Decoder
+from athcodec.decoding.file_bytes import Openable
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import ClipError
 from athcodec.motion.units import stated_scene

@@ -83,10 +83,10 @@ def truncate(
         elif target_size is not None:
             last = _last_within(file, size_of(target_size, "target_size"))
         else:
-            last = file.checked_level(cast(int, level))
+            last = file.tables.checked_level(cast(int, level))
         front, chunks = _shortened(file, last)
         for chunk in chunks:
-            if not file.is_available(chunk):
+            if not file.chunks.is_available(chunk):
                 raise Truncated(
                     f"{chunk}: got a file of {file.available_length} bytes; expected at least "
                     f"{chunk.offset + chunk.length}"
@@ -97,11 +97,11 @@ def truncate(
 
             if not isinstance(file.source, GltfMotion):
                 raise ClipError(f"{target}: got an .ath file to cut, expected a GLB with a motion to write another one")
-            return put_motion(source, b"".join([front, *map(file.stored, chunks)]), target, file.source.number)
+            return put_motion(source, b"".join([front, *map(file.chunks.stored, chunks)]), target, file.source.number)
         with new_file(target) as out:
             out.write(front)
             for chunk in chunks:
-                out.write(file.stored(chunk))
+                out.write(file.chunks.stored(chunk))
             return out.tell()
 
 
@@ -110,12 +110,12 @@ def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
 
     Chunks of unknown kinds are kept as FORMAT.md, "Rewriting", says of a file that is cut off behind a level.
     """
-    chunks = [chunk for chunk in file.all_chunks if not chunk.is_motion or chunk.level <= level]
-    if file.rest_is_missing:
+    chunks = [chunk for chunk in file.chunks.all if not chunk.is_motion or chunk.level <= level]
+    if file.tables.rest_is_missing:
         chunks = [chunk for chunk in chunks if chunk.kind != ct.SOURCE_REST]
     whole = level + 1 == file.full_level_count
     header = replace(
-        file.header,
+        file.tables.header,
         level_count=level + 1,
         joins=file.joins[: level + 1],
         max_error=file.max_error_bound if whole else float(file.errors[level, :, 0].max()),

@@ -81,20 +81,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     for path in map(data.path_of, names) if args.all else args.clips:
         with encoded(path, args.rel_error, ladder=args.ladder) as result:
             file = result.decoder.file
-            ath = None if file.header.is_predicted else _same_nodes(result)  # The paper has no such motion.
+            ath = None if file.tables.header.is_predicted else _same_nodes(result)  # The paper has no such motion.
             meters = measured_levels(result.decoder, result.clip)
             files.append(_file_row(path.stem, result))
-            broken += _broken_file_lines(files[-1], file.header.is_predicted)
+            broken += _broken_file_lines(files[-1], file.tables.header.is_predicted)
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
-                depth = file.header.stages[stored.level]
+                depth = file.tables.header.stages[stored.level]
                 meter, ours = meters[stored.level], meters[stored.level].error
                 has_nodes = ath is not None and depth <= ath.height
                 paper = _measure_paper(result.clip, ath, depth) if has_nodes else None
                 row = case | _level_row(stored, ours, paper) | _better(file.levels, stored.level, meter)
                 levels.append(row)
                 broken += _broken_lines(path, stored, ours, result.decoder)
-                broken += _worse_lines(path, row, file.header.is_predicted)
+                broken += _worse_lines(path, row, file.tables.header.is_predicted)
                 if has_nodes:
                     gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
     return {
@@ -235,7 +235,7 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
     clip = result.clip
     frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
-    paper = ath.attachment_gaps(source, result.decoder.file.header.stages[level])
+    paper = ath.attachment_gaps(source, result.decoder.file.tables.header.stages[level])
     joints = _Joints(result.decoder, level)
     ours = joints.gaps(frames)
     return {
@@ -268,7 +268,7 @@ class _Joints:
     @property
     def loose(self) -> int:
         """Number of measured joints with a translation of their own."""
-        return int((self.decoder.file.branches["flags"][self.measured] & LOOSE > 0).sum())
+        return int((self.decoder.file.tables.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
         """Largest and RMS gap over these frames and all joints."""

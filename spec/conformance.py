@@ -380,10 +380,10 @@ def metadata_text(decoder) -> bytes:
     from athcodec.decoding import container
 
     _ = decoder.metadata  # refuses what is no JSON object
-    chunk = decoder.file.find(container.METADATA)
+    chunk = decoder.file.chunks.find(container.METADATA)
     if chunk is None:
         return b""
-    content = decoder.file.payload(chunk)
+    content = decoder.file.chunks.payload(chunk)
     return rules.parse_metadata(content)
 
 

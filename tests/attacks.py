@@ -223,7 +223,7 @@ def _broken(decoder: athcodec.Decoder, clip: MotionClip, bound: float, attack: A
 def _rest_limit(decoder: athcodec.Decoder, clip: MotionClip, bound: float) -> float:
     """In bounds: more where the rest pose has a chunk of its own."""
     limit = 1.0 + 1e-6
-    if decoder.file.find(SOURCE_REST):
+    if decoder.file.chunks.find(SOURCE_REST):
         low, high = clip.positions.min(axis=(0, 1)), clip.positions.max(axis=(0, 1))
         limit *= max(1.0, SOURCE_REST_TOLERANCE * float(np.linalg.norm(high.astype(float) - low)) / bound)
     return limit + _rounding(clip, bound)

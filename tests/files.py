@@ -45,7 +45,7 @@ class Parts:
     @classmethod
     def of(cls, data: bytes) -> Parts:
         file = AthFile(BytesIO(data), strict=True)
-        return cls(file.header, file.errors, [(chunk, file.payload(chunk)) for chunk in file.chunks])
+        return cls(file.tables.header, file.errors, [(chunk, file.chunks.payload(chunk)) for chunk in file.chunks])
 
     def file(self) -> bytes:
         """The bytes of a file whose table and checksums fit its chunks."""

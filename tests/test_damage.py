@@ -254,8 +254,10 @@ def unknown(kind: int, data: bytes = b"from the future") -> tuple[ct.Chunk, byte
 def unknown_chunks(path) -> list[tuple[int, int, int, bytes, int]]:
     with athcodec.open(path, strict=True) as decoder:
         file = decoder.file
-        unknown = [chunk for chunk in file.all_chunks if chunk.kind not in ct.KIND_NAMES]
-        return [(chunk.kind, chunk.level, chunk.segment, file.stored(chunk), chunk.checksum) for chunk in unknown]
+        unknown = [chunk for chunk in file.chunks.all if chunk.kind not in ct.KIND_NAMES]
+        return [
+            (chunk.kind, chunk.level, chunk.segment, file.chunks.stored(chunk), chunk.checksum) for chunk in unknown
+        ]
 
 
 @pytest.mark.parametrize(
@@ -401,9 +403,9 @@ def both_readings(data: bytes, limits: Limits) -> str:
     except FormatError:
         return "refused for what is behind the front"
     for name in COUNTS:
-        assert getattr(file.header, name) == getattr(header, name)
+        assert getattr(file.tables.header, name) == getattr(header, name)
     assert np.array_equal(file.errors, header.errors)
-    assert file.header.repeats.tolist() == list(map(bool, header.repeats))
+    assert file.tables.header.repeats.tolist() == list(map(bool, header.repeats))
     assert file.joins.tolist() == [[join.width + 128 * join.is_sloped for join in row] for row in header.joins.values()]
     assert [astuple(chunk)[:6] for chunk in file.chunks] == chunks
     return "opened"
@@ -474,7 +476,7 @@ def calls_of_opening(data: bytes) -> int:
 
 def test_opening_takes_no_calls_in_python_for_each_chunk():
     few, many = segments_of_one_frame(2), segments_of_one_frame(1500)
-    assert opened(few).file.header.chunk_count == 7 and opened(many).file.header.chunk_count == 3003
+    assert opened(few).file.tables.header.chunk_count == 7 and opened(many).file.tables.header.chunk_count == 3003
     assert calls_of_opening(many) == calls_of_opening(few)
 
 

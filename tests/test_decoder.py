@@ -148,7 +148,10 @@ def test_stems_above_a_level_have_their_final_shape_but_for_corrections_and_join
         assert any(chunk.kind == ct.CORRECTIONS for chunk, _ in parts.chunks)
         assert not np.array_equal(bare.positions(), decoder.positions())
         branch = decoder.file.hierarchy.vertex_branch()
-        pieces, stages = Plan(decoder.file.branches, decoder.file.vertex_count).pieces, decoder.file.header.stages
+        pieces, stages = (
+            Plan(decoder.file.tables.branches, decoder.file.vertex_count).pieces,
+            decoder.file.tables.header.stages,
+        )
         last -= stages[last] > pieces["level"].max()  # A refinement shows other stems.
         final = bare.positions(level=last)[:, order]
         for level in range(1, last):
@@ -186,7 +189,7 @@ def assert_maps_hang_together(decoder, frame: int, level: int, most: float) -> t
     residual = decoder.residual(frame, level)[order]
     assert np.abs(applied(matrices, residual[:, None])[:, 0] - full).max() < most
     branch = hierarchy.vertex_branch()[parts.first_vertex]
-    loose = decoder.file.branches["flags"][branch] & LOOSE > 0
+    loose = decoder.file.tables.branches["flags"][branch] & LOOSE > 0
     hung = ~parts.is_stem & (hierarchy.attach[branch] >= 0) & ~loose
     attach = hierarchy.attach[branch][hung]
     placed = applied(parts.matrices[hung], pose[attach, None])[:, 0]
@@ -196,7 +199,7 @@ def assert_maps_hang_together(decoder, frame: int, level: int, most: float) -> t
 
 def test_maps_hang_together(played):
     decoder, source = played
-    assert not (decoder.file.branches["flags"] & LOOSE).any()
+    assert not (decoder.file.tables.branches["flags"] & LOOSE).any()
     attached = 0
     for level in range(decoder.file.level_count):
         for frame in shown_frames(decoder):
@@ -403,7 +406,7 @@ def test_static_data_can_be_read_and_checked_while_other_threads_watch(full_clip
         for _ in range(10):
             decoder.file.check()
             for name in ("attributes", "metadata", "faces", "edges"):
-                vars(decoder.file).pop(name)  # remembered otherwise
+                vars(decoder.file.static).pop(name)  # remembered otherwise
             assert np.array_equal(decoder.file.attributes["radius"], full_clip.attributes["radius"])
             assert decoder.metadata.items() >= full_clip.metadata.items()
 

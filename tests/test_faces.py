@@ -55,7 +55,7 @@ def still(points: np.ndarray, faces: np.ndarray) -> athcodec.MotionClip:
 
 def rest_bytes(data: bytes) -> int:
     with opened(data) as decoder:
-        return decoder.file.find(ct.REST).length
+        return decoder.file.chunks.find(ct.REST).length
 
 
 @pytest.mark.parametrize(

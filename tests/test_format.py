@@ -48,7 +48,7 @@ def parts_of(name: str) -> Parts:
 
 def branches_of(seed: int) -> np.ndarray:
     with opened((VALID / f"{FEW[seed % len(FEW)]}.ath").read_bytes()) as decoder:
-        return decoder.file.branches
+        return decoder.file.tables.branches
 
 
 def dump(text: str) -> bytes:
@@ -281,7 +281,7 @@ def read_hierarchy(stream: bytes, like: np.ndarray, fields: list[str]) -> tuple:
     with played(still_file(branches=like, hierarchy=stream), container.HIERARCHY) as decoder:
         numbers = decoder.file.hierarchy
         assert not decoder.positions().any()
-        rows = [[int(row[name]) for name in fields] for row in decoder.file.branches]
+        rows = [[int(row[name]) for name in fields] for row in decoder.file.tables.branches]
         return rows, numbers.branch_source.tolist(), numbers.vertex_source.tolist()
 
 

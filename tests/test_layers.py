@@ -89,7 +89,7 @@ def test_prefixes_of_a_file_with_layers_are_a_fraction_and_the_whole_little_more
     alone, layers = sample_files
     assert layers.bytes < 1.06 * alone.bytes
     with athcodec.open(alone.path) as one, athcodec.open(layers.path) as several:
-        assert several.file.header.stages[-1] == one.file.header.stages[-1] + 2
+        assert several.file.tables.header.stages[-1] == one.file.tables.header.stages[-1] + 2
         least, first = several.levels[0], several.levels[-3]
         assert least.bytes < 0.6 * one.levels[0].bytes
         assert first.bytes < 0.2 * one.levels[-1].bytes
@@ -286,8 +286,8 @@ def test_levels_are_called_by_depth_then_by_layer_in_prefixes_too(layered, bushy
         """Names of all that may be shown, and of what is."""
         names = [*(f"depth {level}" for level in range(32)), *others]
         with athcodec.open(path) as decoder:
-            last = decoder.file.header.stages[-1]
-            return [[*names[: last + 1 - len(others)], *others][stage] for stage in decoder.file.header.stages]
+            last = decoder.file.tables.header.stages[-1]
+            return [[*names[: last + 1 - len(others)], *others][stage] for stage in decoder.file.tables.header.stages]
 
     names = names_of(layered)
     assert names == all_names(layered, *(f"layer {layer} of 4" for layer in range(1, 5)))

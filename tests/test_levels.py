@@ -39,7 +39,7 @@ def assert_levels_get_better(clip: athcodec.MotionClip, data: bytes) -> None:
                 starts = [start for start, _ in part.segments]
                 meter = SmoothnessMeter(len(shown), file.max_error_bound, starts, part.clip.loop)
                 meter.add(wanted, shown)
-                assert file.header.is_predicted or meter.jerks(file.max_error_bound).max(initial=0.0) <= 2
+                assert file.tables.header.is_predicted or meter.jerks(file.max_error_bound).max(initial=0.0) <= 2
 
 
 def coded(clip: athcodec.MotionClip, **options) -> bytes:
@@ -75,7 +75,7 @@ def test_each_level_that_a_ladder_names_holds_the_error(plant, bound, ladder, ot
     data = coded(plant, max_error=bound, ladder=ladder, attributes="none", **others | weights)
     lengths = [error * diagonal(plant) for error in ladder if error * diagonal(plant) >= 4.001 * bound]
     with opened(data, strict=True) as decoder:
-        header = decoder.file.header
+        header = decoder.file.tables.header
         first = header.stages[-1] - header.layer_count + 1
         for stage, length in enumerate(lengths[: header.layer_count - 1], first):
             if stage in header.stages:
@@ -186,7 +186,7 @@ def test_prefixes_and_truncated_files_have_the_levels_of_the_whole(parts, tmp_pa
         for level in whole.levels:
             athcodec.truncate(path, tmp_path / "b.ath", level.level)
             with athcodec.open(tmp_path / "b.ath", strict=True) as cut, opened(data[: level.bytes]) as prefix:
-                assert cut.file.header.stages == parts.header.stages and cut.file.level_count == level.level + 1
+                assert cut.file.tables.header.stages == parts.header.stages and cut.file.level_count == level.level + 1
                 assert prefix.file.deepest == level.level
                 for shown in range(level.level + 1):
                     positions = whole.positions(level=shown)

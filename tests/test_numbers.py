@@ -153,8 +153,11 @@ TAKE_WHOLES: dict[str, tuple[int, Callable[[Any, Any], Any]]] = {
     "write": (100, lambda n, _: WriteOptions(rig=n)),
     "open: limits": (100, lambda n, _: Limits(frames=n)),
     "truncate: level": (1, lambda n, made: truncated(made, level=n)),
-    "AthFile": (1, lambda n, made: [made.file.rest_at(n), made.file.level_rest(n), made.file.nodes_at(n)]),
-    "AthFile.available": (1, lambda n, made: [made.file.available(n), made.file.prepare(n, n) is None]),
+    "AthFile": (
+        1,
+        lambda n, made: [made.file.rest_at(n), made.file.static.level_rest(n), made.file.tables.nodes_at(n)],
+    ),
+    "AthFile.available": (1, lambda n, made: [made.file.available(n), made.file.segments.prepare(n, n) is None]),
     "Decoder.at_level": (1, lambda n, made: [made.decoder.at_level(n)[3], made.decoder.at_level(n).level]),
     "Decoder: level": (1, lambda n, made: [made.decoder.positions(3, n), list(made.decoder.blocks(n))]),
     "Decoder: level of a blend": (1, lambda n, made: made.decoder.blended({"calm": 1.0}, 1.0, {"calm": n})),

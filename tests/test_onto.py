@@ -258,7 +258,7 @@ def test_a_rest_pose_that_is_coarser_than_the_motion_is_warned_of():
     frames = pose + 0.02 * np.sin(np.arange(40) / 5)[:, None, None] * points
     clip = MotionClip(frames, np.arange(40) / 10, rest=points, edges=rows(60))
     with opened(athcodec.encode(clip, rel_error=1e-4)) as plant:
-        assert np.abs(plant.file.rest - points).max() <= plant.file.rest_error
+        assert np.abs(plant.file.rest - points).max() <= plant.file.static.rest_error
         with pytest.warns(CoarseWarning, match="--exact-rest"):
             athcodec.onto(plant, points)
     with opened(athcodec.encode(clip, rel_error=1e-4, exact_rest=True)) as plant, warnings.catch_warnings():

@@ -369,7 +369,7 @@ OPENED = ["shipped tree", "sample", "places-layers", "rest-of-level-1", "layers-
 def test_opening_in_slices_keeps_to_its_budget_and_gives_the_same(name, lib, sample_ath):
     path, budget = {"sample": sample_ath, "shipped tree": SHIPPED}.get(name, VECTORS / f"{name}.ath"), 100
     with athcodec.open(path) as file, Player(lib, path.read_bytes()) as whole:
-        count, levels, longest = file.file.vertex_count, file.file.level_count, file.file.branches["count"].max()
+        count, levels, longest = file.file.vertex_count, file.file.level_count, file.file.tables.branches["count"].max()
         most = budget + max(98304, count, file.frame_count, 16 * longest)
         with Player(lib, path.read_bytes(), in_slices=1, budget=0) as player:
             result, costs = player.result, []

@@ -32,7 +32,7 @@ def test_a_rest_pose_that_was_given_comes_back_within_its_tolerance(bushy_clip, 
     athcodec.encode(bushy_clip, tmp_path / "a.ath", ladder=ladder, **OPTIONS)
     size = diagonal(bushy_clip)
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        assert decoder.file.find(ct.SOURCE_REST)
+        assert decoder.file.chunks.find(ct.SOURCE_REST)
         assert distance(decoder.level_rest(), bushy_clip.rest) > 10 * 1e-4 * size  # the bound
         assert distance(decoder.file.rest, bushy_clip.rest) <= SOURCE_REST_TOLERANCE * size
         assert distance(decoder.positions(), bushy_clip.block(0, bushy_clip.frame_count)) <= 1e-4 * size
@@ -85,7 +85,7 @@ def test_a_rest_pose_that_was_made_is_not_stored(bushy_clip, tmp_path):
     )
     assert not clip.rest_given and not clip.replace(metadata={}).rest_given and bushy_clip.rest_given
     with coded(clip, tmp_path / "a.ath", **OPTIONS) as decoder:
-        assert decoder.file.find(ct.SOURCE_REST) is None
+        assert decoder.file.chunks.find(ct.SOURCE_REST) is None
         assert np.array_equal(decoder.file.rest, np.float32(decoder.level_rest()))
 
 
@@ -94,8 +94,8 @@ def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
     for level in (0, 3):
         athcodec.truncate(tmp_path / "a.ath", tmp_path / "cut.ath", level)
         with athcodec.open(tmp_path / "cut.ath", strict=True) as cut, athcodec.open(tmp_path / "a.ath") as whole:
-            assert cut.file.payload(cut.file.find(ct.SOURCE_REST)) == whole.file.payload(
-                whole.file.find(ct.SOURCE_REST)
+            assert cut.file.chunks.payload(cut.file.chunks.find(ct.SOURCE_REST)) == whole.file.chunks.payload(
+                whole.file.chunks.find(ct.SOURCE_REST)
             )
             closest = distance(cut.level_rest(), whole.level_rest())
             assert distance(cut.file.rest, whole.file.rest) <= 4 * closest + 1e-6
@@ -103,7 +103,7 @@ def test_shortened_files_keep_the_rest_pose(bushy_clip, tmp_path):
 
 def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_path):
     with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS) as decoder:
-        chunk = decoder.file.find(ct.SOURCE_REST)
+        chunk = decoder.file.chunks.find(ct.SOURCE_REST)
     data = bytearray((tmp_path / "a.ath").read_bytes())
     data[chunk.offset + chunk.length - 1] ^= 1
     with athcodec.open(BytesIO(data)) as decoder:
@@ -117,11 +117,11 @@ def test_a_damaged_rest_pose_is_refused_by_those_who_ask_for_it(bushy_clip, tmp_
 def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bushy_clip):
     data = athcodec.encode(bushy_clip, **OPTIONS)
     with athcodec.open(data) as whole:
-        assert not whole.file.rest_is_missing and not whole.file.missing
+        assert not whole.file.tables.rest_is_missing and not whole.file.missing
         end, motion = whole.file.levels[-1].bytes, whole.positions()
-        assert end <= whole.file.find(ct.SOURCE_REST).offset
+        assert end <= whole.file.chunks.find(ct.SOURCE_REST).offset
     with athcodec.open(BytesIO(data[:end])) as cut:
-        assert cut.file.rest_is_missing and cut.file.missing == "rest pose of the source"
+        assert cut.file.tables.rest_is_missing and cut.file.missing == "rest pose of the source"
         assert np.array_equal(cut.positions(), motion)
         assert np.array_equal(cut.file.rest, cut.level_rest().astype(cut.file.rest.dtype))
         with pytest.raises(Truncated, match="SOURCE_REST"):
@@ -131,7 +131,7 @@ def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bus
 def test_joined_clips_share_both_poses(medley_clips, tmp_path):
     joined = athcodec.join(medley_clips)
     with coded(joined, tmp_path / "a.ath", **OPTIONS) as decoder:
-        assert joined.rest_given == (decoder.file.find(ct.SOURCE_REST) is not None)
+        assert joined.rest_given == (decoder.file.chunks.find(ct.SOURCE_REST) is not None)
         assert distance(decoder.file.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
         for clip in decoder.file.clips:
             assert np.array_equal(decoder.play(clip.name).level_rest(), decoder.level_rest())

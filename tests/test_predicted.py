@@ -277,10 +277,10 @@ def test_segments_are_as_long_as_can_be_unless_told_otherwise(always, tmp_path):
     clip = plant(seed=6, frames=256)
     size(clip, tmp_path, 1e-2)
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        assert decoder.file.header.segment_count == 1
+        assert decoder.file.tables.header.segment_count == 1
     size(clip, tmp_path, 1e-2, segment_frames=100)
     with athcodec.open(tmp_path / "a.ath") as decoder:
-        assert decoder.file.header.segment_count == 3
+        assert decoder.file.tables.header.segment_count == 3
 
 
 @pytest.mark.parametrize("target", [700, 1500])
@@ -301,5 +301,5 @@ def test_a_copy_of_the_rest_pose_keeps_the_bound_as_it_is_put_out(tmp_path):
     bound = 5.2436314 * float(np.spacing(np.abs(clip.positions).max()))
     made = athcodec.encode(clip, tmp_path / "a.ath", max_error=bound, effort="fast")
     with athcodec.open(made.path) as decoder:
-        assert decoder.file.header.is_predicted
+        assert decoder.file.tables.header.is_predicted
         assert np.linalg.norm(decoder.positions().astype(float) - clip.positions, axis=2).max() <= bound

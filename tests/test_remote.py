@@ -510,7 +510,7 @@ def test_the_command_reads_other_systems_and_says_what_it_took(other_url, local,
     assert cli.main(["decode", other_url, str(out), "--level", "1", "--frames", "200:210", "--stats"]) == 0
     requests, fetched = re.search(r"stats: (\d) requests, ([\d,]+) bytes", capsys.readouterr().err).groups()
     assert (
-        int(requests) <= 1 + local.file.header.stages[1]
+        int(requests) <= 1 + local.file.tables.header.stages[1]
         and int(fetched.replace(",", "")) <= READ_AHEAD + local.levels[1].bytes
     )
     with athcodec.read_hdf5(out) as clip:

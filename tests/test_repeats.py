@@ -39,7 +39,7 @@ def encoded(clip: athcodec.MotionClip, path: Path, **options) -> athcodec.Summar
 
 
 def repeats_of(decoder: athcodec.Decoder) -> list[bool]:
-    return decoder.file.header.repeats.tolist()
+    return decoder.file.tables.header.repeats.tolist()
 
 
 @pytest.mark.slow

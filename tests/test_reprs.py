@@ -51,7 +51,7 @@ def shown(tmp_path_factory):
     view = athcodec.ClipView(decoder, 1)
     objects = [clip, joined, summary, decoder, decoder.file, view, view.positions, decoder.clip, decoder.levels[0]]
     objects += [athcodec.find_branches(clip, "motion"), athcodec.build_ath(clip, max_error=0.1), decoder.affines(3, 1)]
-    objects += [athcodec.compare(clip, decoder), athcodec.write(view, folder / "a.obj"), decoder.file.header]
+    objects += [athcodec.compare(clip, decoder), athcodec.write(view, folder / "a.obj"), decoder.file.tables.header]
     objects += [athcodec.Thresholds(0.1, 2, "1mm", 3), decoder.file.hierarchy, decoder.file.limits]
     with decoder:
         yield {type(shown).__name__: shown for shown in objects}

@@ -154,7 +154,7 @@ def test_one_accepted_plant_is_one_node_and_two_levels(scratch):
 
 def test_chains_fold_the_depths_beyond_29_into_one_level(scratch):
     decoder = reopened(chain_plant(45, 2), scratch, tam=Thresholds(0, 0, 0, 0), ladder="none")
-    assert decoder.file.table1()["depth"] == 30 and decoder.file.header.stages[-1] == 30
+    assert decoder.file.table1()["depth"] == 30 and decoder.file.tables.header.stages[-1] == 30
 
 
 def test_float64_output_of_a_float32_file_is_within_the_bound_too(bushy_ath, bushy_clip):
@@ -286,7 +286,7 @@ def test_edges_keep_their_type_whether_they_follow_from_the_hierarchy_or_not(dty
     for edges in (derived, derived[::-1].copy()):
         decoder = reopened(source.replace(edges=edges), scratch)
         assert same_array(decoder.file.edges, edges.astype(edges.dtype.newbyteorder("<")))
-        sizes.append(decoder.file.find(ct.EDGES).length)
+        sizes.append(decoder.file.chunks.find(ct.EDGES).length)
     assert sizes[0] == 1 < sizes[1], "edges that follow from the hierarchy cost next to nothing"
 
 

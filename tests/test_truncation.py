@@ -21,7 +21,7 @@ class Whole:
         with athcodec.open(path, strict=True) as decoder:
             self.chunks, self.levels = decoder.file.chunks, decoder.levels
             self.prelude = decoder.file.prelude_length
-            self.segments, self.header = decoder.segments, decoder.file.header
+            self.segments, self.header = decoder.segments, decoder.file.tables.header
             self.positions = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
             self.bound, self.attributes = decoder.file.max_error_bound, decoder.file.attributes
             dtype, count = decoder.file.rest.dtype, decoder.file.level_count

@@ -96,7 +96,7 @@ def test_twigs_keep_their_thickness_at_loose_bounds(scratch, bound, options):
     """A bound of ten times their thickness left rings that were off by a third."""
     clip = twigs()
     with coded(clip, scratch / "twigs.ath", rel_error=bound, attributes="none", **options) as decoder:
-        assert np.all(decoder.file.branches["ring"][1:] == SIDES)
+        assert np.all(decoder.file.tables.branches["ring"][1:] == SIDES)
         decoded = decoder.positions().astype(np.float64)
     stretch = np.abs(around_rings(decoded) / around_rings(np.asarray(clip.positions, np.float64)) - 1)
     assert np.quantile(stretch, 0.999) < 0.06

@@ -77,7 +77,7 @@ def test_all_kinds_of_chunks_that_stand_together_are_in_one_valid_file():
     assert kinds_in(path) == set(container.KIND_NAMES) - {container.PREDICTED}
     with path.open("rb") as file:
         opened = AthFile(file, strict=True)
-        assert opened.header.chunk_count > len(opened.chunks) and opened.header.is_float64
+        assert opened.tables.header.chunk_count > len(opened.chunks) and opened.tables.header.is_float64
 
 
 def test_every_field_has_a_vector_that_breaks_its_range():

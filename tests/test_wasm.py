@@ -103,7 +103,7 @@ def first_chunk(data: bytes) -> int:
 def learned_chunks(path: Path) -> int:
     """How many STEMS chunks bring a time basis of their own (FORMAT.md, "STEMS")."""
     with athcodec.open(path) as decoder:
-        return sum(chunk.kind == 16 and decoder.file.payload(chunk)[5] > 0 for chunk in decoder.file.chunks)
+        return sum(chunk.kind == 16 and decoder.file.chunks.payload(chunk)[5] > 0 for chunk in decoder.file.chunks)
 
 
 @pytest.fixture(

@@ -417,12 +417,12 @@ def _opened_mesh(mesh: Source, opened: ExitStack, options: dict[str, Any]) -> Mo
 def _warn_of_rest(view: ClipView) -> None:
     """Warn of a plant whose rest pose, which the mesh is to lie on, is known less exactly than its motion."""
     file = view.decoder.file
-    if file.rest_error <= COARSE_REST * file.max_error_bound:
+    if file.static.rest_error <= COARSE_REST * file.max_error_bound:
         return
     unit = f" {view.metadata['unit']}" if view.metadata.get("unit") else ""
     warnings.warn(
-        f"{file.name}: the rest pose is off by up to {file.rest_error:.3g}{unit}, and the mesh lies on it no better; "
-        "encode the plant with --exact-rest (exact_rest=True)",
+        f"{file.name}: the rest pose is off by up to {file.static.rest_error:.3g}{unit}, and the mesh lies on it no "
+        "better; encode the plant with --exact-rest (exact_rest=True)",
         CoarseWarning,
         stacklevel=3,
     )

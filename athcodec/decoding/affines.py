@@ -43,21 +43,21 @@ class Affines:
 def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, what: str) -> Affines:
     """Return a frame of the file as matrices, from its segment as prepared at the level. Raises BadChunk."""
     core, parts, hierarchy = file.core, file.core.cut(level), file.hierarchy
-    nodes, stems = parts[parts["branch"] >= 0], file.exact_branches(parts)
+    nodes, stems = parts[parts["branch"] >= 0], file.tables.exact_branches(parts)
     positions = np.empty((core.info.place_count, 3))
     node_matrices = core.matrices(ready, frame, len(nodes))
     core.positions(ready, frame, positions, core_file.FILE_ORDER)
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            rest = file.level_rest(level, core_file.FILE_ORDER)
-            maps = stem_maps(file.place_hierarchy, rest, positions[None])
+            rest = file.static.level_rest(level, core_file.FILE_ORDER)
+            maps = stem_maps(file.static.place_hierarchy, rest, positions[None])
     except np.linalg.LinAlgError:  # Infinite positions lead some plants here.
         maps = np.array(np.nan)
     if not np.isfinite(maps).all():
         raise BadChunk(f"{what}: got positions that no matrix fits; expected those of a plant")
-    first = np.concatenate([nodes["first"], file.branches["first"][stems]])
-    stop = first + np.concatenate([nodes["count"], file.branches["count"][stems]])
-    first, stop = file.place_starts[first], file.place_starts[stop]
+    first = np.concatenate([nodes["first"], file.tables.branches["first"][stems]])
+    stop = first + np.concatenate([nodes["count"], file.tables.branches["count"][stems]])
+    first, stop = file.static.place_starts[first], file.static.place_starts[stop]
     branch = hierarchy.branch_source[np.concatenate([nodes["branch"], stems])]
     is_stem, matrices = np.arange(len(first)) >= len(nodes), np.concatenate([node_matrices, maps[0, stems]])
     order = np.argsort(first, kind="stable")

@@ -40,7 +40,7 @@ class Blending:
         blended = []
         for clip, seconds, level, weight in shares:
             frame = file.core.frame_at(file.clips.index(clip), seconds)
-            first, starts = int(frame), file.segment_starts(clip)
+            first, starts = int(frame), file.tables.segment_starts(clip)
             after = first + 1 if first + 1 < starts[-1] else starts[0]
             segments = {
                 clip.first_segment + bisect_right(starts, place) - 1
@@ -48,7 +48,7 @@ class Blending:
             }
             for segment in segments:
                 place = segment, level
-                ready[place] = ready.get(place) or before.get(place) or file.prepare(*place)
+                ready[place] = ready.get(place) or before.get(place) or file.segments.prepare(*place)
             blended.append(([ready[segment, level] for segment in segments], frame, weight))
         with self._lock:
             self._prepared = ready

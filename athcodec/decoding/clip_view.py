@@ -59,7 +59,7 @@ class ClipView:
         self, decoder: Decoder, level: int | None = None, frames: range | None = None, *, all_clips: bool = False
     ):
         self.decoder = decoder
-        self.level = decoder.level if level is None else decoder.file.checked_level(level)
+        self.level = decoder.level if level is None else decoder.file.tables.checked_level(level)
         played = [decoder.play(clip.name) for clip in decoder.file.clips] if all_clips else [decoder]
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 

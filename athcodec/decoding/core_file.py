@@ -1,7 +1,7 @@
 """ath.h in Python: a file opened by the C core, its prepared segments, and what they show.
 
 Every member mirrors a function of core/include/ath.h, where its contract stands. This module holds the memory, checks
-sizes and turns result codes into exceptions. It reads no file: chunk_file.py feeds the bytes.
+sizes and turns result codes into exceptions. It reads no file: file_bytes.py feeds the bytes.
 Vertices are in file order unless said otherwise; positions are in scene units.
 """
 

@@ -91,7 +91,7 @@ class Decoder(ArrayLike):
         self.file, self._closes_file, self._level = file, closes_file, level
         if level is not None:
             self._level = self._checked_level(level)
-        self.clip: Clip = file.clips[0] if clip is None else file.clip_named(clip)
+        self.clip: Clip = file.clips[0] if clip is None else file.tables.clip_named(clip)
         self._lock = threading.Lock()
         # The segment that was decoded last, after its number and level.
         self._last: tuple[tuple[int, int] | None, core_file.Segment | None] = None, None
@@ -159,7 +159,7 @@ class Decoder(ArrayLike):
 
     def _repr_html_(self) -> str:
         file, report = self.file, Report(parts_of(facts_of(self.file.name, self)))._repr_html_()
-        if file.missing or file.rest_is_missing or file.is_closed:
+        if file.missing or file.tables.rest_is_missing or file.is_closed:
             return report
         if file.file_length > MOST_SHOWN_BYTES:
             return f"{report}<p>A large file: show() plays it here.</p>"
@@ -236,7 +236,7 @@ class Decoder(ArrayLike):
     @cached_property
     def segments(self) -> list[tuple[int, int]]:
         """(start, stop) frames of each segment."""
-        starts = [start - self.clip.first_frame for start in self.file.segment_starts(self.clip)]
+        starts = [start - self.clip.first_frame for start in self.file.tables.segment_starts(self.clip)]
         return list(zip(starts, starts[1:]))
 
     @property
@@ -248,7 +248,7 @@ class Decoder(ArrayLike):
     @property
     def levels(self) -> list[Level]:
         """The stored levels, coarse to fine, with their errors in this clip."""
-        return self.file.levels_in(self.clip.segments)
+        return self.file.tables.levels_in(self.clip.segments)
 
     def level_for(
         self, distance: LengthLike, fov: float, height: float, pixels: float = 1.0, measure: str = "max"
@@ -379,7 +379,7 @@ class Decoder(ArrayLike):
         level, (first, last) = self._checked_level(level), self._checked_run(frames)
         segments = self._segments_of(first, last)
         if len(segments) > 1:
-            self.file.prefetch(self._in_file(segments), level)
+            self.file.segments.prefetch(self._in_file(segments), level)
         for segment in segments:
             start, stop = self.segments[segment]
             low, high = max(start, first), min(stop, last)
@@ -445,7 +445,7 @@ class Decoder(ArrayLike):
         return self._blending.positions(
             [
                 Share(
-                    self.file.clip_named(name),
+                    self.file.tables.clip_named(name),
                     seconds[name] if isinstance(seconds, Mapping) else seconds,
                     self._checked_level(level.get(name) if isinstance(level, Mapping) else level),
                     weight,
@@ -476,7 +476,7 @@ class Decoder(ArrayLike):
         return self._blending.positions([Share(self.clip, seconds, level, weight) for seconds, weight in places])
 
     def level_rest(self, level: int | None = None) -> np.ndarray:
-        """Return the reference pose of a level, which its maps move; see `AthFile.level_rest`.
+        """Return the reference pose of a level, which its maps move; see `AthFile.static.level_rest`.
 
         Parameters
         ----------
@@ -488,7 +488,7 @@ class Decoder(ArrayLike):
         numpy.ndarray
             (N, 3) float64, scene units.
         """
-        return self.file.level_rest(self._checked_level(level))
+        return self.file.static.level_rest(self._checked_level(level))
 
     def affines(self, frame: int, level: int | None = None) -> Affines:
         """Return a frame as matrices: of nodes that move as one, and least-squares maps of exact stems (paper, eq. 2).
@@ -528,7 +528,7 @@ class Decoder(ArrayLike):
         return residual_of(self.affines(frame, level), positions, self.file.hierarchy.vertex_source, f"frame {frame}")
 
     def _checked_level(self, level: int | None) -> int:
-        return self.level if level is None else self.file.checked_level(level, WITHIN)
+        return self.level if level is None else self.file.tables.checked_level(level, WITHIN)
 
     def _indexed(self, index: Any, level: int, dtype: np.dtype) -> np.ndarray:
         """Return what a NumPy index picks of all positions, after decoding the frames that it reads."""
@@ -549,7 +549,7 @@ class Decoder(ArrayLike):
 
         for segments in self._runs_of(frames):
             if len(segments) > 1:
-                self.file.show_all(segments, level, show, room)
+                self.file.segments.show_all(segments, level, show, room)
             else:
                 with self._prepared(segments.start, level, room(segments.start)) as ready:
                     if not ready.gone:
@@ -579,13 +579,13 @@ class Decoder(ArrayLike):
     def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:
         """Give the caller alone a segment of the file at a level; the last one is kept. Raises as `positions`.
 
-        `to` is that of `AthFile.prepare`.
+        `to` is that of `AthFile.segments.prepare`.
         """
         place = segment, level
         with self._lock:
             (last, ready), self._last = self._last, (None, None)
         if last != place or ready is None:
-            ready = self.file.prepare(*place, ready, to)
+            ready = self.file.segments.prepare(*place, ready, to)
         try:
             yield ready
         finally:

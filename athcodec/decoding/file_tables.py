@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.decoding import container as ct
-from athcodec.decoding.chunk_file import ChunkFile
+from athcodec.decoding.chunks import Chunks
+from athcodec.decoding.file_bytes import FileBytes
 from athcodec.errors import ClipUnavailable, LevelUnavailable, Truncated
 from athcodec.options import whole
 
@@ -79,16 +80,24 @@ class Clip:
         return range(self.first_segment, self.first_segment + self.segment_count)
 
 
-class FileTables(ChunkFile):
-    """A file that lists its clips and levels, and says which of its levels are there."""
+class FileTables:
+    """Clips, levels and branches of a file, and which of its levels are there.
+
+    damaged_from: the first level that is damaged, or None.
+    """
+
+    def __init__(self, file_bytes: FileBytes, chunks: Chunks, damaged_from: int | None = None) -> None:
+        self._bytes, self._chunks, self._core = file_bytes, chunks, file_bytes.core
+        self._level_count: int = self._core.info.level_count
+        self._damaged_from = self._level_count if damaged_from is None else damaged_from
 
     @property
     def header(self) -> ct.Header:
         """The fixed header."""
         counts = [field.name for field in fields(ct.Header) if field.name not in ("stages", "joins", "repeats")]
-        values = {name: getattr(self.core.info, name) for name in counts}
+        values = {name: getattr(self._core.info, name) for name in counts}
         return ct.Header(
-            **values, stages=tuple(self.core.stages()), joins=self.core.joins(), repeats=self.core.repeats()
+            **values, stages=tuple(self._core.stages()), joins=self._core.joins(), repeats=self._core.repeats()
         )
 
     # ---- clips ----
@@ -100,9 +109,12 @@ class FileTables(ChunkFile):
             Clip(
                 *(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment, clip.segment_count),
                 *(bool(clip.loop), clip.duration),
-                tuple(self.core.seam_error(index, level) for level in range(self.full_level_count if clip.loop else 0)),
+                tuple(
+                    self._core.seam_error(index, level)
+                    for level in range(self._core.info.full_level_count if clip.loop else 0)
+                ),
             )
-            for index, clip in enumerate(self.core.clips())
+            for index, clip in enumerate(self._core.clips())
         )
 
     def clip_named(self, name: str) -> Clip:
@@ -116,86 +128,88 @@ class FileTables(ChunkFile):
     @cached_property
     def time(self) -> np.ndarray:
         """Seconds, (T,) float64, of the frames of all clips."""
-        return self.core.times()
+        return self._core.times()
 
     def segment_starts(self, clip: Clip) -> list[int]:
         """Return the first frame of each segment of a clip, in the whole file, and the frame behind its last."""
-        return self.core.segment_starts(clip.segments)
+        return self._core.segment_starts(clip.segments)
 
     # ---- levels ----
 
     @cached_property
     def _ends(self) -> np.ndarray:
         """Bytes of the file up to the end of each chunk in the table."""
-        return self._table["offset"] + self._table["length"]
+        return self._chunks.table["offset"] + self._chunks.table["length"]
 
     @cached_property
     def _is_late(self) -> np.ndarray:
         """Which chunks of motion the file was cut off before."""
-        return ct.is_motion(self._table["kind"]) & (self._ends > self.available_length)
+        return ct.is_motion(self._chunks.table["kind"]) & (self._ends > self._bytes.available_length)
 
     def available(self, level: int) -> bool:
         """Return whether all segments of all levels up to this one are there and undamaged."""
-        return whole("level", level) < self._first_lacking
+        return whole("level", level) < self.first_lacking
 
     @cached_property
-    def _first_lacking(self) -> int:
+    def first_lacking(self) -> int:
         """The first level that is incomplete or damaged."""
-        late = () if self.complete else self._table["level"][self._is_late].tolist()
+        late = () if self._bytes.complete else self._chunks.table["level"][self._is_late].tolist()
         return min([self._damaged_from, *late])
 
     def checked_level(self, level: int, hint: str = "") -> int:
         """Return the number of a stored level as an int. hint: the end of the message for what is no whole number.
         Raises LevelUnavailable if the file has no such level."""
-        if not 0 <= (level := whole("level", level, hint)) < self.level_count:
-            raise LevelUnavailable(f"level: got {level}; expected 0 to {self.level_count - 1}")
+        if not 0 <= (level := whole("level", level, hint)) < self._level_count:
+            raise LevelUnavailable(f"level: got {level}; expected 0 to {self._level_count - 1}")
         return level
 
     @property
     def deepest(self) -> int:
         """The deepest complete level. Raises Truncated if not even level 0 is complete."""
-        if self._first_lacking == 0:
-            raise Truncated(f"level 0: got {self.available_length} bytes; expected at least {self._level_end(0)}")
-        return self._first_lacking - 1
+        if self.first_lacking == 0:
+            raise Truncated(
+                f"level 0: got {self._bytes.available_length} bytes; expected at least {self._level_end(0)}"
+            )
+        return self.first_lacking - 1
 
     @property
     def rest_is_missing(self) -> bool:
         """Whether the file was cut off before the rest pose of the source, which stands behind the motion."""
-        return self._lacks(ct.SOURCE_REST)
+        return self._chunks.lacks(ct.SOURCE_REST)
 
     @cached_property
     def missing(self) -> str:
         """One line on what a cut-off or damaged file lacks; empty for a complete one."""
-        late = self._table[self._is_late]
+        late = self._chunks.table[self._is_late]
         parts = []
         for level in np.unique(late["level"]).tolist():
             segments = late["segment"][late["level"] == level]
             first, last = int(segments.min()), int(segments.max())
             parts.append(f"level {level}: " + (f"segments {first}-{last}" if first < last else f"segment {first}"))
-        if self._damaged_from < self.level_count:
+        if self._damaged_from < self._level_count:
             parts.append(f"damaged from level {self._damaged_from}")
-        if not parts and self._lacks(ct.ATTRIBUTE):
+        if not parts and self._chunks.lacks(ct.ATTRIBUTE):
             parts.append("attributes behind the motion")
         if self.rest_is_missing:
             parts.append("rest pose of the source")
-        if not self.complete and not parts:
+        if not self._bytes.complete and not parts:
             parts.append("what is behind the motion")
         return "; ".join(parts)
 
     def _level_end(self, level: int) -> int:
         """Return the bytes of the file cut off after a level."""
-        kind = self._table["kind"]
-        kept = ct.is_prelude(kind) | (ct.is_motion(kind) & (self._table["level"] <= level))
+        kind = self._chunks.table["kind"]
+        kept = ct.is_prelude(kind) | (ct.is_motion(kind) & (self._chunks.table["level"] <= level))
         return int(self._ends[kept].max())
 
     @cached_property
     def branches(self) -> np.ndarray:
         """Records of the branches in file order, (B,) of _native.BRANCH."""
-        return self.core.branches()
+        return self._core.branches()
 
     def nodes_at(self, level: int) -> int:
         """Return the number of parts at a stored level: exact stems, and subtrees that move as one."""
-        parts = self.core.cut(self.checked_level(level))
+        parts = self._core.cut(self.checked_level(level))
         return len(self.exact_branches(parts)) + int((parts["branch"] >= 0).sum())
 
     def exact_branches(self, parts: np.ndarray) -> np.ndarray:
@@ -205,32 +219,27 @@ class FileTables(ChunkFile):
         ends = np.append(runs["first"] + runs["count"], 0)  # Index -1 stands for branches before the first run.
         return np.flatnonzero(self.branches["first"] < ends[run])
 
-    @property
-    def levels(self) -> list[Level]:
-        """The stored levels, coarse to fine, with their errors in all clips."""
-        return self.levels_in(range(self.segment_count))
-
     def levels_in(self, segments: range) -> list[Level]:
         """Return the stored levels, coarse to fine, with their errors in some segments of the whole file."""
         return [
             Level(
                 level,
-                self.core.level_name(level),
+                self._core.level_name(level),
                 self.nodes_at(level),
                 self._level_end(level),
-                *self.core.level_error(level, segments),
+                *self._core.level_error(level, segments),
                 self.available(level),
             )
-            for level in range(self.level_count)
+            for level in range(self._level_count)
         ]
 
     @cached_property
     def errors(self) -> np.ndarray:
         """Errors of each level in each segment, (levels, segments, 3) float64, scene units: largest, 99th percentile,
         root mean square."""
-        return self.core.errors()
+        return self._core.errors()
 
     @property
     def joins(self) -> np.ndarray:
         """How each segment goes on from the end of the one before it, (levels, segments) uint8; 0: it does not."""
-        return self.core.joins()
+        return self._core.joins()

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from athcodec.decoding import core_file
-from athcodec.decoding.chunk_file import ChunkFile
+from athcodec.decoding.file_bytes import FileBytes
 from athcodec.errors import LimitExceeded
 from athcodec.files.threads import ThreadPool, default_jobs
 from athcodec.options import whole
@@ -18,17 +18,20 @@ Show: TypeAlias = Callable[[int, core_file.Segment], None]
 Room: TypeAlias = Callable[[int], np.ndarray | None]
 
 
-class SegmentDecoder(ChunkFile):
-    """A file whose segments can be decoded within the memory that its limits allow."""
+class SegmentDecoder:
+    """The segments of a file, which are decoded within the memory that its limits allow."""
+
+    def __init__(self, file_bytes: FileBytes) -> None:
+        self._bytes, self._core, self._limits = file_bytes, file_bytes.core, file_bytes.limits
 
     @cached_property
     def _work(self) -> core_file.Work:
-        return core_file.Work(self.core.work_size())
+        return core_file.Work(self._core.work_size())
 
     def prefetch(self, segments: range, level: int) -> None:
         """Fetch what segments of the whole file need at a level from a remote source."""
-        with self._lock:
-            self._announce(self.core.missing(level, segments[0], segments[-1]))
+        with self._bytes.lock:
+            self._bytes.announce(self._core.missing(level, segments[0], segments[-1]))
 
     def prepare(
         self, segment: int, level: int, spare: core_file.Segment | None = None, to: np.ndarray | None = None
@@ -63,19 +66,19 @@ class SegmentDecoder(ChunkFile):
         """
         segment, level = whole("segment", segment), whole("level", level)
         what = f"level {level}, segment {segment}"
-        size = self.core.segment_size(level) if to is None else self.core.segment_size_to(segment, level)
+        size = self._core.segment_size(level) if to is None else self._core.segment_size_to(segment, level)
         needed = self._checked_need(level, what)
         before = joined_to = None
-        if spare and needed + len(spare.memory) <= self.limits.memory_bytes:
-            if self.core.goes_on(spare, segment, level):
+        if spare and needed + len(spare.memory) <= self._limits.memory_bytes:
+            if self._core.goes_on(spare, segment, level):
                 before = spare
-            elif self.core.is_ready(spare, self.core.joined_to(segment, level), level):
+            elif self._core.is_ready(spare, self._core.joined_to(segment, level), level):
                 joined_to = spare
         is_free = spare and not before and not joined_to and len(spare.memory) >= size
         ready = spare if spare and is_free else core_file.Segment(size)
-        with self._lock, self._fed(self._missing(segment, level, before, joined_to), what):
+        with self._bytes.lock, self._bytes.fed(self._missing(segment, level, before, joined_to), what):
             self._refine(level)
-            self.core.prepare(self._work, segment, level, ready, before, joined_to, to)
+            self._core.prepare(self._work, segment, level, ready, before, joined_to, to)
         return ready
 
     def show_all(self, segments: range, level: int, show: Show, room: Room) -> None:
@@ -86,7 +89,7 @@ class SegmentDecoder(ChunkFile):
         over. Raises as `prepare`.
         """
         what = f"level {level}, segments {segments.start} to {segments.stop - 1}"
-        with self._lock, self._fed(self.core.missing(level, segments[0], segments[-1]), what):
+        with self._bytes.lock, self._bytes.fed(self._core.missing(level, segments[0], segments[-1]), what):
             self._refine(level)
             follows, runs = self._runs(segments, level, what)
             items = [(run, level, follows, show, room) for run in runs]
@@ -96,7 +99,7 @@ class SegmentDecoder(ChunkFile):
 
     def _checked_need(self, level: int, what: str) -> int:
         """Return the bytes that preparing a segment takes. Raises LimitExceeded if they are not allowed."""
-        needed, limit = self.core.segment_size(level) + self.core.work_size(), self.limits.memory_bytes
+        needed, limit = self._core.segment_size(level) + self._core.work_size(), self._limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"{what}: got a need of {needed} bytes; the limit is {limit}")
         return needed
@@ -106,8 +109,8 @@ class SegmentDecoder(ChunkFile):
 
         The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
         """
-        joined = any(self.core.joined_to(segment, level) >= 0 for segment in segments)
-        size, limit, needed = self.core.segment_size(level), self.limits.memory_bytes, self._checked_need(level, what)
+        joined = any(self._core.joined_to(segment, level) >= 0 for segment in segments)
+        size, limit, needed = self._core.segment_size(level), self._limits.memory_bytes, self._checked_need(level, what)
         follows = joined and needed + size <= limit
         room = limit // (needed + size if follows else needed)
         count = max(1, min(default_jobs(), len(segments) // (2 if joined else 1), room))
@@ -116,16 +119,16 @@ class SegmentDecoder(ChunkFile):
 
     def _show_run(self, run: range, level: int, follows: bool, show: Show, room: Room) -> core_file.CoreError | None:
         """Return a fault rather than raise it, because the other runs need the file's bytes until they end."""
-        work, full = core_file.Work(self.core.work_size()), self.core.segment_size(level)
-        size = max(full if room(segment) is None else self.core.segment_size_to(segment, level) for segment in run)
+        work, full = core_file.Work(self._core.work_size()), self._core.segment_size(level)
+        size = max(full if room(segment) is None else self._core.segment_size_to(segment, level) for segment in run)
         ready, spare = core_file.Segment(size), None
         for segment in run:
             joined_to = None
-            if follows and segment > run.start and self.core.joined_to(segment, level) == segment - 1:
+            if follows and segment > run.start and self._core.joined_to(segment, level) == segment - 1:
                 joined_to, ready = ready, spare or core_file.Segment(size)
                 spare = joined_to
             try:
-                self.core.prepare(work, segment, level, ready, joined_to=joined_to, to=room(segment))
+                self._core.prepare(work, segment, level, ready, joined_to=joined_to, to=room(segment))
             except core_file.CoreError as fault:
                 return fault
             if not ready.gone:
@@ -134,16 +137,16 @@ class SegmentDecoder(ChunkFile):
 
     def _refine(self, level: int) -> None:
         """Build what the segments share at a level, whose bytes are there."""
-        needed, limit = self.core.refinement_size(level), self.limits.memory_bytes
+        needed, limit = self._core.refinement_size(level), self._limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
-        self.core.refine(level)
+        self._core.refine(level)
 
     def _missing(
         self, segment: int, level: int, before: core_file.Segment | None, joined_to: core_file.Segment | None
     ) -> list[tuple[int, int]]:
         if not before and not joined_to:
-            return self.core.missing(level, segment)
-        ranges = self.core.missing_of(segment, level, self.core.level_of(before) if before else -1)
-        neighbour = -1 if joined_to else self.core.joined_to(segment, level)
-        return ranges if neighbour < 0 else sorted(ranges + self.core.missing_of(neighbour, level))
+            return self._core.missing(level, segment)
+        ranges = self._core.missing_of(segment, level, self._core.level_of(before) if before else -1)
+        neighbour = -1 if joined_to else self._core.joined_to(segment, level)
+        return ranges if neighbour < 0 else sorted(ranges + self._core.missing_of(neighbour, level))

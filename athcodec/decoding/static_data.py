@@ -12,103 +12,64 @@ import numpy as np
 
 from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
+from athcodec.decoding.chunks import Chunks
+from athcodec.decoding.file_bytes import FileBytes
 from athcodec.decoding.file_tables import FileTables
 from athcodec.decoding.host_mesh import HostMesh, mesh_positions
-from athcodec.errors import BadChunk, LevelUnavailable, LimitExceeded, Truncated
+from athcodec.errors import BadChunk, LimitExceeded, Truncated
 from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
-from athcodec.motion.units import LengthLike, length_of, scene_unit
 
 CUBE_CORNER = 3**0.5 / 2  # Largest distance of a point from the nearest one of a cubic lattice, in its steps.
 _SOURCE_REST = struct.Struct("<Bf")  # Is_Exact and Rest_Step of FORMAT.md.
 
 
-class StaticData(FileTables):
-    """A file whose static data can be read."""
+class StaticData:
+    """What a file holds beside motion; each part is read when it is asked for."""
 
-    _rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
-    host_mesh: np.ndarray | None = None  # Positions of the host's mesh that was set, (N, 3) float32.
+    def __init__(self, file_bytes: FileBytes, chunks: Chunks, tables: FileTables) -> None:
+        self._bytes, self._chunks, self._tables = file_bytes, chunks, tables
+        self._core, self._limits = file_bytes.core, file_bytes.limits
+        self._rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
+        self.host_mesh: np.ndarray | None = None  # Positions of the host's mesh that was set, (N, 3) float32.
+        self.host_files: frozenset[tuple[int, int]] = frozenset()  # The files that the host's mesh was read from.
 
     @cached_property
     def metadata(self) -> dict[str, Any]:
         """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
-        chunk = self.find(ct.METADATA)
-        return ct.parse_metadata(self.payload(chunk), self.limits) if chunk else {}
+        chunk = self._chunks.find(ct.METADATA)
+        return ct.parse_metadata(self._chunks.payload(chunk), self._limits) if chunk else {}
 
     def private_chunks(self, name: str) -> list[bytes]:
-        """Return the chunks that another program added under a name (FORMAT.md, "Chunk table", private kinds).
-
-        Parameters
-        ----------
-        name : str
-            The name of what they hold, which begins with a domain, backwards: "org.example.leaf_age".
-
-        Returns
-        -------
-        list of bytes
-            Their contents in file order; none if METADATA does not have the name.
-
-        Raises
-        ------
-        Truncated
-            If the file was cut off before one of them.
-        BadChecksum
-            If one is damaged.
-        """
+        """Return the contents of private chunks of a name, in file order. Raises Truncated, BadChecksum."""
         named = self.metadata.get(ct.PRIVATE_KINDS)
         kinds = {kind for kind, stated in named.items() if stated == name} if isinstance(named, dict) else set()
-        private = (chunk for chunk in self.all_chunks if chunk.kind >= ct.FIRST_PRIVATE)
-        return [self.payload(chunk) for chunk in private if f"{chunk.kind:04X}" in kinds]
-
-    def level_within(self, max_error: LengthLike, segments: range | None = None) -> int:
-        """Return the coarsest stored level whose largest error is at most `max_error`.
-
-        Parameters
-        ----------
-        max_error : float or str
-            Scene units, or text such as "5cm".
-        segments : range, optional
-            Numbers of segments in the whole file; by default all.
-
-        Returns
-        -------
-        int
-            Number of the level.
-
-        Raises
-        ------
-        LevelUnavailable
-            If the deepest level's largest error is above it.
-        BoundError
-            If it is text that is no length, or has a unit and the file states none.
-        """
-        segments = segments or range(self.segment_count)
-        wanted = length_of(max_error, "max_error")
-        length = wanted.in_scene_units(scene_unit(self.metadata))
-        largest = self.errors[:, segments.start : segments.stop, 0].max(axis=1)
-        if not (within := np.flatnonzero(largest <= length)).size:
-            raise LevelUnavailable(f"max_error: got {wanted}; expected at least {largest.min():.4g} scene units")
-        return int(within[0])
+        private = (chunk for chunk in self._chunks.all if chunk.kind >= ct.FIRST_PRIVATE)
+        return [self._chunks.payload(chunk) for chunk in private if f"{chunk.kind:04X}" in kinds]
 
     # ---- branches ----
 
     @cached_property
     def places(self) -> Places:
         """Which vertices are at one place."""
-        info = self.core.info
+        info = self._core.info
         if info.place_count == info.vertex_count:
             return Places.apart(info.vertex_count)
-        return Places.of_labels(self.core.vertex_places())
+        return Places.of_labels(self._core.vertex_places())
 
     @cached_property
     def place_hierarchy(self) -> Hierarchy:
         """The branches in file order with a vertex for each place, which is what the file codes."""
         number = np.empty(self.places.count, np.int32)
-        number[self.core.vertex_places()[self.places.first]] = np.arange(self.places.count)
+        number[self._core.vertex_places()[self.places.first]] = np.arange(self.places.count)
         return Hierarchy.from_parts(
-            self.branches["parent"], self.branches["count"], self.branches["attach"], number, self.core.branch_source()
+            self._tables.branches["parent"],
+            self._tables.branches["count"],
+            self._tables.branches["attach"],
+            number,
+            self._core.branch_source(),
         )
 
     @cached_property
@@ -116,19 +77,19 @@ class StaticData(FileTables):
         """The branches in file order with all vertices, of which those at one place follow each other."""
         if not self.places.are_shared:
             return self.place_hierarchy
-        starts, attach = self.place_starts, self.branches["attach"]
+        starts, attach = self.place_starts, self._tables.branches["attach"]
         return Hierarchy.from_parts(
-            self.branches["parent"],
-            np.diff(starts[np.append(self.branches["first"], self.places.count)]),
+            self._tables.branches["parent"],
+            np.diff(starts[np.append(self._tables.branches["first"], self.places.count)]),
             np.where(attach < 0, -1, starts[attach]),
-            np.argsort(self.core.vertex_places(), kind="stable"),
-            self.core.branch_source(),
+            np.argsort(self._core.vertex_places(), kind="stable"),
+            self._core.branch_source(),
         )
 
     @cached_property
     def place_starts(self) -> np.ndarray:
         """The number in `hierarchy` of the first vertex of each place in file order, and of all vertices, (P + 1,)."""
-        return np.append(0, np.cumsum(np.bincount(self.core.vertex_places())))
+        return np.append(0, np.cumsum(np.bincount(self._core.vertex_places())))
 
     @cached_property
     def _source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -161,8 +122,8 @@ class StaticData(FileTables):
     def faces(self) -> np.ndarray | None:
         """Vertex numbers of the corners, (F, k) of the source's integer type, or None; faces of different sizes are
         attributes. If the file has none and is in a GLB, the triangles there."""
-        if self.find(ct.FACES) is None:
-            return getattr(self._source, "faces", None)
+        if self._chunks.find(ct.FACES) is None:
+            return getattr(self._bytes.source, "faces", None)
         return None if self._polygons is None or self._polygons.counts is not None else self._polygons.rows
 
     @cached_property
@@ -178,30 +139,30 @@ class StaticData(FileTables):
         return self._indices(ct.FACES)
 
     def _indices(self, kind: int) -> Polygons | None:
-        chunk = self.find(kind)
+        chunk = self._chunks.find(kind)
         if chunk is None:
             return None
-        with self._lock, self._fed([(chunk.offset, chunk.length)], str(chunk)):
-            return self.core.polygons(kind, self.limits.corners)
+        with self._bytes.lock, self._bytes.fed([(chunk.offset, chunk.length)], str(chunk)):
+            return self._core.polygons(kind, self._limits.corners)
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
         """Named static arrays, unchanged. Those that a cut-off file lacks are left out."""
         faces = self._polygons
         result: dict[str, np.ndarray] = {} if faces is None or faces.counts is None else faces.attributes
-        for chunk in self._chunks_of(ct.ATTRIBUTE):
-            if not self.is_available(chunk):
+        for chunk in self._chunks.of_kind(ct.ATTRIBUTE):
+            if not self._chunks.is_available(chunk):
                 continue
-            if len(result) >= self.limits.attributes:
-                raise LimitExceeded(f"{chunk}: got more than {self.limits.attributes} attributes")
-            name, array = ct.parse_array(self.payload(chunk), str(chunk), self.limits)
+            if len(result) >= self._limits.attributes:
+                raise LimitExceeded(f"{chunk}: got more than {self._limits.attributes} attributes")
+            name, array = ct.parse_array(self._chunks.payload(chunk), str(chunk), self._limits)
             if name in result:
                 raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice")
             result[name] = array
             total = sum(array.nbytes for array in result.values())
-            if total > self.limits.memory_bytes:
+            if total > self._limits.memory_bytes:
                 raise LimitExceeded(
-                    f"{chunk}: got {total} bytes of attributes; the limit is {self.limits.memory_bytes}"
+                    f"{chunk}: got {total} bytes of attributes; the limit is {self._limits.memory_bytes}"
                 )
         return result
 
@@ -214,7 +175,7 @@ class StaticData(FileTables):
         """
         name = self.metadata.get(ERROR_WEIGHTS)
         array = self.attributes.get(name) if isinstance(name, str) else None
-        if array is None or array.size != self.core.info.vertex_count or array.dtype.kind not in "biuf":
+        if array is None or array.size != self._core.info.vertex_count or array.dtype.kind not in "biuf":
             return None
         weights = array.reshape(-1).astype(np.float64)
         return weights if np.isfinite(weights).all() and weights.min() > 0 else None
@@ -225,21 +186,22 @@ class StaticData(FileTables):
     def rest(self) -> np.ndarray:
         """Rest pose of the source as decoded with the deepest complete level, (N, 3), float32 or float64 as in the
         source. If the source had none, or `rest_is_missing`, the reference pose of that level."""
-        level = max(self._first_lacking - 1, 0)
-        return self._as_rest(self.level_rest(level)) if self.rest_is_missing else self.rest_at(level)
+        level = max(self._tables.first_lacking - 1, 0)
+        return self._as_rest(self.level_rest(level)) if self._tables.rest_is_missing else self.rest_at(level)
 
     def rest_at(self, level: int) -> np.ndarray:
         """Return the rest pose as decoded with a stored level. Raises Truncated if `rest_is_missing`,
         LevelUnavailable."""
-        if self.rest_is_missing:
+        if self._tables.rest_is_missing:
             raise Truncated(
-                f"SOURCE_REST: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+                f"SOURCE_REST: not in the file; it is cut off at {self._bytes.available_length} of "
+                f"{self._bytes.file_length} bytes"
             )
-        level = self.checked_level(level)
+        level = self._tables.checked_level(level)
         level_read, pose = self._rest_read
         if level_read != level:
             with self._poses_read(level, [ct.SOURCE_REST]):
-                pose = self._as_rest(self.core.rest(level))
+                pose = self._as_rest(self._core.rest(level))
             self._rest_read = level, pose
         return pose.copy()
 
@@ -247,10 +209,10 @@ class StaticData(FileTables):
     def rest_error(self) -> float:
         """How far a vertex of `rest` may be from the source's rest pose where that is stored apart from the reference
         pose, scene units; 0 if it is exact or is the reference pose, which is within the bound."""
-        chunk = self.find(ct.SOURCE_REST)
-        if chunk is None or self.rest_is_missing:
+        chunk = self._chunks.find(ct.SOURCE_REST)
+        if chunk is None or self._tables.rest_is_missing:
             return 0.0
-        head = bytes(self.payload(chunk)[: _SOURCE_REST.size])
+        head = bytes(self._chunks.payload(chunk)[: _SOURCE_REST.size])
         if len(head) < _SOURCE_REST.size:
             raise BadChunk(f"{chunk}: got {len(head)} bytes; expected at least {_SOURCE_REST.size}")
         is_exact, step = _SOURCE_REST.unpack(head)
@@ -259,7 +221,7 @@ class StaticData(FileTables):
     def _as_rest(self, pose: np.ndarray) -> np.ndarray:
         """Return a pose in the source's type; numbers beyond float32 become infinite, as FORMAT.md rounds."""
         with np.errstate(over="ignore"):
-            return pose.astype(np.float64 if self.core.info.rest_is_float64 else np.float32, copy=False)
+            return pose.astype(np.float64 if self._core.info.rest_is_float64 else np.float32, copy=False)
 
     def level_rest(self, level: int, order: int = core_file.SOURCE_ORDER) -> np.ndarray:
         """Return the reference pose of a level, which its maps move: the source's rest pose, or another that the motion
@@ -268,19 +230,21 @@ class StaticData(FileTables):
         It is (N, 3) float64, scene units, not rounded to the source's type, in core_file.SOURCE_ORDER or FILE_ORDER.
         Raises LevelUnavailable, FormatError.
         """
-        level = self.checked_level(level)
+        level = self._tables.checked_level(level)
         with self._poses_read(level):
-            return self.core.level_rest(level, order)
+            return self._core.level_rest(level, order)
 
     @contextmanager
     def _poses_read(self, level: int, kinds: Sequence[int] = ()) -> Iterator[None]:
         """Give the core the reference poses up to a level's, and the chunks of these kinds, while the context lasts."""
-        with self._lock:
+        with self._bytes.lock:
             chunks = [
-                chunk for chunk in self._chunks_of(ct.REFINED_REST) if self.core.poses_read < chunk.level <= level
+                chunk for chunk in self._chunks.of_kind(ct.REFINED_REST) if self._core.poses_read < chunk.level <= level
             ]
-            chunks += [chunk for kind in kinds for chunk in self._chunks_of(kind)]
-            with self._fed([(chunk.offset, chunk.length) for chunk in chunks], f"reference pose of level {level}"):
+            chunks += [chunk for kind in kinds for chunk in self._chunks.of_kind(kind)]
+            with self._bytes.fed(
+                [(chunk.offset, chunk.length) for chunk in chunks], f"reference pose of level {level}"
+            ):
                 yield
 
     # ---- the host's mesh ----
@@ -289,36 +253,25 @@ class StaticData(FileTables):
     def host_checksum(self) -> str | None:
         """The checksum, 16 hexadecimal digits, of the host's mesh that is the rest pose; None if the file holds a rest
         pose."""
-        info = self.core.info
+        info = self._core.info
         return "{:08x}{:08x}".format(*info.host_checksum) if info.rest_is_host else None
 
     @property
     def needs_host_mesh(self) -> bool:
         """Whether the rest pose is a mesh of the host's that has not been set. Nothing can be decoded then."""
-        return not self.core.has_rest
+        return not self._core.has_rest
 
     def set_host_mesh(self, mesh: HostMesh) -> None:
-        """Set the mesh that the file was made for, if the file does not hold the rest pose; others ignore it.
+        """Set the mesh of the host that is the rest pose; nothing happens if the file holds one or has got it.
 
-        Parameters
-        ----------
-        mesh : (N, 3) array or MotionClip
-            Positions in the source's order, scene units and axes, which are used as float32, bit for bit; or a clip
-            that has them as its rest pose.
-
-        Raises
-        ------
-        WrongHostMesh
-            If it is another mesh, by its number of vertices or its checksum.
-        ClipError
-            If it is no mesh.
+        Raises WrongHostMesh, ClipError.
         """
         if self.needs_host_mesh:
             positions, files = mesh_positions(mesh)
-            self.inputs |= files
+            self.host_files |= files
             try:
-                with self._lock:
-                    self.core.set_host_mesh(positions)
+                with self._bytes.lock:
+                    self._core.set_host_mesh(positions)
                     self.host_mesh = positions
             except core_file.CoreError as error:
-                raise self._refusal(error) from None
+                raise self._bytes.refusal(error) from None

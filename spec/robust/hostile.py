@@ -68,7 +68,7 @@ def within_limits(data: bytes) -> int:
 def _whole_clip(data: bytes) -> int:
     """Bytes of all positions, which `use` reads as float64."""
     try:
-        header = AthFile(BytesIO(data), limits=LIMITS).header
+        header = AthFile(BytesIO(data), limits=LIMITS).tables.header
     except FormatError:
         return 0
     return 2 * 24 * header.vertex_count * header.frame_count
@@ -189,7 +189,7 @@ def seconds_and_bytes(data: bytes) -> tuple[float, int]:
     taken = time.perf_counter() - start
     work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.file.level_count - 1)
     own = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
-    own += CHUNK_BYTES * decoder.file.header.chunk_count
+    own += CHUNK_BYTES * decoder.file.tables.header.chunk_count
     return taken, len(data) + given + decoder.file.rest.nbytes + own
 
 

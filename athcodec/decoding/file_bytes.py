@@ -1,4 +1,4 @@
-"""The bytes and chunks of an .ath file: what is there of them, undamaged, and how the C core gets them."""
+"""The bytes of an .ath file: where they come from, which are there, and how the C core gets them."""
 
 from __future__ import annotations
 
@@ -7,15 +7,11 @@ import os
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from functools import cached_property
 from typing import Any, BinaryIO, TypeAlias
 
-import numpy as np
-
 from athcodec._native import as_bytes
-from athcodec.decoding import container as ct
 from athcodec.decoding import core_file
-from athcodec.decoding.container import Chunk, Limits
+from athcodec.decoding.container import Limits
 from athcodec.errors import (
     BadChecksum,
     ClipError,
@@ -34,92 +30,82 @@ from athcodec.files.shown import redacted
 
 Openable: TypeAlias = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO
 """A path, a URL, the bytes of a file, or a file object."""
-KNOWN_KINDS = np.isin(np.arange(1 << 16), list(ct.KIND_NAMES))
-CHUNK_FIELDS = ("kind", "level", "segment", "length", "checksum", "offset")
 
 
-class ChunkFile:
-    """An opened file that reads its chunks and feeds them to the C core. AthFile documents the attributes."""
+class FileBytes:
+    """An opened source of bytes, and the core's file that it feeds. AthFile documents the attributes.
+
+    Whoever reads or feeds holds `lock`.
+    """
 
     is_closed = False  # Whether `close` has closed the file; a file object of a caller stays open.
 
-    def __init__(
-        self, path: Any, strict: bool, allow_partial: bool, limits: Limits | None, gltf_motion: str | None
-    ) -> None:
+    def __init__(self, path: Any, strict: bool, limits: Limits | None, gltf_motion: str | None) -> None:
         self.limits = limits or Limits()
         self.bytes_read = 0
-        self._lock = threading.Lock()
-        self._closes_source = not hasattr(path, "read")
-        self._source = _opened(path, gltf_motion)
+        self.lock = threading.Lock()
+        self.closes_source = not hasattr(path, "read")
+        self.source = _opened(path, gltf_motion)
         self._name = redacted(os.fspath(path)) if isinstance(path, (str, os.PathLike)) else ""
         self.inputs = file_ids(path if isinstance(path, (str, os.PathLike)) else getattr(path, "name", None))
         try:
-            self.available_length: int = self._source.seek(0, os.SEEK_END)
+            self.available_length: int = self.source.seek(0, os.SEEK_END)
             self.core = self._open_core()
             self.file_length: int = self.core.info.file_length
-            self.prelude_length: int = self.core.info.prelude_length
-            self.segment_count: int = self.core.info.segment_count
-            self.level_count: int = self.core.info.level_count
-            self.full_level_count: int = self.core.info.full_level_count
             self.complete: bool = self.available_length >= self.file_length
             if strict and self.available_length != self.file_length:
                 refused = TrailingBytes if self.complete else Truncated
                 raise refused(f"file: got {self.available_length} bytes; expected {self.file_length}")
-            self._damaged_from = self._first_damaged_level() if allow_partial else self.level_count
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Close the file, if it was opened here, as soon as no thread reads from it."""
-        if self._closes_source:
-            with self._lock:
-                self._source.close()
+        if self.closes_source:
+            with self.lock:
+                self.source.close()
                 self.is_closed = True
 
     def __del__(self) -> None:
         """Close a file that nobody can read from any more, as h5py does."""
-        if getattr(self, "_closes_source", False) and hasattr(self, "_source"):
-            self._source.close()
+        if getattr(self, "closes_source", False) and hasattr(self, "source"):
+            self.source.close()
 
     @property
     def name(self) -> str:
         """The path or URL of the file, or the name of a file object; "file" if it has none."""
-        stated = self._name or getattr(self._source, "name", None)
+        stated = self._name or getattr(self.source, "name", None)
         return stated if isinstance(stated, str) and stated else "file"
-
-    @property
-    def source(self) -> Any:
-        """The file object that the bytes come from. That of a URL counts its `requests` and `bytes`."""
-        return self._source
 
     # ---- bytes ----
 
     def whole(self) -> bytes:
         """Return all bytes of the file that are there."""
-        with self._lock:
+        with self.lock:
             return self._read_some(0, self.available_length)
 
     def _read_some(self, offset: int, length: int) -> bytes:
         """Return `length` bytes, or fewer at the end; a file object may give fewer at a time than it was asked for."""
-        self._source.seek(offset)
+        self.source.seek(offset)
         parts, size = [], 0
-        while size < length and (part := self._source.read(length - size)):
+        while size < length and (part := self.source.read(length - size)):
             parts.append(part)
             size += len(part)
         self.bytes_read += size
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
-    def _read(self, offset: int, length: int, what: str) -> bytes:
+    def read(self, offset: int, length: int, what: str) -> bytes:
+        """Return `length` bytes from an offset on. Raises Truncated, which names `what` is read, if fewer are there."""
         data = self._read_some(offset, length)
         if len(data) < length:
             raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
         return data
 
-    def _announce(self, ranges: list[tuple[int, int]]) -> None:
+    def announce(self, ranges: list[tuple[int, int]]) -> None:
         """Tell a remote source which (offset, size) are read next, so that it fetches them together."""
-        if hasattr(self._source, "prefetch"):
-            self._source.prefetch(ranges)
+        if hasattr(self.source, "prefetch"):
+            self.source.prefetch(ranges)
 
     def _open_core(self) -> core_file.File:
         limits, data = core_file.Limits.of(self.limits), b""
@@ -134,7 +120,7 @@ class ChunkFile:
                     needed, memory, lacking = core_file.front(data, limits)
             return core_file.File(data, memory, limits)
         except core_file.CoreError as error:
-            raise self._refusal(error) from None
+            raise self.refusal(error) from None
 
     def _no_ath_file(self) -> NotAnAthFile:
         """Return the exception for another file, which says what it looks like and how to encode it."""
@@ -148,101 +134,33 @@ class ChunkFile:
         names = f"{name!r}, {os.path.splitext(name)[0] + '.ath'!r}" if name else "PATH, 'a.ath'"
         return NotAnAthFile(message, python=f"athcodec.encode({names}) makes one", shell="use `athcodec encode` first")
 
-    def _refusal(self, error: core_file.CoreError) -> FormatError:
+    def refusal(self, error: core_file.CoreError) -> FormatError:
         """Return the exception for an error of the core. A bad checksum may be that of a remote file that changed."""
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
         if refused is NotAnAthFile:
             return self._no_ath_file()
         if refused is NeedsHostMesh:
             return refused(error, python="athcodec.open takes it as host_mesh", shell="--host-mesh names it")
-        return refused(f"{error}{getattr(self._source, 'change_hint', '') if refused is BadChecksum else ''}")
+        return refused(f"{error}{getattr(self.source, 'change_hint', '') if refused is BadChecksum else ''}")
 
     @contextmanager
-    def _fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
+    def fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
         """Give the core these bytes, (offset, size), for as long as the context lasts. Raises as `prepare`."""
         if any(offset + size > self.available_length for offset, size in ranges):
             raise LevelUnavailable(
                 f"{what}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
             )
-        self._announce(ranges)
-        pieces = [as_bytes(self._read(offset, size, f"bytes from {offset} on")) for offset, size in ranges]
+        self.announce(ranges)
+        pieces = [as_bytes(self.read(offset, size, f"bytes from {offset} on")) for offset, size in ranges]
         try:
             for (offset, _), data in zip(ranges, pieces):
                 self.core.feed(data, offset)
             yield
         except core_file.CoreError as error:
-            raise self._refusal(error) from None
+            raise self.refusal(error) from None
         finally:
             for offset, size in ranges:
                 self.core.drop(offset, size)
-
-    # ---- chunks ----
-
-    @cached_property
-    def _index(self) -> np.ndarray:
-        return np.flatnonzero(KNOWN_KINDS[self.core.chunks()["kind"]])  # Chunks of unknown kinds are left out.
-
-    @cached_property
-    def _table(self) -> np.ndarray:
-        return self.core.chunks()[self._index]
-
-    @cached_property
-    def chunks(self) -> list[Chunk]:
-        """The chunk table without unknown kinds, in file order."""
-        return self._chunks_at(self._index)
-
-    @property
-    def all_chunks(self) -> list[Chunk]:
-        """The chunk table, those of unknown optional kinds among it, in file order."""
-        return self._chunks_at(np.arange(len(self.core.chunks())))
-
-    def _chunks_of(self, kind: int) -> list[Chunk]:
-        return self._chunks_at(self._index[self._table["kind"] == kind])
-
-    def _chunks_at(self, indices: np.ndarray) -> list[Chunk]:
-        table = self.core.chunks()[indices]
-        columns = (table[name].tolist() for name in CHUNK_FIELDS)
-        return list(map(Chunk, *columns, indices.tolist(), table["stage"].tolist()))
-
-    def find(self, kind: int) -> Chunk | None:
-        """Return the first chunk of a kind (FORMAT.md, "Chunk table"), or None if the file has none."""
-        return next(iter(self._chunks_of(kind)), None)
-
-    def is_available(self, chunk: Chunk) -> bool:
-        """Return whether the bytes of a chunk, one of `chunks`, are there."""
-        return chunk.offset + chunk.length <= self.available_length
-
-    def _lacks(self, kind: int) -> bool:
-        """Return whether the file was cut off before a chunk of this kind."""
-        return not all(map(self.is_available, self._chunks_of(kind)))
-
-    def stored(self, chunk: Chunk) -> bytes:
-        """Return the bytes of a chunk as they stand, for one that is written to another file. Raises Truncated and, if
-        the kind is known, BadChecksum."""
-        if chunk.kind in ct.KIND_NAMES:
-            return self.payload(chunk)
-        with self._lock:
-            return self._read(chunk.offset, chunk.length, str(chunk))
-
-    def payload(self, chunk: Chunk) -> bytes:
-        """Return the stored bytes of a chunk, one of `all_chunks`. Raises Truncated, BadChecksum."""
-        with self._lock:
-            data = self._read(chunk.offset, chunk.length, str(chunk))
-            try:
-                self.core.check_chunk(chunk.index, chunk.offset, data)
-            except core_file.CoreError as error:
-                raise self._refusal(error) from None
-        return data
-
-    def _first_damaged_level(self) -> int:
-        self._announce([(0, self.file_length)])
-        for chunk in self.chunks:
-            if chunk.is_motion and self.is_available(chunk):
-                try:
-                    self.payload(chunk)
-                except BadChecksum:
-                    return chunk.level
-        return self.level_count
 
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:
