@@ -172,3 +172,36 @@ def test_a_plant_far_from_the_origin_has_exact_velocities(tmp_path, suffix):
         schema = AbcGeom.IPoints(place, Abc.WrapExistingFlag.kWrapExisting).getSchema()
         velocities = np.array([np.array(sample) for sample in schema.getVelocitiesProperty().samples])
     assert np.allclose(velocities, np.gradient(far, 1 / 30, axis=0), rtol=0, atol=1e-6)
+
+
+SHOWN = """
+fresh()
+scene = bpy.context.scene
+scene.render.fps, scene.render.fps_base = 24, 1.001
+if args["path"].endswith("abc"):
+    bpy.ops.wm.alembic_import(filepath=args["path"])
+else:
+    bpy.ops.wm.usd_import(filepath=args["path"])
+scene.frame_set(105)
+found = {}
+for thing in bpy.data.objects:
+    if thing.name.startswith("grid"):
+        mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        velocity = np.empty(3 * len(mesh.vertices), np.float32)
+        mesh.attributes["velocity"].data.foreach_get("vector", velocity)
+        matrix = np.array(thing.matrix_world)[:3, :3]
+        found[thing.name] = velocity.reshape(-1, 3) @ matrix.T
+save(**found)
+"""
+
+
+@pytest.mark.programs
+@pytest.mark.parametrize("suffix", ["abc", "usdc"])
+def test_blender_has_the_velocities_as_an_attribute_per_second(blender, plant, tmp_path, suffix):
+    out = tmp_path / f"b.{suffix}"
+    with athcodec.read(plant.with_suffix(".usdc"), only=["grid"]) as clip:
+        clip.metadata["unit"] = "m"  # Blender scales a stage in centimetres.
+        athcodec.write(clip, out, velocities=True)
+        frames = clip.block(3, 6).astype(float)
+    [shown] = blender.run(SHOWN, path=out).values()
+    assert np.allclose(shown, (frames[2] - frames[0]) * FPS / 2, rtol=1e-4, atol=1e-4)
