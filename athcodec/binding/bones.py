@@ -8,6 +8,7 @@ linear blending its place then follows, to first order at both ends, the cubic c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Bones:
     weight: np.ndarray
 
     @property
-    def slices(self) -> dict[str, list]:
+    def slices(self) -> dict[str, list[Any]]:
         """The bones that are slices: their numbers as "bone", how many vertices each follows as "count", and these
         vertices as "vertex", with their offsets (x, y, z) from the bone in the rest pose as "offset"."""
         chains = self.chains
