@@ -29,7 +29,7 @@ from bench.clips import files_of
 from bench.tables import table
 from bench.trees import exact
 from bench.trees.beams import bend
-from bench.trees.mesh import dress
+from bench.trees.mesh import SIDES, dress
 from bench.trees.plant import grow
 from bench.trees.wind import Wind
 
@@ -72,7 +72,11 @@ class Canopy:
         return plant.clip(moved, np.arange(self.frames) / FPS, FPS, **described)
 
     def make(self) -> athcodec.MotionClip:
-        return dress(self.skeleton(), self._wind, self.frames, self.leaves, self.seed, self.species)
+        return self.with_sides(SIDES)
+
+    def with_sides(self, sides: int) -> athcodec.MotionClip:
+        """Return the mesh with tubes of so many sides."""
+        return dress(self.skeleton(), self._wind, self.frames, self.leaves, self.seed, self.species, sides)
 
     @property
     def _wind(self) -> Wind:

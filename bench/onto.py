@@ -1,6 +1,7 @@
 """A mesh that moves by the file of a plant's skeleton: bytes and errors beside those of the mesh's own file.
 
-The canopies hang on the beams that were simulated, the Blender tree on the bones of its armature. The skeleton is
+The canopies hang on the beams that were simulated, the Blender tree on the bones of its armature, a scan of a small
+tree on beams too; and a canopy's coarse mesh on its fine one, a plant whose stems are surfaces. The skeleton is
 stored with its exact rest pose, on which the mesh lies. Errors are those of the mesh's vertices against their own
 motion; wood and leaves stand apart, because leaves in the wind flutter on hinges that no skeleton has.
 """
@@ -28,9 +29,15 @@ from bench.tables import ROOT, table
 from bench.trees.leaves import SPECIES, Leaves
 from bench.trees.mesh import Tubes
 from bench.trees.ride import Skeleton
+from bench.trees.scan import scanned, thickened
 
 CANOPIES = ("canopy_15k_200f", "canopy_67k_200f")
 ARMATURE = "blender_armature_tree"
+SCAN, SCANNED = "scan", data.Canopy(40, 1, 40, 2.0, 8.0, 0, "broadleaf", seed=5)
+THICKER = 4.0  # Girth of the stems of the scanned tree, over those of the simulation, so that a grid resolves twigs.
+CELL, NOISE = 0.016, 0.0003  # Metres.
+ON_MESH, SURFACE, COARSE_SIDES = "canopy_4k_on_its_mesh", "canopy_4k_60f", 4
+OTHERS = f"{ARMATURE}, {SCAN}, {ON_MESH}"
 TAIL = 0.999  # Quantile of edges whose stretch is stated.
 MOST_STRETCH = 0.02  # Stretch of edges at that quantile.
 JOINT = 1.0  # Distance of points of two pieces at a joint in the rest pose, in lengths of a median edge.
@@ -44,8 +51,9 @@ LIGHT = np.array([-0.4, 0.7, 0.6]) / np.linalg.norm([-0.4, 0.7, 0.6])
 NOTE = """
 Bytes of the skeleton's file and of the mesh's own file, both within the bound of their diagonals, the mesh without
 other attributes than faces. Errors in metres against the mesh's own motion, of wood and of leaves; size: the diagonal
-of the mesh. Stretch: |length / length at rest - 1| of edges at 99.9 %, as the mesh moves with the skeleton and in its
-own motion. Gap: by how much a stem and one that grows on it come apart at most where they touch at rest, in both.
+of the mesh. Stretch: |length / length at rest - 1| of edges at 99.9 %, as the mesh moves with the skeleton, in its own
+motion, and of the skeleton's own edges. Gap: by how much a stem and one that grows on it come apart at most where they
+touch at rest, in both. Bones of the mesh that --bind writes, and how far its skin is off the moved mesh at most.
 Seconds: to bind the mesh, and to move a frame.
 """
 
@@ -62,7 +70,11 @@ class Case:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "clips", nargs="*", default=(*CANOPIES, ARMATURE), metavar="CLIP", help="names of canopies, or " + ARMATURE
+        "clips",
+        nargs="*",
+        default=(*CANOPIES, ARMATURE, SCAN, ON_MESH),
+        metavar="CLIP",
+        help="names of canopies, or " + OTHERS,
     )
     add_rel_error(parser)
     parser.add_argument(
@@ -92,7 +104,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def case_of(name: str) -> Case:
-    """Return a canopy on its beams, or the Blender tree on its bones. Raises KeyError for other names."""
+    """Return a canopy on its beams, or one of OTHERS. Raises KeyError for other names."""
+    if name == SCAN:
+        beams = thickened(SCANNED.skeleton(), THICKER)
+        scan = scanned(beams, CELL, NOISE, SCANNED.seed)
+        return Case(name, beams, scan, np.ones(scan.vertex_count, bool))
+    if name == ON_MESH:
+        canopy = data.RECIPES[SURFACE]
+        assert isinstance(canopy, data.Canopy)
+        fine, coarse = athcodec.read(data.path_of(SURFACE)), canopy.with_sides(COARSE_SIDES)
+        return Case(name, fine, coarse, coarse.vertex_branch < fine.branch_count - canopy.leaves)
     if name == ARMATURE:
         path = data.path_of(name)
         mesh = athcodec.read(path)
@@ -101,7 +122,7 @@ def case_of(name: str) -> Case:
         return Case(name, bones(path, mesh), mesh, size[pieces.piece[pieces.of_vertex]] > 4)
     recipe = data.RECIPES[name]
     if not isinstance(recipe, data.Canopy):
-        raise KeyError(f"clip: got {name!r}, expected a canopy or {ARMATURE}")
+        raise KeyError(f"clip: got {name!r}, expected a canopy or {OTHERS}")
     beams = recipe.skeleton()
     mesh = athcodec.read(data.path_of(name))
     return Case(name, beams, mesh, mesh.vertex_branch < beams.branch_count)
@@ -156,7 +177,7 @@ def measured(case: Case, rel_error: float) -> dict[str, Any]:
             for first, block in moving.clip.blocks(8):
                 figures.add(block, case.mesh.block(first, first + len(block)))
             took = perf_counter() - bound
-            report = moving.report
+            report, bound_facts = moving.report, moving.write_bound(Path(folder, "bound.glb"))
         return {
             "clip": case.name,
             "nodes": case.skeleton.vertex_count,
@@ -168,6 +189,9 @@ def measured(case: Case, rel_error: float) -> dict[str, Any]:
             "far": report.far_count,
             "whole pieces": report.card_count,
             **figures.row(),
+            "skeleton stretch": _stretch(case.skeleton),
+            "bones": bound_facts["bones"],
+            "bones max": bound_facts["max_error"],
             "bind s": bound - start,
             "frame s": took / case.mesh.frame_count,
         }
@@ -206,9 +230,20 @@ class _Figures:
         wood, leaves = self._meters
         stretch, own = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
         row: dict[str, Any] = {"wood max": wood.max_error, "wood RMS": wood.rms_error}
-        row |= {"leaves max": leaves.max_error, "leaves RMS": leaves.rms_error}
+        has_leaves = not self._wood.all()
+        row |= {"leaves max": leaves.max_error if has_leaves else None}
+        row |= {"leaves RMS": leaves.rms_error if has_leaves else None}
         gaps = self._gaps if len(self._joints) else (None, None)
         return row | {"stretch": stretch, "own stretch": own, "gap": gaps[0], "own gap": gaps[1]}
+
+
+def _stretch(clip: athcodec.MotionClip) -> float:
+    """Return the stretch of a clip's own edges at the quantile TAIL."""
+    edges = edges_of(clip)
+    rest = _lengths(clip.rest[None], edges)[0]
+    edges, rest = edges[rest > 0], rest[rest > 0]
+    found = [np.abs(_lengths(block, edges) / rest - 1).astype(np.float32) for _, block in clip.blocks(8)]
+    return float(np.quantile(np.concatenate(found), TAIL))
 
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:

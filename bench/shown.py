@@ -116,7 +116,10 @@ def _onto(tables: dict[str, list[Row]]) -> list[Row]:
         {name: row[name] for name in ("clip", "nodes", "vertices", "frames")}
         | {"skeleton's file": row["skeleton bytes"], "mesh's own file": row["mesh bytes"], "diagonal": row["size"]}
         | {"wood, RMS": row["wood RMS"], "wood, max": row["wood max"], "leaves, RMS": row["leaves RMS"]}
-        | {name: row[name] for name in ("stretch", "own stretch", "gap", "own gap")}
+        | {name: row[name] for name in ("stretch", "own stretch")}
+        | {"skeleton's stretch": row["skeleton stretch"]}
+        | {name: row[name] for name in ("gap", "own gap", "bones")}
+        | {"bones, max": row["bones max"]}
         for row in tables["Onto"]
     ]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_gltf_programs import node  # noqa: F401, a fixture
-from test_onto import CARD, LENGTH, bent_clip, line, rows, tube
+from test_onto import CARD, LENGTH, bent_clip, coarse_surfaces, line, rows, surfaces, tube
 
 import athcodec
 from athcodec.viewer.build_viewer import modules
@@ -50,6 +50,19 @@ def test_one_file_moves_three_meshes_in_three_js_as_onto_does(bound, node):  # n
         off = np.linalg.norm(np.fromfile(out, "<f4").reshape(moved.shape) - moved, axis=2)
         assert facts["bones"] == 30 and off.max() <= expected["max_error"] + 1e-5
         assert np.median(off) < 1e-3 * np.abs(moved[-1] - moved[0]).max()
+
+
+@pytest.mark.programs
+def test_slices_of_surfaces_move_a_mesh_in_three_js_as_its_bones_say(tmp_path, node):  # noqa: F811
+    points, faces = coarse_surfaces()
+    athcodec.encode(surfaces(), tmp_path / "tree.ath", rel_error=1e-5, exact_rest=True)
+    with athcodec.open(tmp_path / "tree.ath") as plant, athcodec.onto(plant, points, faces=faces) as moving:
+        facts = moving.write_bound(tmp_path / "bound.glb")
+        moved = np.asarray(moving)
+    out = tmp_path / "out.bin"
+    node("bones.mjs", VIEWER, tmp_path / "tree.ath", tmp_path / "bound.glb", out)
+    off = np.linalg.norm(np.fromfile(out, "<f4").reshape(moved.shape) - moved, axis=2)
+    assert off.max() <= facts["max_error"] + 1e-5 < 1e-3 * np.abs(moved[-1] - moved[0]).max() + 1e-5
 
 
 @pytest.mark.programs

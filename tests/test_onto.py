@@ -381,13 +381,47 @@ def test_decode_binds_a_mesh_and_refuses_what_has_no_bones(files, capsys):
         assert message in capsys.readouterr().err
 
 
-def test_a_mesh_on_surfaces_is_not_bound(tmp_path):
-    points, quads = tube(0.0, LENGTH, 0.05, 41)
-    data = athcodec.encode(bent_clip(points, faces=quads), rel_error=1e-4, exact_rest=True)
-    with opened(data) as plant, athcodec.onto(plant, points, faces=quads) as moving:
-        with pytest.raises(ClipError, match="surfaces, expected stems"):
-            moving.write_bound(tmp_path / "bound.glb")
-    assert not list(tmp_path.iterdir())
+def surfaces():
+    """A clip of a tube that bends, one that grows on it, and a card that turns about its foot besides."""
+    trunk, quads = tube(0.0, LENGTH, 0.05, 41)
+    side, side_quads = tube(0.05, 0.9, 0.03, 20, axis=2, centre=(0.0, 1.0))
+    first = len(trunk) + len(side)
+    faces = np.concatenate([quads, len(trunk) + side_quads, [first + np.arange(4)]])
+    branch = np.repeat([0, 1, 2], [len(trunk), len(side), 4])
+    clip = bent_clip(
+        np.concatenate([trunk, side, CARD]), faces=faces, vertex_branch=branch, branch_parent=np.array([-1, 0, 0])
+    )
+    frames = np.array(clip.positions)
+    for frame, angle in enumerate(2 * ANGLES):
+        turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+        foot = frames[frame, first]
+        frames[frame, first:] = foot + (frames[frame, first:] - foot) @ turn.T
+    return clip.replace(positions=frames)
+
+
+def coarse_surfaces():
+    """The points and faces of a mesh of another tessellation, without the side stem."""
+    trunk, quads = tube(0.0, LENGTH, 0.05, 18)
+    return np.concatenate([trunk, CARD]), [*quads, len(trunk) + np.arange(4)]
+
+
+def test_a_mesh_on_surfaces_is_bound_to_their_slices(tmp_path):
+    points, faces = coarse_surfaces()
+    data = athcodec.encode(surfaces(), rel_error=1e-5, exact_rest=True)
+    with opened(data) as plant, athcodec.onto(plant, points, faces=faces) as moving:
+        facts = moving.write_bound(tmp_path / "bound.glb")
+        card, expected = moving[:, -4:], plant[:, -4:]
+    assert facts["bones"] < plant.file.vertex_count / 4  # The stem that moves nothing of the mesh has none.
+    assert facts["max_error"] < 1e-3 and np.abs(card - expected).max() < 2e-3
+    document, _ = apart((tmp_path / "bound.glb").read_bytes())
+    bones = document["nodes"][document["skins"][0]["skeleton"]]["extras"]["ATH_bones"]
+    slices = bones["slices"]
+    assert slices["bone"] == list(range(facts["bones"])) and set(bones["vertex"]) <= set(slices["vertex"])
+    # The vertices of a bone, at rest about it, are those of the plant.
+    bone = np.repeat(slices["bone"], slices["count"])
+    rest = np.array([document["nodes"][node]["translation"] for node in document["skins"][0]["joints"]])
+    places = rest[bone] + np.reshape(slices["offset"], (-1, 3))
+    np.testing.assert_allclose(places, surfaces().rest[slices["vertex"]], atol=1e-6)
 
 
 @pytest.mark.tools

@@ -211,8 +211,8 @@ class OntoMesh(ArrayLike):
     def write_bound(self, path: FilePath) -> dict[str, Any]:
         """Write the mesh as a GLB with a skin whose bones stand in the rest pose, for ATHBones of three.js.
 
-        Bones are the vertices of the plant's stems; ATHBones moves them by positions that are decoded from the .ath
-        file, so that one small file moves any number of meshes.
+        Bones are the vertices of the plant's stems, or slices of stems that are surfaces. ATHBones moves them by
+        positions that are decoded from the .ath file, so that one small file moves any number of meshes.
 
         Parameters
         ----------
@@ -228,7 +228,7 @@ class OntoMesh(ArrayLike):
         Raises
         ------
         ClipError
-            If branches that move the mesh are surfaces and no rows of points, or there are more than 65,536 bones.
+            If there are more than 65,536 bones.
         OSError
             If the file cannot be written.
         """
@@ -237,10 +237,9 @@ class OntoMesh(ArrayLike):
         bones = bones_of(self._chains, self._binding, self._points.of_vertex)
         rest, largest = np.asarray(self.clip.rest, np.float64), 0.0
         for start, block in self.clip.blocks():
-            pose = self._chains.pose(self._view.block(start, start + len(block)))
-            off = bones.skinned(pose, rest) - block
+            off = bones.skinned(self._view.block(start, start + len(block)), rest) - block
             largest = max(largest, float(np.sqrt((off**2).sum(axis=2).max())))
-        facts = {"bones": len(bones.vertex), "vertices": len(rest), "max_error": largest}
+        facts = {"bones": len(bones.rest), "vertices": len(rest), "max_error": largest}
         return facts | write_bound(self.clip, path, bones, facts | {"max_error_of_plant": self._chains.error})
 
     # ---- what is known of it ----

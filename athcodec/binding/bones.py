@@ -1,19 +1,22 @@
 """A mesh on a plant's chains as bones and weights, which engines skin: what `OntoMesh.write_bound` writes.
 
-A bone is a node of a stem. A point at a place along an element hangs on the bones at both ends by a smooth step: under
+A bone is a node of a stem: a vertex of a row of points, or a slice of a surface, which SLICE_VERTICES of its vertices
+stand for. A point at a place along an element hangs on the bones at both ends by a smooth step: under
 linear blending its place then follows, to first order at both ends, the cubic curve that `Chains.places` follows.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from athcodec.binding.chains import Chains, Pose, rotated
+from athcodec.binding.chains import Chains, rotated
 from athcodec.binding.search import Binding
 from athcodec.errors import ClipError
 
+SLICE_VERTICES = 8  # Vertices of a slice that its bone follows, at most.
 INFLUENCES = 4  # Bones of a vertex, as glTF and engines have them in one set.
 MOST_BONES = 65536
 
@@ -24,10 +27,10 @@ class Bones:
 
     Attributes
     ----------
-    node : (J,) int64
-        The node of the chains that each bone is.
+    chains : Chains
+        The nodes that the bones are.
     vertex : (J,) int64
-        The vertex of the plant, in the source's order, whose place the bone has.
+        The vertex of the plant, in the source's order, whose place the bone has; of a slice one of its vertices.
     before, after : (J,) int64
         The bones that come before and after it along its stem, the foot's on the parent's stem; -1 for none.
     side : (J,) bool
@@ -40,7 +43,7 @@ class Bones:
         Their weights, which add up to 1.
     """
 
-    node: np.ndarray
+    chains: Chains
     vertex: np.ndarray
     before: np.ndarray
     after: np.ndarray
@@ -49,13 +52,29 @@ class Bones:
     joint: np.ndarray
     weight: np.ndarray
 
-    def skinned(self, pose: Pose, points: np.ndarray) -> np.ndarray:
-        """Return vertices (k, V, 3) that are at `points` (V, 3) in the rest pose, as an engine skins them."""
-        moved = np.zeros((len(pose.centre), *points.shape))
+    @property
+    def slices(self) -> dict[str, list[Any]]:
+        """The bones that are slices: their numbers as "bone", how many vertices each follows as "count", and these
+        vertices as "vertex", with their offsets (x, y, z) from the bone in the rest pose as "offset"."""
+        chains = self.chains
+        bones = np.flatnonzero(~chains.is_line[chains.node_branch]).tolist()
+        vertices = [chains.vertices_of(bone) for bone in bones]
+        off = [chains.vertex_rest[each] - self.rest[bone] for bone, each in zip(bones, vertices)]
+        return {
+            "bone": bones,
+            "count": [len(each) for each in vertices],
+            "vertex": [vertex for each in vertices for vertex in each.tolist()],
+            "offset": [float(f"{number:.7g}") for each in off for number in each.reshape(-1).tolist()],
+        }
+
+    def skinned(self, frames: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return vertices (k, V, 3) that are at `points` (V, 3) in the rest pose, as an engine skins them in frames
+        (k, N, 3) of the plant."""
+        pose = self.chains.pose(frames)
+        moved = np.zeros((len(frames), *points.shape))
         for joint, weight in zip(self.joint.T, self.weight.T):
-            node = self.node[joint]
-            off = pose.size[:, node, None] * rotated(pose.turn[:, node], points - self.rest[joint])
-            moved += weight[:, None] * (pose.centre[:, node] + off)
+            off = pose.size[:, joint, None] * rotated(pose.turn[:, joint], points - self.rest[joint])
+            moved += weight[:, None] * (pose.centre[:, joint] + off)
         return moved
 
 
@@ -65,7 +84,7 @@ def bones_of(chains: Chains, binding: Binding, of_vertex: np.ndarray) -> Bones:
     Parameters
     ----------
     chains : Chains
-        The plant, whose branches that move any of the mesh are rows of points.
+        The plant.
     binding : Binding
         What moves each point of the mesh.
     of_vertex : (V,) array of integers
@@ -74,31 +93,26 @@ def bones_of(chains: Chains, binding: Binding, of_vertex: np.ndarray) -> Bones:
     Raises
     ------
     ClipError
-        If a branch that moves the mesh is a surface, or there are more than MOST_BONES bones.
+        If there are more than MOST_BONES bones.
     """
     parent = chains.hierarchy.branch_parent
     is_used = np.bincount(chains.element_branch[binding.element], minlength=len(parent)) > 0
     for branch in np.flatnonzero(parent >= 0)[::-1].tolist():  # Parents come before their children.
-        is_used[parent[branch]] |= is_used[branch]
-    surfaces = int((is_used & ~chains.is_line).sum())
-    if surfaces:
-        raise ClipError(
-            f"bones: got {surfaces:,} of {int(is_used.sum()):,} branches that are surfaces, expected stems that are "
-            "rows of points, such as beams or bones; write the moved mesh without --bind"
-        )
+        is_used[parent[branch]] |= is_used[branch] and chains.is_line[branch]
     node = np.flatnonzero(is_used[chains.node_branch])
     if len(node) > MOST_BONES:
-        raise ClipError(f"bones: got {len(node):,}, expected at most {MOST_BONES:,} vertices of the plant's stems")
-    number = np.full(len(chains.rest) + 1, -1)
+        raise ClipError(f"bones: got {len(node):,}, expected at most {MOST_BONES:,} vertices or slices of the plant")
+    number = np.full(len(chains.rest), -1)
     number[node] = np.arange(len(node))
     joint, weight = _influences(chains, binding, len(chains.rest))
+    some = chains.thinned(node, SLICE_VERTICES)
     return Bones(
-        node,
-        chains.vertex_of_nodes[node],
-        number[chains.before[node]],
-        number[chains.after[node]],
-        np.append(True, np.diff(chains.node_branch[node]) != 0),
-        chains.rest[node],
+        some,
+        some.vertex_of_nodes,
+        some.before,
+        some.after,
+        np.append(True, np.diff(some.node_branch) != 0),
+        some.rest,
         number[joint][of_vertex],
         weight[of_vertex],
     )

@@ -9,6 +9,7 @@ neighbours best, and their size.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -79,6 +80,7 @@ class Chains:
         links, has_faces = _links(view)
         self.is_line = self._lines(has_faces, view.edges is not None)
         self._make_nodes(links)
+        self._join_nodes()
         self._make_elements()
         self.radius = self._radii(view.attributes.get("radius"))
 
@@ -126,18 +128,20 @@ class Chains:
         node_of[order] = np.cumsum(begins) - 1
         self._node_of_vertex = node_of  # By the vertex' number in file order.
 
-    def _make_elements(self) -> None:
-        hierarchy, count = self.hierarchy, len(self.rest)
-        nodes = np.arange(count)
+    def _join_nodes(self) -> None:
+        hierarchy, nodes = self.hierarchy, np.arange(len(self.rest))
         is_first = np.append(True, np.diff(self.node_branch) != 0)
         attach = hierarchy.attach[self.node_branch]
         hangs_on = np.where(attach >= 0, self._node_of_vertex[np.maximum(attach, 0)], -1)
         # A surface is moved by its slices alone: its foot is in its first slice, wherever its parent is.
         hangs_on = np.where(self.is_line[self.node_branch], hangs_on, -1)
         self.before = np.where(is_first, hangs_on, nodes - 1)
-        is_last = np.append(is_first[1:], True)
-        self.after = np.where(is_last, -1, nodes + 1)
-        alone = is_first & is_last & (self.before < 0)
+        self.after = np.where(np.append(is_first[1:], True), -1, nodes + 1)
+
+    def _make_elements(self) -> None:
+        hierarchy = self.hierarchy
+        is_first = np.append(True, np.diff(self.node_branch) != 0)
+        alone = is_first & (self.before < 0) & (self.after < 0)
         end = np.flatnonzero((self.before >= 0) | alone)
         self.end, self.start = end, np.where(alone[end], end, self.before[end])
         self.element_branch = self.node_branch[end]
@@ -162,6 +166,32 @@ class Chains:
         if not (np.isfinite(radius).all() and radius.min() >= 0):
             return None
         return np.add.reduceat(radius[self._vertices], self._starts) / self._counts
+
+    def thinned(self, nodes: np.ndarray, most: int) -> Chains:
+        """Return chains of some of the nodes, ascending, of which slices have `most` vertices each at most.
+
+        What a node hangs on has to be among them. Such chains give poses, and no places for a mesh.
+        """
+        some = copy.copy(self)
+        for name in ("_generations", "_beside"):
+            some.__dict__.pop(name, None)
+        number = np.full(len(self.rest) + 1, -1)
+        number[nodes] = np.arange(len(nodes))
+        vertices = [self.vertices_of(node) for node in nodes]
+        vertices = [each if len(each) <= most else each[_spread_out(self.vertex_rest[each], most)] for each in vertices]
+        some._counts = np.array([len(each) for each in vertices])
+        some._starts = np.cumsum(some._counts) - some._counts
+        some._vertices = np.concatenate(vertices)
+        some.vertex_of_nodes = some._vertices[some._starts]
+        some.node_branch = self.node_branch[nodes]
+        some.before, some.after = number[self.before[nodes]], number[self.after[nodes]]
+        some.rest = some._means(self.vertex_rest[None])[0]
+        some._make_elements()
+        return some
+
+    def vertices_of(self, node: int) -> np.ndarray:
+        """Return the vertices of a node, in the source's numbering."""
+        return self._vertices[self._starts[node] : self._starts[node] + self._counts[node]]
 
     # ---- the rest pose as a curve ----
 
@@ -384,6 +414,16 @@ def _slices(points: np.ndarray, along: np.ndarray, edge: float) -> np.ndarray:
     if not width > 0:
         return np.zeros(len(points), np.int64)
     return np.unique((along / width).astype(np.int64), return_inverse=True)[1].reshape(-1)
+
+
+def _spread_out(points: np.ndarray, count: int) -> np.ndarray:
+    """Return the numbers of so many points, each as far as possible from those before it."""
+    chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
+    distance = np.full(len(points), np.inf)
+    while len(chosen) < count:
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+        chosen.append(int(distance.argmax()))
+    return np.array(chosen)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:

@@ -24,9 +24,12 @@ LARGEST_CARD = 0.5  # Extent of a piece over the plant's diagonal, above which i
 SMALL_CARD = 0.1  # The same extent, below which a piece between several stems is a leaf and no wood.
 FLAT = 0.05  # Variance of a flat piece across its plane over the smaller one within it.
 BLADE = 0.15  # Mean distance of a flat piece from its stem over its extent, above which it is a leaf across the stem.
-ROUNDS = 6  # Rounds in which weights spread over the mesh where the branches of neighbours differ.
 SHARES = 3  # Branches that move a point, at most.
-LEAST_WEIGHT = 0.02
+LEAST_WEIGHT = 0.005
+REACH = 1.5  # How far two stems share a skin from where they meet in it, over its distance from the thinner of them.
+SLACK = 3.0  # Lengths of that reach over which a skin that nothing holds goes back to its own stem.
+LEAST_LINK = 1e-3  # Length of a link, over the median, below which weights spread along it as along one so long.
+COLUMNS = 64  # Branches whose weights are in memory at once.
 BLOCK = 1 << 21  # Pairs of points and elements whose distances are in memory at once.
 
 
@@ -260,22 +263,64 @@ class _Search:
         return points[weights.row], pairs.element, pairs.share, weights.data
 
     def _spread(self, points: np.ndarray, branch: np.ndarray) -> Any:
-        """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most."""
-        sparse = scipy_module("sparse")
+        """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most.
+
+        They are 1 and 0 but around links between points of different branches. There, as far as REACH says, they change
+        over the skin as the places of a membrane do, so that short edges hold no large change.
+        """
+        sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
         number = np.full(len(self.mesh.place), -1)
         number[points] = np.arange(len(points))
         # Only a skin spreads: the points of a centre line are each on one stem.
         links = number[self.mesh.links[(self.mesh.piece[self.mesh.links] >= 0).all(axis=1)]]
         links = links[(links >= 0).all(axis=1)]
-        count = len(points)
-        both = np.concatenate([links, links[:, ::-1], np.arange(count)[:, None] * [1, 1]])
-        step = sparse.coo_matrix((np.ones(len(both)), both.T), (count, count)).tocsr()
-        step = sparse.diags(1.0 / np.asarray(step.sum(axis=1)).reshape(-1)) @ step
-        shape = count, self.chains.hierarchy.branch_count
-        weights = sparse.coo_matrix((np.ones(count), (np.arange(count), branch)), shape).tocsr()
-        for _ in range(ROUNDS):
-            weights = _largest(step @ weights)
-        return weights.tocoo()
+        count, branches = len(points), self.chains.hierarchy.branch_count
+        weights = sparse.coo_matrix((np.ones(count), (np.arange(count), branch)), (count, branches)).tocsr()
+        seams = links[branch[links[:, 0]] != branch[links[:, 1]]]
+        if not len(seams):
+            return weights.tocoo()
+        place = self.mesh.place[points]
+        length = np.linalg.norm(place[links[:, 0]] - place[links[:, 1]], axis=1)
+        length = np.maximum(length, LEAST_LINK * np.median(length))
+        ends = np.concatenate([links, links[:, ::-1]])
+        near = sparse.coo_matrix((1.0 / np.tile(length, 2), ends.T), (count, count)).tocsr()
+        seeds, of_seam = np.unique(seams, return_inverse=True)
+        girth = _Pairs(self.chains, place[seeds], branch[seeds]).distance[of_seam.reshape(seams.shape)].min(axis=1)
+        reach = np.zeros(len(seeds))
+        np.maximum.at(reach, of_seam.reshape(-1), REACH * np.repeat(girth, 2))
+        # A point in front of all seams, each as far behind it as its reach is short of the longest, tells what is near.
+        most = max(float(reach.max()), float(length.min()))
+        rows, columns = np.append(links[:, 0], np.full(len(seeds), count)), np.append(links[:, 1], seeds)
+        ways = np.append(length, 1.001 * most - reach)
+        graph = sparse.coo_matrix((ways, (rows, columns)), (count + 1, count + 1)).tocsr()
+        away = graphs.dijkstra(graph, directed=False, indices=count, limit=1.001 * most)[:count]
+        return _largest(_membrane(near, weights, np.flatnonzero(np.isfinite(away)), most)).tocoo()
+
+
+def _membrane(near: Any, weights: Any, free: np.ndarray, reach: float) -> Any:
+    """Return weights, a sparse matrix, whose rows `free` are those of a membrane between the others. near: (n, n) how
+    much neighbours pull; reach: how far a membrane goes from its middle at most."""
+    sparse, linalg = scipy_module("sparse"), scipy_module("sparse.linalg")
+    pull = np.asarray(near.sum(axis=1)).reshape(-1)
+    # Far beyond its reach it holds to what it was, which matters only where nothing else holds it.
+    degree = np.diff(near.indptr)
+    slack = pull * np.minimum(degree / np.maximum(2 * SLACK * reach * pull, degree), 1.0) ** 2
+    rows = near[free]
+    matrix = sparse.diags(pull[free] + slack[free]) - rows[:, free]
+    held = np.ones(near.shape[0], bool)
+    held[free] = False
+    right = rows[:, held] @ weights[held] + sparse.diags(slack[free]) @ weights[free]
+    right = right.tocsc()
+    used = np.flatnonzero(np.diff(right.indptr))
+    solved, columns = linalg.splu(matrix.tocsc()), []
+    for some in np.split(used, np.arange(COLUMNS, len(used), COLUMNS)):
+        found = solved.solve(right[:, some].toarray())
+        columns.append(sparse.csc_matrix(np.where(found >= LEAST_WEIGHT / 2, found, 0.0)))
+    of_free = sparse.hstack(columns, format="coo")
+    kept = weights.tocoo()
+    rest = held[kept.row]
+    row, column = np.append(kept.row[rest], free[of_free.row]), np.append(kept.col[rest], used[of_free.col])
+    return sparse.coo_matrix((np.append(kept.data[rest], of_free.data), (row, column)), weights.shape)
 
 
 def _largest(weights: Any) -> Any:

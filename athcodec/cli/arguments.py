@@ -553,6 +553,20 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         "that is off by no more than the level is",
     )
     verb.add_argument(
+        "--velocities",
+        action="store_true",
+        help="write to USD or Alembic the velocity of every vertex in every frame, in lengths per second, for motion "
+        "blur: as many bytes again as the positions",
+    )
+    verb.add_argument(
+        "--samples",
+        metavar="N",
+        type=_argument(_jobs),
+        default=1,
+        help="write to USD or Alembic so many samples for each frame, evenly in time and on straight lines between "
+        "frames: N times the bytes (default: %(default)s)",
+    )
+    verb.add_argument(
         "--allow-partial",
         action="store_true",
         help="leave out a damaged level and those beyond it instead of giving up",

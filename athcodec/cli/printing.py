@@ -100,15 +100,20 @@ def print_demo(facts: dict[str, Any], diagonal: float) -> None:
 def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> dict[str, Any]:
     """The files that are there now, and what their format costs."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
-    facts = {name: written.facts[name] for name in ("animation", "instances", "max_error") if name in written.facts}
+    facts = {
+        name: written.facts[name]
+        for name in ("animation", "instances", "max_error", "samples")
+        if name in written.facts
+    }
     named = {"level": level.level, "name": level.name, "unit": motion.metadata.get("unit")}
     return {"files": [os.fspath(path) for path in written.files]} | counts | named | facts
 
 
 def print_written(facts: dict[str, Any]) -> None:
     names, instances, how = facts["files"], facts.get("instances"), facts.get("animation", "textures")
+    samples = f" in {counted(facts['samples'], 'sample')}" if "samples" in facts else ""
     echo(
-        f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(facts['frames'], 'frame')}, "
+        f"{names[0]}{f' to {names[-1]}' if len(names) > 1 else ''}: {counted(facts['frames'], 'frame')}{samples}, "
         f"{counted(facts['vertices'], 'vertex', 'vertices')}, level {facts['level']} ({facts['name']})"
     )
     if "max_error" in facts:

@@ -252,7 +252,7 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
     format_name = format_to_write(args.output, args.format).name  # An unknown one is refused before there is work.
     if args.bind and format_name != "gltf":
         raise ClipError(f"--bind: got {args.output}, expected a .glb file, which has bones")
-    if args.bind and (args.rig is not None or args.instances or args.animation != "auto"):
+    if args.bind and (args.rig is not None or args.instances or args.animation != "auto" or _blurs(args)):
         raise ClipError("--bind: got another way to move the mesh too, expected its bones alone")
     how = {"clip": args.clip, "allow_partial": args.allow_partial, "host_mesh": args.host_mesh}
     with ExitStack() as opened:
@@ -300,7 +300,12 @@ def _bound(moving: OntoMesh, path: str) -> Written:
 def _goes_back(args: argparse.Namespace) -> bool:
     """Whether a GLB with motions is to be written as a copy of it, with morph targets."""
     is_gltf = (args.format or Path(args.output).suffix.lower()) in ("gltf", ".glb")
-    return is_gltf and args.onto is None and args.animation != "joints" and args.rig is None and not args.instances
+    is_plain = args.animation != "joints" and args.rig is None and not args.instances and not _blurs(args)
+    return is_gltf and args.onto is None and is_plain
+
+
+def _blurs(args: argparse.Namespace) -> bool:
+    return args.samples > 1 or args.velocities
 
 
 def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Namespace) -> Written:
@@ -315,7 +320,8 @@ def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Name
         write_back(args.input, motions, args.output)
         return exporters.Written((Path(args.output),))
     name = exporters.format_to_write(args.output, args.format).name
-    how = {option: getattr(args, option) for option in ("gzip", "animation", "instances", "rig", "nanite")}
+    options = ("gzip", "animation", "instances", "rig", "nanite", "samples", "velocities")
+    how = {option: getattr(args, option) for option in options}
     with progress() as report:
         return athcodec.write(motion, args.output, name, progress=report, **how)
 

@@ -21,6 +21,7 @@ from athcodec.decoding.clip_view import ClipView
 from athcodec.decoding.decoder import Decoder
 from athcodec.errors import ClipError, CoarseWarning
 from athcodec.exporters.placing import in_singles
+from athcodec.exporters.samples import with_samples
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.files.kinds import add_kind, kind_by_suffix
@@ -31,7 +32,9 @@ from athcodec.sources.registry import registered
 Report = Callable[[str, float], None]
 Progress = Callable[[float], None]
 MOST_RIGGED = 65535
+MOST_SAMPLES = 1000  # Samples of a frame interval.
 RIGS = ("usd", "gltf")
+BLURRED = ("usd", "alembic")  # Formats whose programs blur motion by samples between frames, or by velocities.
 HAVE_TRANSFORMS = ("usd", "gltf", "alembic")  # They hold the place of a plant that is far from the origin.
 SINGLES = (*HAVE_TRANSFORMS, "pc2", "mdd")  # Formats whose points are float32.
 KEPT = ("presence", "doubleSided", "subdivisionScheme")
@@ -60,11 +63,17 @@ class WriteOptions:
     nanite : bool, optional
         For USD with a rig: laid out as Nanite Assemblies of Unreal Engine 5.7, with copies of one shape as instances on
         the joints, and the JSON of Dynamic Wind beside it. This was not run in Unreal.
+    samples : int, optional
+        For USD and Alembic: samples of each frame interval, of which the first is the frame. Between frames vertices go
+        along straight lines, as players show them.
+    velocities : bool, optional
+        For USD and Alembic: the velocity of every vertex at every sample, in lengths per second, as central differences
+        of the positions that are written. It takes as many bytes as the positions.
 
     Raises
     ------
     ValueError
-        For another animation, or nanite without a rig.
+        For another animation, nanite without a rig, samples or velocities with one, or no usable number.
     """
 
     gzip: bool = False
@@ -73,15 +82,26 @@ class WriteOptions:
     instances: bool = False
     rig: int | None = None
     nanite: bool = False
+    samples: int = 1
+    velocities: bool = False
 
     def __post_init__(self) -> None:
-        set_numbers(self, wholes=("rig",))
+        set_numbers(self, wholes=("rig", "samples"))
         if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
         if self.nanite and self.rig is None:
             raise ValueError("nanite: got no rig, expected one too")
+        if not 1 <= self.samples <= MOST_SAMPLES:
+            raise ValueError(f"samples: got {self.samples!r}, expected 1 to {MOST_SAMPLES} in each frame interval")
+        for name in self.blur if self.rig is not None else ():
+            raise ValueError(f"{name}: got a rig too, whose joints move the vertices; expected one of both")
         if self.animation not in ("auto", "joints", "morphs"):
             raise ValueError(f'animation: got {self.animation!r}, expected "auto", "joints" or "morphs"')
+
+    @property
+    def blur(self) -> list[str]:
+        """The options for motion blur that are in use."""
+        return [name for name, is_used in (("samples", self.samples > 1), ("velocities", self.velocities)) if is_used]
 
 
 FORMATS = (
@@ -110,6 +130,7 @@ class Written:
         The files that hold the clip, in the order of their frames; one, the path that was given, of most formats.
     facts : dict
         What a format costs that does not hold positions as they are: "max_error" in the clip's unit, and more.
+        "samples" is the number of samples where frames have several;
         "rounding" is by how much float32 moves a vertex of float64 at most, if the format has float32 alone;
         "not_written" names what the format has no place for, by kind. Empty of others.
     """
@@ -148,7 +169,8 @@ def write(
     progress : callable, optional
         Called with "export" and the fraction that is done.
     **options
-        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half, instances, rig, nanite.
+        Parameters of `athcodec.exporters.WriteOptions`: gzip, animation, half, instances, rig, nanite, samples,
+        velocities.
 
     Returns
     -------
@@ -176,6 +198,8 @@ def write(
         raise ClipError(f"rig: got {kind.name}, expected one of {', '.join(RIGS)}")
     if wanted.nanite and kind.name != "usd":
         raise ClipError(f"nanite: got {kind.name}, expected usd")
+    if wanted.blur and kind.name not in BLURRED:
+        raise ClipError(f"{wanted.blur[0]}: got {kind.name}, expected one of {', '.join(BLURRED)}")
     if wanted.rig is None:
         _check_clips(motion, kind)
     report = progress or (lambda stage, fraction: None)
@@ -185,9 +209,11 @@ def write(
         check_target(path, kind.suffixes[0])
         write_clip = kind.function("write_clip", __name__)
         is_rounded = kind.name in SINGLES and motion.dtype == np.float64
-        shown = in_singles(motion, kind.name in HAVE_TRANSFORMS) if is_rounded else motion
+        shown = motion if wanted.samples == 1 else with_samples(motion, wanted.samples)
+        shown = in_singles(shown, kind.name in HAVE_TRANSFORMS) if is_rounded else shown
         facts = dict(write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
         facts |= {"rounding": shown.rounding} if is_rounded else {}
+        facts |= {"samples": shown.frame_count} if wanted.samples > 1 else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
     if wanted.rig is not None:

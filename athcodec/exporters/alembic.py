@@ -9,15 +9,15 @@ import os
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.copies import cost_of, fit_copies
 from athcodec.exporters.placing import origin_of
+from athcodec.exporters.samples import samples_of
 from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
 from athcodec.files.plain import FilePath
@@ -47,7 +47,8 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )
         try:
-            said = _send(process, (static, instanced), motion, report)
+            samples = samples_of(motion, objects, options.velocities)
+            said = _send(process, (static, instanced), samples, lambda frame: report((frame + 1) / motion.frame_count))
         finally:
             process.kill()
             process.wait()
@@ -60,13 +61,13 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
-def _send(process: subprocess.Popen, head: Any, motion: Any, report: Progress) -> bytes:
+def _send(process: subprocess.Popen, head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
     """Return the final answer of the process."""
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)
-        for start, block in motion.blocks():
-            pickle.dump((start, np.asarray(block)), process.stdin, pickle.HIGHEST_PROTOCOL)
-            report((start + len(block)) / motion.frame_count)
+        for sample in samples:
+            pickle.dump(sample, process.stdin, pickle.HIGHEST_PROTOCOL)
+            report(sample[0])
         process.stdin.close()
     except BrokenPipeError:
         pass  # it has said why, or has crashed

@@ -66,7 +66,7 @@ def main() -> None:
     given = sys.stdin.buffer
     motion, instanced = pickle.load(given)
     try:
-        _write(motion, _blocks(given), instanced, sys.argv[1])
+        _write(motion, _samples(given), instanced, sys.argv[1])
         gc.collect()  # an archive is complete when nothing refers to it
         said = "done"
     except (RuntimeError, TypeError, OSError) as error:
@@ -74,13 +74,14 @@ def main() -> None:
     print(said, end="")
 
 
-def _blocks(given: BinaryIO) -> Iterator[tuple[int, np.ndarray]]:
+def _samples(given: BinaryIO) -> Iterator[tuple[Any, ...]]:
+    """Frames as exporters.samples gives them."""
     with suppress(EOFError):
         while True:
             yield pickle.load(given)
 
 
-def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dict[int, Copies], name: str) -> None:
+def _write(motion: Any, samples: Iterator[tuple[Any, ...]], instanced: dict[int, Copies], name: str) -> None:
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     index = archive.addTimeSampling(_sampling(numbers, rate))
@@ -108,12 +109,10 @@ def _write(motion: Any, blocks: Iterator[tuple[int, np.ndarray]], instanced: dic
             obj.target = KINDS[obj.kind](places[0], name, sampling)
         _hide(places, obj, index)
     _bind_materials(motion, objects)
-    for start, block in blocks:
-        for row, positions in enumerate(block.astype(np.float32, copy=False)):
-            for obj in objects:
-                if obj.copies == 1:
-                    own = _rows(statics, obj) if start + row == 0 else None
-                    _add(obj, positions[obj.vertices], own)
+    for frame, *values in samples:
+        for obj in objects:
+            if obj.copies == 1:
+                _add(obj, [each[obj.vertices] for each in values], _rows(statics, obj) if frame == 0 else None)
 
 
 def _sampling(numbers: np.ndarray, rate: float) -> Any:
@@ -157,7 +156,7 @@ def _add_instanced(
         key: (values if domain == "constant" else rows_of_one(values, obj), domain)
         for key, (values, domain) in _rows(statics, obj).items()
     }
-    _add(one, copies.shape, own)
+    _add(one, [copies.shape], own)
     for place in places[1:]:
         place.addChildInstance(one.target, name)
     return places
@@ -189,17 +188,24 @@ def _filled(kind: Any, values: np.ndarray) -> Any:
 # ---- samples ----
 
 
-def _add(obj: SceneObject, positions: np.ndarray, own: dict[str, tuple[np.ndarray, str]] | None) -> None:
-    """A sample of the points; the first one brings what does not move, the rows of the object."""
-    points = _filled(imath.V3fArray, positions)
+def _add(obj: SceneObject, values: list[np.ndarray], own: dict[str, tuple[np.ndarray, str]] | None) -> None:
+    """A sample of the points, and of their velocities where there are any; the first one brings what does not move, the
+    rows of the object."""
+    points, *moving = (_filled(imath.V3fArray, each) for each in values)
     schema = obj.target.getSchema()
+
+    def set_sample(sample: Any) -> None:
+        for velocities in moving:
+            sample.setVelocities(velocities)
+        schema.set(sample)
+
     if own is None:
-        sample = {
+        kinds = {
             "mesh": AbcGeom.OPolyMeshSchemaSample,
             "curves": AbcGeom.OCurvesSchemaSample,
             "points": AbcGeom.OPointsSchemaSample,
-        }[obj.kind](points)
-        schema.set(sample)
+        }
+        set_sample(kinds[obj.kind](points))
         return
     order = turned_corners(obj.faces[0])
     own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
@@ -211,7 +217,7 @@ def _add(obj: SceneObject, positions: np.ndarray, own: dict[str, tuple[np.ndarra
         "curves": _filled(imath.IntArray, obj.curves),
         "indices": _filled(imath.IntArray, obj.faces[1][order]),
     }
-    schema.set({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
+    set_sample({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
     for name, (values, domain) in own.items():
         if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
             _write_param(schema.getArbGeomParams(), name, values, domain)

@@ -158,7 +158,8 @@ def write_bound(motion: Any, path: FilePath, bones: Any, facts: Mapping[str, Any
     not written, as `write_clip` does.
 
     What ATHBones needs to turn them is in the extras of the node above them, as "ATH_bones": for each bone its vertex
-    in the .ath file, and the bones before and after it along its stem; and the bones that are the first of their stems.
+    in the .ath file, and the bones before and after it along its stem; the bones that are the first of their stems; and
+    the slices of surfaces (binding.bones.Bones, slices).
     """
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), Path(fspath(path)).stem)
     lost = {"left_out": meshes.left_out} if meshes.left_out else {}
@@ -166,6 +167,8 @@ def write_bound(motion: Any, path: FilePath, bones: Any, facts: Mapping[str, Any
     add_materials(glb, meshes)
     lists = {name: getattr(bones, name).tolist() for name in ("vertex", "before", "after")}
     lists["first"] = np.flatnonzero(bones.side).tolist()
+    slices = bones.slices
+    lists |= {"slices": slices} if slices["bone"] else {}
     extras = {"ATH_bones": {**lists, "error": facts["max_error_of_plant"]}}
     root = glb.node(name="plant", extras=extras, **root_transform(motion))
     count = len(bones.rest)

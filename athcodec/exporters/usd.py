@@ -29,6 +29,7 @@ from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.looks import Looks, line_look, looks_of
 from athcodec.exporters.placing import origin_of
 from athcodec.exporters.rig import fit_rig
+from athcodec.exporters.samples import samples_of, velocities_of_copies
 from athcodec.exporters.scene_objects import (
     KNOWN_ATTRIBUTES,
     KNOWN_METADATA,
@@ -162,8 +163,11 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Progress) -> d
     _write_presence(objects, codes)
     if joints is not None:
         return _write_rigged(stage, motion, joints, objects, looks, codes, report) | hidden_copies(objects)
-    _write_places(stage, [(objects[number], copies) for number, copies in instanced.items()], codes)
-    _write_frames(stage, motion, objects, codes, report)
+    placed = [(objects[number], copies) for number, copies in instanced.items()]
+    _write_places(stage, placed, codes)
+    if options.velocities:
+        _write_velocities_of_places(motion, placed, codes)
+    _write_frames(stage, motion, objects, codes, report, options.velocities)
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
@@ -388,6 +392,14 @@ def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]],
                 attribute.Set(array.FromNumpy(copies.turns[frame].astype(dtype)), code)
 
 
+def _write_velocities_of_places(motion: Any, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
+    for obj, copies in instanced:
+        attributes = obj.instancer.CreateVelocitiesAttr(), obj.instancer.CreateAngularVelocitiesAttr()
+        for attribute, values in zip(attributes, velocities_of_copies(motion, obj.shown, copies.places, copies.turns)):
+            for code, value in zip(codes.tolist(), values):
+                attribute.Set(_vec3(value), code)
+
+
 def _write_presence(objects: list[SceneObject], codes: np.ndarray) -> None:
     """Visibility of objects, and the copies that an instancer hides, from the frames on in which they change."""
     for obj in objects:
@@ -512,21 +524,25 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
 
 
 def _write_frames(
-    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Progress
+    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Progress, has_velocities: bool
 ) -> None:
-    layer = stage.GetRootLayer()
-    points = [None if obj.copies > 1 else obj.target.GetPointsAttr().GetPath() for obj in objects]
-    places = [(obj, path, _whole(obj).CreateExtentAttr().GetPath()) for obj, path in zip(objects, points)]
-    unsaved = 0
-    for start, block in motion.blocks():
-        for row, positions in enumerate(block.astype(np.float32, copy=False)):
-            with Sdf.ChangeBlock():
-                _write_frame(layer, places, positions, float(codes[start + row]))
-            unsaved += positions.nbytes
-            if unsaved >= SAVE_BYTES:
-                _must(layer.Save(), layer.identifier)
-                unsaved = 0
-        report((start + len(block)) / len(codes))
+    layer, unsaved = stage.GetRootLayer(), 0
+    extents = [(obj, _whole(obj).CreateExtentAttr().GetPath()) for obj in objects]
+    moved = [obj for obj in objects if obj.copies == 1]
+    arrays = [[(obj.vertices, obj.target.GetPointsAttr().GetPath()) for obj in moved]]
+    if has_velocities:
+        arrays.append([(obj.vertices, obj.target.CreateVelocitiesAttr().GetPath()) for obj in moved])
+    for frame, *values in samples_of(motion, objects, has_velocities):
+        with Sdf.ChangeBlock():
+            _write_extents(layer, extents, values[0], float(codes[frame]))
+            for each, places in zip(values, arrays):
+                for vertices, path in places:
+                    layer.SetTimeSample(path, float(codes[frame]), _vec3(each[vertices]))
+        unsaved += sum(each.nbytes for each in values)
+        if unsaved >= SAVE_BYTES:
+            _must(layer.Save(), layer.identifier)
+            unsaved = 0
+        report((frame + 1) / len(codes))
     _must(layer.Save(), layer.identifier)
 
 
@@ -535,12 +551,9 @@ def _whole(obj: SceneObject) -> Any:
     return obj.target if obj.copies == 1 else obj.instancer
 
 
-def _write_frame(layer: Sdf.Layer, places: list, positions: np.ndarray, code: float) -> None:
-    for obj, points, extent in places:
-        own = np.ascontiguousarray(positions[obj.vertices])
-        if points is not None:
-            layer.SetTimeSample(points, code, Vt.Vec3fArray.FromNumpy(own) if len(own) else Vt.Vec3fArray())
+def _write_extents(layer: Sdf.Layer, extents: list, positions: np.ndarray, code: float) -> None:
+    for obj, path in extents:
+        own = positions[obj.vertices]
         if len(own):
             half = np.float32(obj.width / 2)
-            box = np.stack([own.min(axis=0) - half, own.max(axis=0) + half])
-            layer.SetTimeSample(extent, code, Vt.Vec3fArray.FromNumpy(box))
+            layer.SetTimeSample(path, code, _vec3([own.min(axis=0) - half, own.max(axis=0) + half]))

@@ -16,10 +16,12 @@ from bench.trees.wind import Wind
 SIDES = 6
 
 
-def dress(clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar") -> MotionClip:
-    """The first frames of a simulated clip as a mesh with so many leaves."""
+def dress(
+    clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar", sides: int = SIDES
+) -> MotionClip:
+    """The first frames of a simulated clip as a mesh with so many leaves, and tubes of so many sides."""
     skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
-    tubes = Tubes(skeleton)
+    tubes = Tubes(skeleton, sides)
     cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
     turns = cards.flown(wind)
     shape = (tubes.count + len(kind.blade) * leaves, 3)

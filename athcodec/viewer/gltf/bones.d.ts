@@ -17,7 +17,7 @@ import type { Object3D } from "three";
 export class ATHBones {
   /** scene: of a loaded GLB, or an object in it that has the bones and their meshes. Throws a TypeError where there are none. */
   constructor(scene: Object3D);
-  /** Vertices of the plant, in the source's order, that the bones follow. */
+  /** Vertices of the plant, in the source's order, that the bones follow; of a slice of a surface one of its vertices. */
   readonly vertices: Int32Array;
   /** Moves the bones to where the plant is. positions: x, y, z of all vertices of the plant, in the source's order. */
   pose(positions: Float32Array | Float64Array): this;

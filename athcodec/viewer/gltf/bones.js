@@ -1,9 +1,9 @@
 // Meshes that `athcodec decode --onto MESH --bind` wrote, moved by the positions of the plant's own file. Frames turn along the stems by
-// the smallest rotations, as athcodec/binding/chains.py turns them.
+// the smallest rotations, and slices of surfaces by the rotations that fit their vertices best, as athcodec/binding/chains.py turns them.
 
-import { Quaternion, Vector3 } from "three";
+import { Matrix4, Quaternion, Vector3 } from "three";
 
-const GROWTH = 0.1, LEAST = 1e-9; // As chains.py has them; the second is a share of the plant's diagonal.
+const GROWTH = 0.1, LEAST = 1e-9, PRIOR = 1e-3; // As chains.py has them; the second is a share of the plant's diagonal.
 
 /** For the scene of a GLB: moves its bones as the plant of an .ath file stands. */
 export class ATHBones {
@@ -17,6 +17,8 @@ export class ATHBones {
   #stemStarts; // The bones that are the first of their stem.
   #restLength;
   #least;
+  #slices; // Of each bone that is a slice of a surface: its vertices, their offsets at rest, and what is known of both; else null.
+  #stems;  // Runs [first, stop) of bones that are slices of one surface.
 
   constructor(scene) {
     let above = null;
@@ -41,9 +43,12 @@ export class ATHBones {
     this.#least = LEAST * extent(this.#rest);
     this.#tangents(this.#rest, this.#restTangent);
     this.#restLength = this.#lengths(this.#rest);
+    this.#slices = slicesOf(this.#list.slices, count);
+    const firsts = [...this.#list.first, count];
+    this.#stems = this.#list.first.map((first, at) => [first, firsts[at + 1]]).filter(([first]) => this.#slices[first]);
   }
 
-  /** Vertices of the plant, in the source's order, that the bones follow. */
+  /** Vertices of the plant, in the source's order, that the bones follow; of a slice of a surface one of its vertices. */
   get vertices() {
     return Int32Array.from(this.#list.vertex);
   }
@@ -51,22 +56,65 @@ export class ATHBones {
   /** Moves the bones to where the plant is. positions: x, y, z of all its vertices in the source's order. */
   pose(positions) {
     const { vertex, before } = this.#list, centre = this.#centre, tangent = this.#tangent;
-    for (let bone = 0; bone < vertex.length; bone++)
-      for (let k = 0; k < 3; k++) centre[3 * bone + k] = positions[3 * vertex[bone] + k];
+    for (let bone = 0; bone < vertex.length; bone++) {
+      const { vertices } = this.#slices[bone] ?? { vertices: [vertex[bone]] };
+      for (let k = 0; k < 3; k++) {
+        let sum = 0;
+        for (const one of vertices) sum += positions[3 * one + k];
+        centre[3 * bone + k] = sum / vertices.length;
+      }
+    }
+    this.#fit(positions);
     this.#tangents(centre, tangent);
     const length = this.#lengths(centre);
     for (let bone = 0; bone < vertex.length; bone++) {
       const turn = this.#turn[bone], inherited = before[bone] >= 0 ? this.#turn[before[bone]] : STILL;
-      carried.fromArray(this.#restTangent, 3 * bone).applyQuaternion(inherited);
-      now.fromArray(tangent, 3 * bone);
-      turn.copy(inherited);
-      if (carried.lengthSq() > 0.5 && now.lengthSq() > 0.5) turn.premultiply(smallest.setFromUnitVectors(carried.normalize(), now));
-      const object = this.#bones[bone];
+      const slice = this.#slices[bone], object = this.#bones[bone];
+      if (!slice) {
+        carried.fromArray(this.#restTangent, 3 * bone).applyQuaternion(inherited);
+        now.fromArray(tangent, 3 * bone);
+        turn.copy(inherited);
+        if (carried.lengthSq() > 0.5 && now.lengthSq() > 0.5) turn.premultiply(smallest.setFromUnitVectors(carried.normalize(), now));
+      }
       object.position.fromArray(centre, 3 * bone);
       object.quaternion.copy(turn);
-      object.scale.setScalar(this.#growth(length[bone], this.#restLength[bone]));
+      object.scale.setScalar(slice ? slice.size : this.#growth(length[bone], this.#restLength[bone]));
     }
     return this;
+  }
+
+  // Turns and sizes of slices. A slice is turned with those before and behind it, near the turn of its whole surface, which decides
+  // where they leave a turn free; and that of all surfaces decides for a surface.
+  #fit(positions) {
+    const centre = this.#centre, rest = this.#rest, least = this.#least ** 2, whole = [];
+    const all = new Float64Array(9);
+    for (const [first, stop] of this.#stems) {
+      const moment = new Float64Array(9), middle = [0, 0, 0], restMiddle = [0, 0, 0];
+      let count = 0;
+      for (let bone = first; bone < stop; bone++) {
+        const slice = this.#slices[bone];
+        slice.measure(positions, centre, 3 * bone, least);
+        count += slice.vertices.length;
+        for (let k = 0; k < 3; k++) {
+          middle[k] += slice.vertices.length * centre[3 * bone + k];
+          restMiddle[k] += slice.vertices.length * rest[3 * bone + k];
+        }
+      }
+      for (let k = 0; k < 3; k++) { middle[k] /= count; restMiddle[k] /= count; }
+      for (let bone = first; bone < stop; bone++) this.#slices[bone].addTo(moment, centre, rest, 3 * bone, middle, restMiddle, 0);
+      moment.forEach((value, at) => { all[at] += value; });
+      whole.push(moment);
+    }
+    bestTurn(all, STILL, ofPlant);
+    this.#stems.forEach(([first, stop], stem) => {
+      bestTurn(whole[stem], ofPlant, ofStem);
+      for (let bone = first; bone < stop; bone++) {
+        const moment = new Float64Array(9);
+        for (const other of [bone, Math.max(bone - 1, first), Math.min(bone + 1, stop - 1)])
+          this.#slices[other].addTo(moment, centre, rest, 3 * other, centre, rest, 3 * bone);
+        bestTurn(moment, ofStem, this.#turn[bone]);
+      }
+    });
   }
 
   // Unit tangents of parabolas through each bone and its neighbours; 0 where nothing tells.
@@ -105,7 +153,89 @@ export class ATHBones {
   }
 }
 
-const STILL = new Quaternion(), smallest = new Quaternion();
+// A slice of a surface: the vertices that stand for it.
+class Slice {
+  constructor(vertices, offsets) {
+    this.vertices = vertices;
+    this.offsets = offsets;
+    this.spread = offsets.reduce((sum, value) => sum + value * value, 0);
+    this.size = 1;
+    this.moment = new Float64Array(9); // Of the places and the offsets at rest, about the centre: a row for x, y and z.
+  }
+
+  measure(positions, centre, at, least) {
+    const { vertices, offsets, moment } = this;
+    let spread = 0;
+    moment.fill(0);
+    for (let number = 0; number < vertices.length; number++)
+      for (let row = 0; row < 3; row++) {
+        const off = positions[3 * vertices[number] + row] - centre[at + row];
+        spread += off * off;
+        for (let column = 0; column < 3; column++) moment[3 * row + column] += off * offsets[3 * number + column];
+      }
+    this.size = this.spread > least ? Math.sqrt(spread / this.spread) : 1;
+  }
+
+  // Adds its moment about another place.
+  addTo(sum, centre, rest, at, middle, restMiddle, middleAt) {
+    const weight = this.vertices.length;
+    for (let row = 0; row < 3; row++) {
+      const off = weight * (centre[at + row] - middle[middleAt + row]);
+      for (let column = 0; column < 3; column++)
+        sum[3 * row + column] += this.moment[3 * row + column] + off * (rest[at + column] - restMiddle[middleAt + column]);
+    }
+  }
+}
+
+function slicesOf(list, count) {
+  const slices = new Array(count).fill(null);
+  let at = 0;
+  list?.bone.forEach((bone, number) => {
+    const end = at + list.count[number];
+    slices[bone] = new Slice(list.vertex.slice(at, end), list.offset.slice(3 * at, 3 * end));
+    at = end;
+  });
+  return slices;
+}
+
+// The rotation that fits a moment best, near `prior` where it leaves one free: the largest eigenvector of Horn's matrix (J. Opt. Soc. Am.
+// A 4(4), 1987), by Jacobi's method.
+function bestTurn(moment, prior, out) {
+  const size = Math.hypot(...moment) || 1, [xx, xy, xz, , yx, yy, yz, , zx, zy, zz] = matrix.makeRotationFromQuaternion(prior).elements;
+  const S = [xx, yx, zx, xy, yy, zy, xz, yz, zz].map((value, at) => moment[at] / size + PRIOR * value); // elements go by columns
+  const a = [
+    [S[0] + S[4] + S[8], S[7] - S[5], S[2] - S[6], S[3] - S[1]],
+    [S[7] - S[5], S[0] - S[4] - S[8], S[1] + S[3], S[2] + S[6]],
+    [S[2] - S[6], S[1] + S[3], S[4] - S[0] - S[8], S[5] + S[7]],
+    [S[3] - S[1], S[2] + S[6], S[5] + S[7], S[8] - S[0] - S[4]],
+  ];
+  const v = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
+  for (let sweep = 0; sweep < SWEEPS; sweep++)
+    for (let p = 0; p < 3; p++)
+      for (let q = p + 1; q < 4; q++) {
+        if (Math.abs(a[p][q]) < 1e-15) continue;
+        const theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        const t = (theta < 0 ? -1 : 1) / (Math.abs(theta) + Math.sqrt(theta * theta + 1)), c = 1 / Math.sqrt(t * t + 1), s = t * c;
+        for (let k = 0; k < 4; k++) {
+          const x = a[k][p], y = a[k][q];
+          a[k][p] = c * x - s * y;
+          a[k][q] = s * x + c * y;
+        }
+        for (let k = 0; k < 4; k++) {
+          const x = a[p][k], y = a[q][k], u = v[k][p], w = v[k][q];
+          a[p][k] = c * x - s * y;
+          a[q][k] = s * x + c * y;
+          v[k][p] = c * u - s * w;
+          v[k][q] = s * u + c * w;
+        }
+      }
+  let best = 0;
+  for (let k = 1; k < 4; k++) if (a[k][k] > a[best][best]) best = k;
+  out.set(v[1][best], v[2][best], v[3][best], v[0][best]).normalize();
+}
+
+const SWEEPS = 8; // Jacobi's method converges within them.
+const STILL = new Quaternion(), ofPlant = new Quaternion(), ofStem = new Quaternion(), matrix = new Matrix4(), smallest = new Quaternion();
 const here = new Vector3(), into = new Vector3(), out = new Vector3(), carried = new Vector3(), now = new Vector3();
 
 function extent(points) {
