@@ -13,6 +13,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import plants
 import pytest
 from programs import CACHE, install_once, printed
 
@@ -52,18 +53,51 @@ console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [
 """
 
 
+# Plays 60 pictures a second by a clock of its own: one step of a preparation takes as long as makes a segment take `cost` ms at
+# the deepest level, and a tenth at others.
+PLAY_ON = """
+import { openPlant } from "./plant.js";
+const [url, cost, rounds] = process.argv.slice(2), { AthFile } = await import("athcodec-three/decoder");
+const plant = await openPlant(url), { file } = plant, deepest = file.info.levelCount - 1;
+const alone = file.preparation(0, deepest);
+let clock = 0, steps = 1, spent = 0, longest = 0;
+while (!alone.step(1)) steps++;
+alone.segment.free();
+performance.now = () => clock;
+const preparation = file.preparation.bind(file);
+file.preparation = (...given) => {
+  const work = preparation(...given), step = work.step.bind(work);
+  work.step = () => { clock += (work.level === deepest ? 1 : 0.1) * Number(cost) / steps; return step(1); };
+  return work;
+};
+const shown = [], view = { distance: 1e-3, fov: 0.8, height: 1080 }, { lastTime, firstSegment, segmentCount } = file.clips[0];
+for (let picture = 0; picture / 60 < rounds * lastTime; picture++) {
+  const start = clock, now = plant.update(picture / 60, view);
+  longest = Math.max(longest, clock - start);
+  shown.push([file.segmentOf(Math.floor(file.frameAt(picture / 60, "loop"))), now?.level ?? -1]);
+  await new Promise((done) => setTimeout(done, 0)); // what is fetched arrives
+  if (picture === 0) while (file.ranges(deepest, 0).length > 0 && !plant.failure) { // all of it, to measure decoding alone
+    plant.update(0, view);
+    await new Promise((done) => setTimeout(done, 1));
+  }
+}
+console.log(JSON.stringify({ shown, deepest, steps, longest, failure: plant.failure?.message ?? null }));
+"""
+
+
 def package(folder: Path) -> None:
     """The npm package, where programs of a folder find it."""
     (folder / "node_modules").mkdir()
     (folder / "node_modules" / "athcodec-three").symlink_to(VIEWER)
 
 
-def play(folder: Path, url: str, distance: float, *seconds: float, code: int = 0):
+def run(folder: Path, script: str, *words: object) -> str:
+    """What a script prints that stands beside plant.js."""
     package(folder)
     shutil.copy(EXAMPLES / "plant.js", folder)
     (folder / "package.json").write_text('{"type": "module"}')
-    (folder / "play.mjs").write_text(PLAY)
-    return printed("node", folder / "play.mjs", url, distance, *seconds, code=code)
+    (folder / "script.mjs").write_text(script)
+    return printed("node", folder / "script.mjs", *words)
 
 
 def decoded(level: int, frame: int) -> np.ndarray:
@@ -76,7 +110,7 @@ def decoded(level: int, frame: int) -> np.ndarray:
 def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(distance, ranges, tmp_path):
     data = TREE.read_bytes()
     with ThrottledServer({"tree.ath": data}, ranges=ranges) as server:
-        result = json.loads(play(tmp_path, f"{server.address}tree.ath", distance, 0.5, 3.5))
+        result = json.loads(run(tmp_path, PLAY, f"{server.address}tree.ath", distance, 0.5, 3.5))
         fetched = server.sent("tree.ath")
     assert result["failure"] is None
     for shown, frame in zip(result["shown"], (15, 105)):
@@ -90,6 +124,27 @@ def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(
         if ranges:  # prelude, arrays, and of the two segments of one clip what the level takes
             assert fetched <= level.bytes + len(data) - decoder.levels[-1].bytes + (1 << 14)
             assert distance == NEAR or fetched < len(data) / 3
+
+
+@pytest.fixture(scope="module")
+def swaying() -> bytes:
+    """A plant of 6 segments of 40 frames, 1.3 s each."""
+    options = dict(rel_error=1e-3, effort="fast", segment_frames=40)
+    return athcodec.encode(plants.plant(branches=60, longest=20, frames=240), **options)
+
+
+# The budget of 2 ms in each of 80 pictures is 160 ms a segment: the second case takes more.
+@pytest.mark.web
+@pytest.mark.parametrize("cost", [110, 200])
+def test_the_shown_level_never_falls_at_the_boundaries_of_segments(cost, swaying, tmp_path):
+    with ThrottledServer({"plant.ath": swaying}) as server:
+        result = json.loads(run(tmp_path, PLAY_ON, f"{server.address}plant.ath", cost, 1.5))
+    assert result["failure"] is None and result["steps"] > 100, "one step is little"
+    segments, levels = np.transpose(result["shown"])
+    arrival = np.argmax(levels == result["deepest"])
+    assert (levels[np.argmax(levels >= 0) :] >= 0).all() and (np.diff(segments[arrival:]) != 0).sum() > 6
+    assert (levels[arrival:] == result["deepest"]).all()
+    assert result["longest"] <= 500 / 60 + cost / result["steps"], "half of a picture's time, and a step"
 
 
 def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
@@ -106,20 +161,37 @@ def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
 
 
 @pytest.mark.web
+def test_a_plant_without_faces_is_points(tmp_path):
+    clip = plants.plant(branches=4, frames=10)
+    script = """
+    import { openPlant } from "./plant.js";
+    const plant = await openPlant(process.argv[2]), { mesh, origin } = plant, view = { distance: 1e-3, fov: 0.8, height: 1080 };
+    let shown = null;
+    while (shown?.level !== plant.file.info.levelCount - 1 && !plant.failure) {
+      await new Promise((done) => setTimeout(done, 1));
+      shown = plant.update(0.2, view);
+    }
+    console.log(JSON.stringify({ failure: plant.failure, positions: [...shown.positions], origin, source: [...mesh.source],
+      triangles: mesh.triangles.length }));
+    """
+    with ThrottledServer({"points.ath": athcodec.encode(clip, rel_error=1e-3, effort="fast")}) as server:
+        result = json.loads(run(tmp_path, script, f"{server.address}points.ath"))
+    assert result["failure"] is None and result["triangles"] == 0
+    wanted, bound = clip.positions[6], 1.1e-3 * np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3), axis=0))
+    assert np.abs(np.reshape(result["positions"], (-1, 3)) + result["origin"] - wanted[result["source"]]).max() < bound
+
+
+@pytest.mark.web
 def test_a_file_that_is_cut_off_or_not_there_is_an_error(tmp_path):
     with ThrottledServer({"cut.ath": TREE.read_bytes()[:20_000]}) as server:
         for name, message in (("cut.ath", "MISSING"), ("none.ath", "got status 404")):
             folder = tmp_path / name
             folder.mkdir()
-            package(folder)
-            shutil.copy(EXAMPLES / "plant.js", folder)
-            (folder / "package.json").write_text('{"type": "module"}')
             script = f"""
             import {{ openPlant }} from "./plant.js";
             await openPlant("{server.address}{name}").catch((error) => console.log(error.message));
             """
-            (folder / "open.mjs").write_text(script)
-            assert message in printed("node", folder / "open.mjs")
+            assert message in run(folder, script)
 
 
 def test_an_engine_that_is_not_three_asks_for_no_three():
