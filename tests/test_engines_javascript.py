@@ -53,8 +53,8 @@ console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [
 """
 
 
-# Plays 60 pictures a second by a clock of its own: one step of a preparation takes as long as makes a segment take `cost` ms at
-# the deepest level, and a tenth at others.
+# Plays 60 pictures a second by a clock of its own, in which a segment takes `cost` ms at the deepest level, and a tenth
+# of that at others.
 PLAY_ON = """
 import { openPlant } from "./plant.js";
 const [url, cost, rounds] = process.argv.slice(2), { AthFile } = await import("athcodec-three/decoder");
@@ -70,13 +70,13 @@ file.preparation = (...given) => {
   work.step = () => { clock += (work.level === deepest ? 1 : 0.1) * Number(cost) / steps; return step(1); };
   return work;
 };
-const shown = [], view = { distance: 1e-3, fov: 0.8, height: 1080 }, { lastTime, firstSegment, segmentCount } = file.clips[0];
-for (let picture = 0; picture / 60 < rounds * lastTime; picture++) {
+const shown = [], view = { distance: 1e-3, fov: 0.8, height: 1080 };
+for (let picture = 0; picture / 60 < rounds * file.clips[0].lastTime; picture++) {
   const start = clock, now = plant.update(picture / 60, view);
   longest = Math.max(longest, clock - start);
   shown.push([file.segmentOf(Math.floor(file.frameAt(picture / 60, "loop"))), now?.level ?? -1]);
   await new Promise((done) => setTimeout(done, 0)); // what is fetched arrives
-  if (picture === 0) while (file.ranges(deepest, 0).length > 0 && !plant.failure) { // all of it, to measure decoding alone
+  while (picture === 0 && file.ranges(deepest, 0).length > 0 && !plant.failure) { // to measure decoding alone
     plant.update(0, view);
     await new Promise((done) => setTimeout(done, 1));
   }
@@ -165,14 +165,14 @@ def test_a_plant_without_faces_is_points(tmp_path):
     clip = plants.plant(branches=4, frames=10)
     script = """
     import { openPlant } from "./plant.js";
-    const plant = await openPlant(process.argv[2]), { mesh, origin } = plant, view = { distance: 1e-3, fov: 0.8, height: 1080 };
+    const plant = await openPlant(process.argv[2]), { mesh, origin } = plant;
     let shown = null;
     while (shown?.level !== plant.file.info.levelCount - 1 && !plant.failure) {
       await new Promise((done) => setTimeout(done, 1));
-      shown = plant.update(0.2, view);
+      shown = plant.update(0.2, { distance: 1e-3, fov: 0.8, height: 1080 });
     }
-    console.log(JSON.stringify({ failure: plant.failure, positions: [...shown.positions], origin, source: [...mesh.source],
-      triangles: mesh.triangles.length }));
+    console.log(JSON.stringify({ failure: plant.failure, positions: [...shown.positions], origin,
+      source: [...mesh.source], triangles: mesh.triangles.length }));
     """
     with ThrottledServer({"points.ath": athcodec.encode(clip, rel_error=1e-3, effort="fast")}) as server:
         result = json.loads(run(tmp_path, script, f"{server.address}points.ath"))
