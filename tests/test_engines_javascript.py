@@ -28,6 +28,7 @@ NODE = Path(__file__).resolve().parent / "node"
 NEAR, FAR = 12.0, 90.0  # Metres at which the tree is shown at two levels.
 FRAMES = range(0, 40, 4)
 ESBUILD = "esbuild@0.28.2"
+NO_CODE = r"\s*(//|/\*|\*|import|using |#include|#define)"
 # Engines that a user of Babylon.js or PlayCanvas has, and those of a user of three.js.
 APPS = {"engines_page.mjs": "playcanvas@2.23.3 @babylonjs/core@9.35.0", "engines_three_page.mjs": "three@0.187.0"}
 ENGINES = {"playcanvas": "engines_page.mjs", "babylon": "engines_page.mjs", "three": "engines_three_page.mjs"}
@@ -91,10 +92,10 @@ def package(folder: Path) -> None:
     (folder / "node_modules" / "athcodec-three").symlink_to(VIEWER)
 
 
-def run(folder: Path, script: str, *words: object) -> str:
-    """What a script prints that stands beside plant.js."""
+def run(folder: Path, script: str, *words: object, player: str | None = None) -> str:
+    """What a script prints that stands beside plant.js, or another player of that name."""
     package(folder)
-    shutil.copy(EXAMPLES / "plant.js", folder)
+    (folder / "plant.js").write_text(player or (EXAMPLES / "plant.js").read_text("utf-8"), "utf-8")
     (folder / "package.json").write_text('{"type": "module"}')
     (folder / "script.mjs").write_text(script)
     return printed("node", folder / "script.mjs", *words)
@@ -147,16 +148,71 @@ def test_the_shown_level_never_falls_at_the_boundaries_of_segments(cost, swaying
     assert result["longest"] <= 500 / 60 + cost / result["steps"], "half of a picture's time, and a step"
 
 
+def page_blocks() -> list[str]:
+    """The blocks of JavaScript of the page: the player, what lists levels, and lines for fades."""
+    return re.findall(r"```js\n(.*?)```\n", (ROOT / "docs" / "engines.md").read_text("utf-8"), re.DOTALL)
+
+
+LISTS = """
+import { readFileSync } from "node:fs";
+import { openPlant } from "./plant.js";
+const plant = await openPlant(readFileSync(process.argv[2]));
+"""
+
+
+@pytest.mark.web
+def test_the_lines_of_the_page_list_the_levels_of_a_file_in_node(tmp_path):
+    lines = run(tmp_path, LISTS + page_blocks()[1], TREE).splitlines()
+    with athcodec.open(TREE) as decoder:
+        levels = decoder.file.levels
+    assert len(lines) == len(levels)
+    for line, level in zip(lines, levels):  # A level does without what only coarser ones need.
+        words, size = line.rsplit(" ", 1)
+        assert words == f"{level.level} {level.name} {level.p99_error:.16g}" and 0 < int(size) <= level.bytes
+
+
+FADES = """
+import { openPlant } from "./plant.js";
+import { readFileSync } from "node:fs";
+const plant = await openPlant(readFileSync(process.argv[2])), shown = [], { file } = plant;
+const start = file.times()[file.segmentStart(1)] - 0.15, play = (k, distance) =>
+  plant.update(start + k / 600, { distance, fov: 0.8, height: 1080, budget: 1e9 });
+for (let k = 0; k < 240; k++) shown.push([...play(k, k < 20 ? 1e9 : 1e-3).positions]);
+console.log(JSON.stringify(shown));
+"""
+
+
+@pytest.mark.web
+def test_the_lines_of_the_page_fade_from_level_to_level_over_boundaries_of_segments(swaying, tmp_path):
+    (tmp_path / "plant.ath").write_bytes(swaying)
+    text, steps, ends = (EXAMPLES / "plant.js").read_text("utf-8"), [], []
+    replaced = re.search(r"    for \(const each of decoded\).*?file\.positions\(.*?\n", text, re.DOTALL)[0]
+    faded = text.replace(replaced, page_blocks()[2]).replace("{ AthFile, ready }", "{ AthFade, AthFile, ready }")
+    faded = faded.replace("  let works", "  const fade = new AthFade();\n  let works")
+    for name, code in (("plain", text), ("faded", faded)):
+        folder = tmp_path / name
+        folder.mkdir()
+        shown = np.array(json.loads(run(folder, FADES, tmp_path / "plant.ath", player=code)))
+        steps.append(np.abs(np.diff(shown, axis=0)).max(axis=1))
+        ends.append(shown[-1])
+    assert np.argmax(steps[0]) == 19 and steps[1].max() < steps[0].max() / 4
+    assert np.allclose(*ends, atol=1e-5 * np.abs(ends[0]).max())
+
+
 def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
     page = (ROOT / "docs" / "engines.md").read_text("utf-8")
     section = page[page.index("## JavaScript") :]
-    assert re.search(r"```js\n(.*?)```\n", section, re.DOTALL)[1] == (EXAMPLES / "plant.js").read_text("utf-8")
+    assert page_blocks()[0] == (EXAMPLES / "plant.js").read_text("utf-8")
+    for path in ("viewer/examples/plant.js", "core/examples/Plant.cs", "core/examples/raylib_player.c"):
+        code = (VIEWER.parent / path).read_text("utf-8").splitlines()
+        lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
+        assert re.search(rf"\({re.escape(f'../athcodec/{path}')}\) \| {len(lines)} \|", page), path
     for packages in APPS.values():
         for package in packages.split():
             name, version = package.rsplit("@", 1)
             example = next(each for each in ENGINES if each in name)
             code = (EXAMPLES / f"{example}.js").read_text("utf-8").splitlines()
-            lines = [line for line in code if line.strip() and not re.match(r"\s*(//|/\*|\*|import)", line)]
+            lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
             assert re.search(rf"\| {version} \| \[{example}.js\][^|]*(\|[^|]*)?\| {len(lines)} \|", section), name
 
 

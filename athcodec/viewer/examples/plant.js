@@ -1,4 +1,5 @@
 // An .ath file for any engine: openPlant(url) gives its mesh, and update() its positions and normals for every drawn frame.
+// In place of a URL, it takes the bytes of a file.
 import { AthFile, ready } from "athcodec-three/decoder";
 
 export async function openPlant(url) {
@@ -6,6 +7,7 @@ export async function openPlant(url) {
   let file = null, isFetching = false;
 
   async function bytesOf(offset, size) {
+    if (url instanceof Uint8Array) return [url, 0];
     const answer = await fetch(url, { headers: { Range: `bytes=${offset}-${offset + size - 1}` } });
     if (!answer.ok) throw new Error(`${url}: got status ${answer.status}, expected 200 or 206`);
     return [new Uint8Array(await answer.arrayBuffer()), answer.status === 206 ? offset : 0]; // 200: the whole file
@@ -69,7 +71,7 @@ export async function openPlant(url) {
     const now = file.segmentOf(Math.floor(frame)), next = now < last ? now + 1 : clip.firstSegment;
     const left = [now, next].reduce((sum, index) => sum + (costs[level] ?? 0) * (1 - (find(index, level)?.progress ?? 0)), 0);
     const updates = (file.segmentStart(now + 1) - frame) / (frame - before.frame); // until the next segment is shown
-    const due = updates > 0 ? Math.min(1.5 * left / updates, 500 * Math.min(seconds - before.seconds, 0.1)) : 0;
+    const passed = seconds - before.seconds, due = updates > 0 ? Math.min(1.5 * left / updates, 500 * Math.min(passed, 0.1)) : 0;
     const end = performance.now() + Math.max(budget, due), has = (index) => works.some((each) => each.index === index && each.segment);
     before = { seconds, frame };
 
