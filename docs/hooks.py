@@ -26,6 +26,7 @@ SHOWN = (
     "athcodec/sample/*.ath",
     "athcodec/viewer/web/*",
     "athcodec/viewer/*.d.ts",
+    "athcodec/viewer/ath_decoder.mjs",
     "athcodec/viewer/examples/*",
     "athcodec/viewer/src/*.d.ts",
     "athcodec/exporters/vat.md",
@@ -37,6 +38,7 @@ SHOWN = (
     "athcodec/core/include/ath_gpu.h",
     "athcodec/core/include/ath_player.h",
     "athcodec/core/examples/*",
+    "athcodec/core/bindings/*",
     "tests/points_plugin/pyproject.toml",
     "tests/points_plugin/athcodec_points/*.py",
 )

@@ -181,8 +181,9 @@ def test_the_c_program_shows_a_coarse_level_at_a_distance(files, c_program):
 
 
 def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
-    ((_, text),) = blocks(ROOT / "docs" / "webassembly.md", "js")
-    module = (ROOT / "athcodec" / "viewer" / "ath_decoder.mjs").as_uri()
+    (_, player), (_, text) = blocks(ROOT / "docs" / "webassembly.md", "js")
+    viewer = ROOT / "athcodec" / "viewer"
+    module = (viewer / "ath_decoder.mjs").as_uri()
     given = (
         "import { readFileSync } from 'node:fs';\n"
         "const bytes = new Uint8Array(readFileSync(process.argv[2]));\n"
@@ -194,6 +195,13 @@ def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
     shown = run("node", tmp_path / "example.mjs", files / "tree.ath")
     with athcodec.open(files / "tree.ath") as decoder:
         assert shown == decoder.positions(30).tobytes()
+    copied = (viewer / "examples" / "plant.js").read_text("utf-8").replace("athcodec-three/decoder", module)
+    (tmp_path / "plant.js").write_text(copied)
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    draw = "const draw = (triangles, positions) => console.log(triangles.length, positions.length);\n"
+    at_once = player.replace("'tree.ath'", "bytes").replace("height }", "height, budget: 60_000 }")
+    (tmp_path / "example.mjs").write_text(given + draw + at_once)
+    assert run("node", tmp_path / "example.mjs", files / "tree.ath") == b"0 3003\n"
 
 
 def test_the_report_on_robustness_is_that_of_the_stored_results_and_names_the_commit_of_each():

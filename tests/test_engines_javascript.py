@@ -13,6 +13,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import plants
 import pytest
 from programs import CACHE, install_once, printed
 
@@ -27,6 +28,7 @@ NODE = Path(__file__).resolve().parent / "node"
 NEAR, FAR = 12.0, 90.0  # Metres at which the tree is shown at two levels.
 FRAMES = range(0, 40, 4)
 ESBUILD = "esbuild@0.28.2"
+NO_CODE = r"\s*(//|/\*|\*|import|using |#include|#define)"
 # Engines that a user of Babylon.js or PlayCanvas has, and those of a user of three.js.
 APPS = {"engines_page.mjs": "playcanvas@2.23.3 @babylonjs/core@9.35.0", "engines_three_page.mjs": "three@0.187.0"}
 ENGINES = {"playcanvas": "engines_page.mjs", "babylon": "engines_page.mjs", "three": "engines_three_page.mjs"}
@@ -52,18 +54,51 @@ console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [
 """
 
 
+# Plays 60 pictures a second by a clock of its own, in which a segment takes `cost` ms at the deepest level, and a tenth
+# of that at others.
+PLAY_ON = """
+import { openPlant } from "./plant.js";
+const [url, cost, rounds] = process.argv.slice(2), { AthFile } = await import("athcodec-three/decoder");
+const plant = await openPlant(url), { file } = plant, deepest = file.info.levelCount - 1;
+const alone = file.preparation(0, deepest);
+let clock = 0, steps = 1, spent = 0, longest = 0;
+while (!alone.step(1)) steps++;
+alone.segment.free();
+performance.now = () => clock;
+const preparation = file.preparation.bind(file);
+file.preparation = (...given) => {
+  const work = preparation(...given), step = work.step.bind(work);
+  work.step = () => { clock += (work.level === deepest ? 1 : 0.1) * Number(cost) / steps; return step(1); };
+  return work;
+};
+const shown = [], view = { distance: 1e-3, fov: 0.8, height: 1080 };
+for (let picture = 0; picture / 60 < rounds * file.clips[0].lastTime; picture++) {
+  const start = clock, now = plant.update(picture / 60, view);
+  longest = Math.max(longest, clock - start);
+  shown.push([file.segmentOf(Math.floor(file.frameAt(picture / 60, "loop"))), now?.level ?? -1]);
+  await new Promise((done) => setTimeout(done, 0)); // what is fetched arrives
+  while (picture === 0 && file.ranges(deepest, 0).length > 0 && !plant.failure) { // to measure decoding alone
+    plant.update(0, view);
+    await new Promise((done) => setTimeout(done, 1));
+  }
+}
+console.log(JSON.stringify({ shown, deepest, steps, longest, failure: plant.failure?.message ?? null }));
+"""
+
+
 def package(folder: Path) -> None:
     """The npm package, where programs of a folder find it."""
     (folder / "node_modules").mkdir()
     (folder / "node_modules" / "athcodec-three").symlink_to(VIEWER)
 
 
-def play(folder: Path, url: str, distance: float, *seconds: float, code: int = 0):
+def run(folder: Path, script: str, *words: object, player: str | None = None) -> str:
+    """What a script prints that stands beside plant.js, or another player of that name."""
     package(folder)
-    shutil.copy(EXAMPLES / "plant.js", folder)
+    (folder / "plant.js").write_text(player or (EXAMPLES / "plant.js").read_text("utf-8"), "utf-8")
     (folder / "package.json").write_text('{"type": "module"}')
-    (folder / "play.mjs").write_text(PLAY)
-    return printed("node", folder / "play.mjs", url, distance, *seconds, code=code)
+    (folder / "script.mjs").write_text(script)
+    return printed("node", folder / "script.mjs", *words)
 
 
 def decoded(level: int, frame: int) -> np.ndarray:
@@ -76,7 +111,7 @@ def decoded(level: int, frame: int) -> np.ndarray:
 def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(distance, ranges, tmp_path):
     data = TREE.read_bytes()
     with ThrottledServer({"tree.ath": data}, ranges=ranges) as server:
-        result = json.loads(play(tmp_path, f"{server.address}tree.ath", distance, 0.5, 3.5))
+        result = json.loads(run(tmp_path, PLAY, f"{server.address}tree.ath", distance, 0.5, 3.5))
         fetched = server.sent("tree.ath")
     assert result["failure"] is None
     for shown, frame in zip(result["shown"], (15, 105)):
@@ -92,17 +127,114 @@ def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(
             assert distance == NEAR or fetched < len(data) / 3
 
 
+@pytest.fixture(scope="module")
+def swaying() -> bytes:
+    """A plant of 6 segments of 40 frames, 1.3 s each."""
+    options = dict(rel_error=1e-3, effort="fast", segment_frames=40)
+    return athcodec.encode(plants.plant(branches=60, longest=20, frames=240), **options)
+
+
+# The budget of 2 ms in each of 80 pictures is 160 ms a segment: the second case takes more.
+@pytest.mark.web
+@pytest.mark.parametrize("cost", [110, 200])
+def test_the_shown_level_never_falls_at_the_boundaries_of_segments(cost, swaying, tmp_path):
+    with ThrottledServer({"plant.ath": swaying}) as server:
+        result = json.loads(run(tmp_path, PLAY_ON, f"{server.address}plant.ath", cost, 1.5))
+    assert result["failure"] is None and result["steps"] > 100, "one step is little"
+    segments, levels = np.transpose(result["shown"])
+    arrival = np.argmax(levels == result["deepest"])
+    assert (levels[np.argmax(levels >= 0) :] >= 0).all() and (np.diff(segments[arrival:]) != 0).sum() > 6
+    assert (levels[arrival:] == result["deepest"]).all()
+    assert result["longest"] <= 500 / 60 + cost / result["steps"], "half of a picture's time, and a step"
+
+
+def page_blocks() -> list[str]:
+    """The blocks of JavaScript of the page: the player, what lists levels, and lines for fades."""
+    return re.findall(r"```js\n(.*?)```\n", (ROOT / "docs" / "engines.md").read_text("utf-8"), re.DOTALL)
+
+
+LISTS = """
+import { readFileSync } from "node:fs";
+import { openPlant } from "./plant.js";
+const plant = await openPlant(readFileSync(process.argv[2]));
+"""
+
+
+@pytest.mark.web
+def test_the_lines_of_the_page_list_the_levels_of_a_file_in_node(tmp_path):
+    lines = run(tmp_path, LISTS + page_blocks()[1], TREE).splitlines()
+    with athcodec.open(TREE) as decoder:
+        levels = decoder.file.levels
+    assert len(lines) == len(levels)
+    for line, level in zip(lines, levels):  # A level does without what only coarser ones need.
+        words, size = line.rsplit(" ", 1)
+        assert words == f"{level.level} {level.name} {level.p99_error:.16g}" and 0 < int(size) <= level.bytes
+
+
+FADES = """
+import { openPlant } from "./plant.js";
+import { readFileSync } from "node:fs";
+const plant = await openPlant(readFileSync(process.argv[2])), shown = [], { file } = plant;
+const start = file.times()[file.segmentStart(1)] - 0.15, play = (k, distance) =>
+  plant.update(start + k / 600, { distance, fov: 0.8, height: 1080, budget: 1e9 });
+for (let k = 0; k < 240; k++) shown.push([...play(k, k < 20 ? 1e9 : 1e-3).positions]);
+console.log(JSON.stringify(shown));
+"""
+
+
+@pytest.mark.web
+def test_the_lines_of_the_page_fade_from_level_to_level_over_boundaries_of_segments(swaying, tmp_path):
+    (tmp_path / "plant.ath").write_bytes(swaying)
+    text, steps, ends = (EXAMPLES / "plant.js").read_text("utf-8"), [], []
+    replaced = re.search(r"    for \(const each of decoded\).*?file\.positions\(.*?\n", text, re.DOTALL)[0]
+    faded = text.replace(replaced, page_blocks()[2]).replace("{ AthFile, ready }", "{ AthFade, AthFile, ready }")
+    faded = faded.replace("  let works", "  const fade = new AthFade();\n  let works")
+    for name, code in (("plain", text), ("faded", faded)):
+        folder = tmp_path / name
+        folder.mkdir()
+        shown = np.array(json.loads(run(folder, FADES, tmp_path / "plant.ath", player=code)))
+        steps.append(np.abs(np.diff(shown, axis=0)).max(axis=1))
+        ends.append(shown[-1])
+    assert np.argmax(steps[0]) == 19 and steps[1].max() < steps[0].max() / 4
+    assert np.allclose(*ends, atol=1e-5 * np.abs(ends[0]).max())
+
+
 def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
     page = (ROOT / "docs" / "engines.md").read_text("utf-8")
     section = page[page.index("## JavaScript") :]
-    assert re.search(r"```js\n(.*?)```\n", section, re.DOTALL)[1] == (EXAMPLES / "plant.js").read_text("utf-8")
+    assert page_blocks()[0] == (EXAMPLES / "plant.js").read_text("utf-8")
+    for path in ("viewer/examples/plant.js", "core/examples/Plant.cs", "core/examples/raylib_player.c"):
+        code = (VIEWER.parent / path).read_text("utf-8").splitlines()
+        lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
+        assert re.search(rf"\({re.escape(f'../athcodec/{path}')}\) \| {len(lines)} \|", page), path
     for packages in APPS.values():
         for package in packages.split():
             name, version = package.rsplit("@", 1)
             example = next(each for each in ENGINES if each in name)
             code = (EXAMPLES / f"{example}.js").read_text("utf-8").splitlines()
-            lines = [line for line in code if line.strip() and not re.match(r"\s*(//|/\*|\*|import)", line)]
+            lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
             assert re.search(rf"\| {version} \| \[{example}.js\][^|]*(\|[^|]*)?\| {len(lines)} \|", section), name
+
+
+@pytest.mark.web
+def test_a_plant_without_faces_is_points(tmp_path):
+    clip = plants.plant(branches=4, frames=10)
+    script = """
+    import { openPlant } from "./plant.js";
+    const plant = await openPlant(process.argv[2]), { mesh, origin } = plant;
+    let shown = null;
+    while (shown?.level !== plant.file.info.levelCount - 1 && !plant.failure) {
+      await new Promise((done) => setTimeout(done, 1));
+      shown = plant.update(0.2, { distance: 1e-3, fov: 0.8, height: 1080 });
+    }
+    console.log(JSON.stringify({ failure: plant.failure, positions: [...shown.positions], origin,
+      source: [...mesh.source], triangles: mesh.triangles.length }));
+    """
+    with ThrottledServer({"points.ath": athcodec.encode(clip, rel_error=1e-3, effort="fast")}) as server:
+        result = json.loads(run(tmp_path, script, f"{server.address}points.ath"))
+    assert result["failure"] is None and result["triangles"] == 0
+    wanted, bound = clip.positions[6], 1.1e-3 * np.linalg.norm(np.ptp(clip.positions.reshape(-1, 3), axis=0))
+    assert np.abs(np.reshape(result["positions"], (-1, 3)) + result["origin"] - wanted[result["source"]]).max() < bound
 
 
 @pytest.mark.web
@@ -111,15 +243,11 @@ def test_a_file_that_is_cut_off_or_not_there_is_an_error(tmp_path):
         for name, message in (("cut.ath", "MISSING"), ("none.ath", "got status 404")):
             folder = tmp_path / name
             folder.mkdir()
-            package(folder)
-            shutil.copy(EXAMPLES / "plant.js", folder)
-            (folder / "package.json").write_text('{"type": "module"}')
             script = f"""
             import {{ openPlant }} from "./plant.js";
             await openPlant("{server.address}{name}").catch((error) => console.log(error.message));
             """
-            (folder / "open.mjs").write_text(script)
-            assert message in printed("node", folder / "open.mjs")
+            assert message in run(folder, script)
 
 
 def test_an_engine_that_is_not_three_asks_for_no_three():

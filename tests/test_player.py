@@ -527,6 +527,20 @@ def test_the_segment_that_comes_is_there_when_its_time_comes(lib, sample_ath, wr
         assert memory.taken == taken
 
 
+@pytest.mark.parametrize("budget", [BUDGET, BUDGET // 4])
+def test_playing_on_shows_no_coarser_level_than_before(lib, budget):
+    """Over the boundaries of segments, whether the level that is asked for is ready in time or not."""
+    with athcodec.open(SHIPPED) as file, Player(lib, SHIPPED.read_bytes(), budget=budget) as player:
+        step = 1 / 30 if budget == BUDGET else 1 / 60
+        duration, deepest = file.time[file.file.clips[0].frame_count - 1] - file.time[0], file.file.level_count - 1
+        levels = []
+        for time in np.arange(0, duration, step):
+            levels.append(player.level(time, wrap=LOOP))
+            lib.ath_player_ahead(player.player, budget)
+    assert 0 == levels[0] < levels[-1] and levels == sorted(levels)
+    assert budget != BUDGET or levels[-1] == deepest
+
+
 def test_jobs_run_on_other_threads_while_this_one_shows(lib, sample_ath):
     with athcodec.open(sample_ath) as file:
         wanted, seconds = file.positions(), file.time - file.time[0]

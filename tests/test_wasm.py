@@ -266,13 +266,20 @@ waiting.push(file.preparation(0, 0));
 waiting.pop().cancel();
 let rounds = 0;
 while (waiting.map((preparation) => preparation.step(3)).includes(false)) rounds++;
-answer({ whole, steps: frames(file, waiting.map(({ segment }) => segment)), rounds });
+const progress = each(file.info.segmentCount, (index) => {
+  const preparation = file.preparation(index, deepest, { following: waiting[index - 1]?.segment }), shares = [];
+  do shares.push(preparation.progress); while (!preparation.step(1));
+  return [shares, preparation.progress];
+});
+answer({ whole, steps: frames(file, waiting.map(({ segment }) => segment)), rounds, progress });
 """
 
 
 def test_segments_prepared_side_by_side_in_steps_show_the_same_bits(sample_ath, tmp_path):
     result = run_node(tmp_path, STEPS, sample_ath)
     assert result["steps"] == result["whole"] and result["rounds"] > 10
+    for shares, end in result["progress"]:  # also of a segment that is joined to the one before
+        assert end == 1 and shares[0] == 0 and shares == sorted(shares) and 0.9 < shares[-1] < 1
 
 
 # ---- bytes that arrive ----
@@ -636,7 +643,7 @@ const out = new Float32Array(positions.length), normals = file.normals(positions
 answer({ triangles: [...file.triangles()], normals: [...normals], same: normals === out, rest: [...positions],
          source: [...mesh.source], mesh: [...mesh.triangles], uv: [...mesh.uv], colors: [...mesh.colors],
          gathered: [...mesh.gather(positions)], few: thrown(() => file.normals(positions.subarray(3))),
-         clips: file.clips, plain: [plain.triangles(), plain.mesh()] });
+         clips: file.clips, plain: [plain.triangles(), [...plain.mesh().triangles], plain.mesh().source.length] });
 """
 
 
@@ -658,7 +665,7 @@ def test_triangles_normals_and_a_mesh_come_without_the_loader(sample_ath, tmp_pa
     assert np.array_equal(uv[result["mesh"]], static_arrays()["uv"][corners])
     assert np.allclose(np.reshape(result["colors"], (-1, 4)), [1, 0, 0.2, 1])
     assert np.array_equal(np.reshape(result["gathered"], (-1, 3)), rest[source])
-    assert result["few"]["type"] == "RangeError" and result["plain"] == [None, None]
+    assert result["few"]["type"] == "RangeError" and result["plain"] == [None, [], len(athcodec.open(sample_ath)[0])]
 
 
 def test_the_duration_of_a_loop_is_its_round_and_that_of_others_the_time_of_their_last_frame(sample_ath, tmp_path):

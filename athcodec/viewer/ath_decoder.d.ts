@@ -175,7 +175,7 @@ export interface Attribute {
 export interface Mesh {
   /** The vertex of the source that each vertex of the mesh is. */
   readonly source: Uint32Array;
-  /** Three vertices of the mesh each, in the order of the faces; faces of more corners are fans. */
+  /** Three vertices of the mesh each, in the order of the faces; faces of more corners are fans. Empty: the file has no faces. */
   readonly triangles: Uint32Array;
   /** Texture coordinates as the source has them, 2 numbers per vertex of the mesh; null: the file has none. */
   readonly uv: Float32Array | null;
@@ -251,6 +251,8 @@ export interface Preparation {
   readonly level: number;
   /** Null until step() has returned true. */
   readonly segment: Segment | null;
+  /** The share of its steps that are done, from 0 to 1. It may end early, since steps are counted as if it took the most. */
+  readonly progress: number;
   /** Goes on for `steps` (default 16) bounded pieces of work, of at most 64 vertices or one matrix over
    * the segment's frames. True: done. Throws AthError where the file is damaged; nothing is left to clean
    * up then. */
@@ -340,9 +342,9 @@ export class AthFile {
   /** Unit normals of vertices at `positions`, both in the source's order, 3 numbers each: those of the triangles around each, weighted
    * by area. A vertex without triangles gets one that points away from the middle. They go to `out` if given. */
   normals(positions: ArrayLike<number>, options?: { out?: Float32Array }): Float32Array;
-  /** Triangles, texture coordinates and colours for an engine; null: the file has no faces. Feed attributeRanges() before: throws
-   * AthError, "MISSING", as attribute() does. */
-  mesh(): Mesh | null;
+  /** Triangles, texture coordinates and colours for an engine. Feed attributeRanges() before: throws AthError, "MISSING", as
+   * attribute() does. */
+  mesh(): Mesh;
 
   /** Hands over `bytes`, the file's from `offset` on. Chunks that lie inside can be used from now on; one
    * that begins inside goes on with the piece that continues it, so the pieces of one download can be fed

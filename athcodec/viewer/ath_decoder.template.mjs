@@ -401,13 +401,20 @@ class Segment {
 class Preparation {
   #step;
   #cancel;
+  #steps; // the largest number that it takes
+  #done = 0;
 
-  constructor(index, level, step, cancel) {
+  constructor(index, level, steps, step, cancel) {
     this.index = index;
     this.level = level;
     this.segment = null;
+    this.#steps = steps;
     this.#step = step;
     this.#cancel = cancel;
+  }
+
+  get progress() {
+    return this.segment ? 1 : Math.min(this.#done / this.#steps, 1);
   }
 
   step(steps = 16) {
@@ -416,6 +423,7 @@ class Preparation {
     whole(steps, 1, MOST_STEPS, "steps");
     try {
       this.segment = this.#step(steps);
+      this.#done += steps;
     } catch (error) {
       this.#step = null;
       throw error;
@@ -803,8 +811,7 @@ export class AthFile {
   }
 
   mesh() {
-    const faces = this.#faces();
-    if (!faces) return null;
+    const faces = this.#faces() ?? { array: new Uint32Array(0), columns: 3, counts: null };
     const domains = this.metadata().domains ?? {}, { vertexCount } = this.info, corners = faces.array;
     const [uv, colors] = [["uv", [2]], ["colors", [3, 4]]].map(([name, sizes]) =>
       this.#rows(name, sizes, domains[name] === "corner", domains[name] === "corner" ? corners.length : vertexCount));
@@ -933,6 +940,7 @@ export class AthFile {
     let before = this.#pointer(from) && from.index === segment ? this.#pointers.get(from) : null, at = 0, kept = 0;
     const work = this.#works.pop() ?? core.take(workSize);
     const reads = [segment, this.joinedTo(segment, level)].filter((index) => index >= 0);
+    let steps = c.ath_prepare_steps(this.#at, segment, level); // half of which decode the segment that this one is joined to
     const end = () => {
       this.#works.push(work);
       for (const index of reads) {
@@ -946,12 +954,12 @@ export class AthFile {
       core.give(at);
       core.give(kept);
     };
-    const step = (steps) => {
+    const step = (count) => {
       if (before && from.freed) {
         fail();
         throw new Error("step: got a freed segment");
       }
-      const code = this.#c.ath_prepare_step(work, steps);
+      const code = this.#c.ath_prepare_step(work, count);
       if (code === MORE) return null;
       try {
         this.#checkWork(code, work);
@@ -976,12 +984,13 @@ export class AthFile {
       this.#check(code, `segment ${segment} at level ${level}`);
       const room = keep ? Math.min(c.ath_keep_size(this.#at, level) >>> 0, size >>> 1) : 0; // a hundredth is usual
       if (room >= 16) c.ath_keep(work, kept = core.take(room), room);
-      if (this.#pointer(following)) c.ath_follow(work, this.#pointers.get(following).at); // or decodes it anew
+      const follows = this.#pointer(following) && c.ath_follow(work, this.#pointers.get(following).at) === OK; // or decodes it anew
+      if (follows && reads.length > 1) steps = Math.ceil(steps / 2);
     } catch (error) {
       fail();
       throw error;
     }
-    return new Preparation(segment, level, step, fail);
+    return new Preparation(segment, level, steps, step, fail);
   }
 
   // Builds what the segments share at a level, in memory that stays as long as the file.

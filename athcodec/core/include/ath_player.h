@@ -22,8 +22,10 @@
  *
  * Time. A call that shows something builds levels and prepares segments for its budget, about 2 ms, and at most one step
  * of ath.h more. Opening takes longer, unless you choose options.in_slices.
- * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. If
- * there is none, it prepares level 0 at once, or the coarsest one whose bytes have been fed. If the level is prepared for only one of two frames, that one is held.
+ * Until the level that you ask for is prepared, it shows the best level that is: a deeper one, else a coarser one. A
+ * coarse level of the next segment is prepared first, in case the budget does not suffice for the one that you ask for.
+ * If nothing is prepared, level 0 is, at once, or the coarsest one whose bytes have been fed. If the level is prepared
+ * for only one of two frames, that one is held.
  *
  * Threads. Use a player from one thread at a time. Only ath_player_run may run on other threads meanwhile, each job on
  * one. Hand the job over and back by a queue of yours.
@@ -604,14 +606,37 @@ static int32_t ath_player_aim(const ath_player *p, int32_t segment, int32_t leve
     return aim >= 0 && ath_player_best(p, segment, aim, p->deepest) < aim ? aim : level;
 }
 
-/* Gets the segments of a moment at a level or, until they are prepared, at the best level up to `most`. */
-static int ath_player_moment_at(ath_player *p, double frame, int32_t level, int32_t most, ath_player_moment *moment)
+/* Returns the segment that comes after the one shown; -1: none. */
+static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
 {
-    ath_blend blend = ath_blend_at(p->file, frame);
-    int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1, exactly = ATH_PLAYER_EXACT;
+    const ath_clip *clip = ath_clips(p->file) + now->clip;
+    int32_t last = clip->first_segment + clip->segment_count - 1, next = now->segment + now->direction;
+    if (next >= clip->first_segment && next <= last) return next;
+    if (now->wrap == ATH_LOOP) return next > last ? clip->first_segment : last;
+    if (now->wrap == ATH_PING_PONG && clip->segment_count > 1) return now->segment - now->direction;
+    return -1;
+}
+
+/* Returns the level at which the segment that comes next is prepared before a level of this one is, so that the plant is
+ * as good there as here until then; -1: none. A job for this one goes on, since it would have to begin anew. */
+static int32_t ath_player_aim_after(const ath_player *p, const ath_player_track *now, int32_t level, int32_t *next)
+{
+    *next = ath_player_next(p, now);
+    if (*next < 0 || p->budget == ATH_PLAYER_EXACT || ath_player_job_of(p, now->segment, level)) return -1;
+    level = ath_player_level_of(p, *next, level);
+    int32_t aim = level >= 0 ? ath_player_aim(p, *next, level) : -1;
+    return aim < level ? aim : -1;
+}
+
+/* Gets the segments of a moment at a level or, until they are prepared, at the best level up to `most`. */
+static int ath_player_moment_at(ath_player *p, const ath_player_track *now, int32_t level, int32_t most,
+                                ath_player_moment *moment)
+{
+    ath_blend blend = ath_blend_at(p->file, now->frame);
+    int32_t count = blend.segment[1] != blend.segment[0] ? 2 : 1, exactly = ATH_PLAYER_EXACT, next, after;
     int result = ATH_OK;
     level = ath_player_level_at(p, &blend, level);
-    moment->frame = frame;
+    moment->frame = now->frame;
     moment->level = level;
     moment->segment_count = 0;
     if (level < 0) return ATH_MISSING;
@@ -620,8 +645,11 @@ static int ath_player_moment_at(ath_player *p, double frame, int32_t level, int3
         ath_player_find(p, blend.segment[0], best)->used = p->calls;
     else if (p->left != exactly)
         result = ath_player_prepare(p, blend.segment[0], ath_player_coarsest(p, blend.segment[0], level), &exactly);
-    if (result == ATH_OK && p->left != exactly)
-        result = ath_player_prepare(p, blend.segment[0], ath_player_aim(p, blend.segment[0], level), &p->left);
+    int32_t aim = ath_player_aim(p, blend.segment[0], level);
+    if (result == ATH_OK && p->left != exactly && aim < level)
+        result = ath_player_prepare(p, blend.segment[0], aim, &p->left);
+    if (result == ATH_OK && p->left != exactly && (after = ath_player_aim_after(p, now, level, &next)) >= 0)
+        (void)ath_player_prepare(p, next, after, &p->left); /* its damage is told when it is shown */
     for (int32_t i = 0; i < count && result == ATH_OK; i++)
         result = ath_player_prepare(p, blend.segment[i], level, &p->left);
     if (result != ATH_OK && result != ATH_MORE) return result;
@@ -685,7 +713,7 @@ int ath_player_show(ath_player *player, int32_t clip, double seconds, ath_wrap w
 {
     double frame;
     int result = ath_player_move_one(player, clip, seconds, wrap, level, &frame);
-    return result == ATH_OK ? ath_player_moment_at(player, frame, level, player->deepest, moment) : result;
+    return result == ATH_OK ? ath_player_moment_at(player, player->tracks, level, player->deepest, moment) : result;
 }
 
 int ath_player_positions(ath_player *player, int32_t clip, double seconds, ath_wrap wrap, int32_t level,
@@ -705,7 +733,7 @@ int ath_player_matrices(ath_player *player, int32_t clip, double seconds, ath_wr
     double frame;
     int result = ath_player_move_one(player, clip, seconds, wrap, level, &frame);
     if (result == ATH_OK)
-        result = ath_player_moment_at(player, frame, level, level < 0 ? player->deepest : level, &now);
+        result = ath_player_moment_at(player, player->tracks, level, level < 0 ? player->deepest : level, &now);
     if (result != ATH_OK) return result;
     if (shown) *shown = now.level;
     result = ath_matrices(player->file, now.segments, now.segment_count, now.frame, matrices, 12 * size);
@@ -724,7 +752,7 @@ int ath_player_faded_positions(ath_player *player, int32_t clip, double seconds,
     if (result != ATH_OK) return result;
     for (int32_t i = 0; i < fade->count; i++) {
         ath_player_moment moment;
-        result = ath_player_moment_at(player, frame, fade->level[i], player->deepest, &moment);
+        result = ath_player_moment_at(player, player->tracks, fade->level[i], player->deepest, &moment);
         if (result != ATH_OK) return result;
         shown.level[i] = moment.level;
         for (int32_t k = 0; k < moment.segment_count; k++) segments[count++] = moment.segments[k];
@@ -759,7 +787,7 @@ int ath_player_blended_positions(ath_player *player, const ath_player_share *sha
     if (result != ATH_OK) return result;
     if (count > 1 && !player->blending && !(player->blending = ath_player_block_of(player, size))) return ATH_NO_MEMORY;
     for (int32_t i = 0; i < count; i++) {
-        result = ath_player_moment_at(player, player->tracks[i].frame, used[i].level, player->deepest, moments + i);
+        result = ath_player_moment_at(player, player->tracks + i, used[i].level, player->deepest, moments + i);
         if (result != ATH_OK) return result;
         ath_share share = {moments[i].segments, moments[i].segment_count, moments[i].frame, used[i].weight};
         blended[i] = share;
@@ -786,30 +814,23 @@ int ath_player_wind_positions(ath_player *player, const ath_wind *winds, double 
 
 /* ---- preparing ahead ---- */
 
-/* Returns the segment that comes after the one shown; -1: none. */
-static int32_t ath_player_next(const ath_player *p, const ath_player_track *now)
-{
-    const ath_clip *clip = ath_clips(p->file) + now->clip;
-    int32_t last = clip->first_segment + clip->segment_count - 1, next = now->segment + now->direction;
-    if (next >= clip->first_segment && next <= last) return next;
-    if (now->wrap == ATH_LOOP) return next > last ? clip->first_segment : last;
-    if (now->wrap == ATH_PING_PONG && clip->segment_count > 1) return now->segment - now->direction;
-    return -1;
-}
+/* What is prepared of each clip that is shown, in this order. */
+enum { ATH_PLAYER_AIM, ATH_PLAYER_AIM_AFTER, ATH_PLAYER_LEVEL, ATH_PLAYER_BLENDED, ATH_PLAYER_WISHES };
 
-/* Gets one of the segments to prepare, from place 0 on: three for each clip that is shown, then the next one of each;
+/* Gets one of the segments to prepare, from place 0 on: those wishes of each clip, then the next segment of each;
  * -1: none. Returns 0 after the last place. */
 static int ath_player_wish(const ath_player *p, int32_t place, int32_t *segment, int32_t *level)
 {
-    int32_t shown = 3 * p->track_count;
+    int32_t shown = ATH_PLAYER_WISHES * p->track_count, wish = place < shown ? place % ATH_PLAYER_WISHES : -1;
     if (place >= shown + p->track_count) return 0;
-    const ath_player_track *track = p->tracks + (place < shown ? place / 3 : place - shown);
+    const ath_player_track *track = p->tracks + (place < shown ? place / ATH_PLAYER_WISHES : place - shown);
     ath_blend blend = ath_blend_at(p->file, track->frame);
-    *segment = place < shown ? blend.segment[place % 3 / 2] : ath_player_next(p, track);
-    *level = place < shown ? ath_player_level_at(p, &blend, track->level) : track->level;
-    if (place >= shown && *segment >= 0) *level = ath_player_level_of(p, *segment, *level);
+    *segment = wish < 0 ? ath_player_next(p, track) : blend.segment[wish == ATH_PLAYER_BLENDED];
+    *level = wish < 0 ? track->level : ath_player_level_at(p, &blend, track->level);
+    if (wish < 0 && *segment >= 0) *level = ath_player_level_of(p, *segment, *level);
+    if (wish == ATH_PLAYER_AIM && *level >= 0) *level = ath_player_aim(p, *segment, *level);
+    if (wish == ATH_PLAYER_AIM_AFTER && *level >= 0) *level = ath_player_aim_after(p, track, *level, segment);
     if (*level < 0) *segment = -1;
-    if (place < shown && place % 3 == 0 && *segment >= 0) *level = ath_player_aim(p, *segment, *level);
     return 1;
 }
 
