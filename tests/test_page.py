@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import SLOWEST
 from PIL import Image, ImageSequence
+from test_tubes import RINGS, TWIGS, twigs
 
 import athcodec
 from athcodec import cli
@@ -104,17 +105,14 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     assert not page.is_visible("#level")
 
 
-def test_lines_run_once_along_each_branch_and_not_around_its_bark(opened_file):
-    path = athcodec.sample_path("leafed")
-    page = opened_file(path.read_bytes())
+def test_lines_run_once_along_each_branch_and_not_around_its_bark(opened_file, tmp_path):
+    """Nine twigs of twelve rings on a stem of twelve vertices."""
+    athcodec.encode(twigs(), tmp_path / "twigs.ath", rel_error=1e-3, effort="fast")
+    page = opened_file((tmp_path / "twigs.ath").read_bytes())
     page.click("#show [data-value=lines]")
     found = """() => { const all = []; athcodecViewer.stage.panes[0].scene.traverse((each) => {
       if (each.isLineSegments) all.push(each.geometry.index.count / 2); }); return all; }"""
-    with athcodec.open(path) as decoder:
-        branches, sizes = decoder.file.branches, decoder.file.hierarchy.stem_count
-        rings = [count // ring for count, ring in zip(sizes, branches["ring"]) if ring > 1]
-    (edges,) = page.evaluate(found)
-    assert edges == sum(rings) - 1  # Each ring hangs on the one before, and the first of the trunk on nothing.
+    assert page.evaluate(found) == [TWIGS * RINGS + RINGS - 1]
 
 
 def test_colours_that_tell_something_have_a_legend(page):

@@ -210,15 +210,15 @@ export class Plant {
     return geometry;
   }
 
-  // One line along each branch that is a tube, from ring to ring; where there are none, all edges.
+  // One line along each branch that is a tube, from ring to ring, or that others grow on; where there are no tubes, all edges.
   #alongBranches() {
-    const { skeleton, branches: { first, count, attach, ring }, channel: { vertexPlaces } } = this.ath;
+    const { skeleton, branches: { first, count, attach, parent, ring }, channel: { vertexPlaces } } = this.ath;
     if (!ring.some((size) => size > 1)) return skeleton;
-    const vertex = new Uint32Array(this.ath.channel.info.placeCount), edges = [];
+    const vertex = new Uint32Array(this.ath.channel.info.placeCount), edges = [], bearing = new Set(parent);
     vertexPlaces.forEach((place, i) => { vertex[place] = i; });
     for (let b = 0; b < first.length; b++) {
-      if (!(ring[b] > 1)) continue;
-      for (let place = first[b], before = attach[b]; place < first[b] + count[b]; before = place, place += ring[b])
+      if (!(ring[b] > 1) && !bearing.has(b)) continue;
+      for (let place = first[b], before = attach[b]; place < first[b] + count[b]; before = place, place += Math.max(ring[b], 1))
         if (before >= 0) edges.push(vertex[before], vertex[place]);
     }
     return Uint32Array.from(edges);
