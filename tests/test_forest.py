@@ -257,59 +257,6 @@ def test_axe_finds_nothing_in_a_forest(opened, grove):
     assert found == []
 
 
-CAMERA = "[...athcodecForest.camera.position.toArray(), athcodecForest.camera.rotation.y]"
-
-
-def moves(page) -> list[float]:
-    """How far the camera goes, along x, y and z, and turns, until it has moved."""
-    before = np.array(page.evaluate(CAMERA))
-    page.wait_for_function(
-        f"(before) => Math.hypot(...{CAMERA}.map((x, i) => x - before[i])) > 0.05", arg=before.tolist()
-    )
-    return (np.array(page.evaluate(CAMERA)) - before).tolist()
-
-
-def test_the_forest_is_walked_through_by_keys(opened, grove):
-    page = opened(grove, 50)
-    page.evaluate("athcodecForest.playing = true")
-    page.keyboard.down("w")
-    page.wait_for_function("() => athcodecForest.walk.on")
-    page.wait_for_function(
-        "() => athcodecForest.camera.position.y < 1.05 * athcodecForest.walk.height", timeout=120_000
-    )
-    assert page.get_attribute("#walk", "aria-pressed") == "true"
-    way = page.evaluate(
-        "(() => { const way = athcodecForest.camera.matrixWorld.elements; return [-way[8], -way[10]]; })()"
-    )
-    x, _, z, turned = moves(page)
-    assert x * way[0] + z * way[1] > 0 and abs(turned) < 1e-6
-    page.keyboard.up("w")
-    page.mouse.move(200, 60)
-    page.mouse.down()
-    page.mouse.move(100, 60)
-    page.mouse.up()
-    page.wait_for_function("() => athcodecForest.frames > 0")
-    page.keyboard.press("Escape")
-    page.wait_for_function("() => !athcodecForest.walk.on && athcodecForest.controls.enabled")
-
-
-def test_the_forest_is_walked_through_by_a_thumb(browser, grove):
-    with ThrottledServer({"plant.ath": grove.read_bytes()}) as line:
-        page = browser.new_page(viewport={"width": 360, "height": 480}, has_touch=True, is_mobile=True)
-        page.goto(f"{line.address}forest.html?file=plant.ath&count=50")
-        page.wait_for_function(
-            "() => athcodecForest.forest?.levels.length > 0 && athcodecForest.frames > 1", timeout=120_000
-        )
-        box = page.locator("#stick").bounding_box()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        page.mouse.down()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 4)
-        page.wait_for_function("() => athcodecForest.walk.on")
-        assert max(map(abs, moves(page))) > 0.01
-        page.mouse.up()
-        page.close()
-
-
 @pytest.mark.parametrize("mode", ["matrices", "positions"])
 def test_one_plant_and_its_shadow_move_on_a_renderer_for_webgpu(opened, mode, tmp_path):
     path = tmp_path / "tube.ath"

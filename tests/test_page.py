@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from conftest import SLOWEST
 from PIL import Image, ImageSequence
+from test_tubes import RINGS, TWIGS, twigs
 
 import athcodec
 from athcodec import cli
@@ -102,6 +103,44 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     chip = page.inner_text("#level-choice [data-value='0']").replace("\xa0", " ").split("\n")
     assert [chip[0], chip[1]] == [f"{size / 1e3:.1f} kB", f"{100 * error:.2g} cm"]
     assert not page.is_visible("#level")
+
+
+def test_lines_run_once_along_each_branch_and_not_around_its_bark(opened_file, tmp_path):
+    """Nine twigs of twelve rings on a stem of twelve vertices."""
+    athcodec.encode(twigs(), tmp_path / "twigs.ath", rel_error=1e-3, effort="fast")
+    page = opened_file((tmp_path / "twigs.ath").read_bytes())
+    page.click("#show [data-value=lines]")
+    found = """() => { const all = []; athcodecViewer.stage.panes[0].scene.traverse((each) => {
+      if (each.isLineSegments) all.push(each.geometry.index.count / 2); }); return all; }"""
+    assert page.evaluate(found) == [TWIGS * RINGS + RINGS - 1]
+
+
+def test_colours_that_tell_something_have_a_legend(page):
+    legend = page.locator("#legend")
+    assert not legend.is_visible()
+    page.click("#colour [data-value=order]")
+    assert legend.inner_text().split("\n")[:2] == ["trunk", "limbs"]
+    page.click("#colour [data-value=part]")
+    assert "moves as one piece" in legend.inner_text()
+    page.click("#colour [data-value=plant]")
+    assert not legend.is_visible()
+
+
+@pytest.mark.parametrize("size", [(390, 844), (844, 390), (1200, 800)])
+def test_a_window_of_any_size_shows_the_levels_and_says_in_their_figures_which_is_drawn(opened, sample_ath, size):
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened(line.page("tree.ath"), viewport=dict(zip(("width", "height"), size)))
+        for level in (0, 1):
+            chip = page.locator(f"#level-choice [data-value='{level}']")
+            chip.click()
+            bytes_, error = chip.inner_text().split("\n")
+            page.wait_for_function(
+                """([level, text]) => document.getElementById("arrived").innerText.startsWith(text)
+                  && document.querySelector("[data-shown=true]")?.dataset.value === level""",
+                arg=[str(level), f"Shown: {bytes_}, at most {error} off"],
+            )
+            assert page.evaluate("athcodecViewer.motion.level") == level
+            assert page.locator("#arrived").is_visible()
 
 
 def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath):
@@ -201,7 +240,7 @@ def test_no_number_promises_more_than_is_shown(page):
         page.wait_for_function(f"() => athcodecViewer.motion.level === {level} && !athcodecViewer.motion.fading")
         page.wait_for_timeout(600)
         off = page.evaluate(PIXELS_OFF)
-        assert ("less than a pixel" in page.inner_text("#level-hint")) == (off <= 1)
+        assert ("under a pixel" in page.inner_text("#arrived")) == (off <= 1)
 
 
 def test_wind_is_one_weight_from_calm_to_gale_and_the_gale_comes_first(opened_file, windy):

@@ -23,7 +23,7 @@
  * be decoded throws an AthError.
  */
 
-/** Whether this host can run the decoder: WebAssembly with SIMD, and DecompressionStream. */
+/** Whether this host can run the decoder: WebAssembly with SIMD. */
 export const supported: boolean;
 
 /** Resolves when the decoder is compiled; before that, AthFile's functions throw. Rejects where

@@ -3,7 +3,7 @@
 // workers, Node. ath_decoder.mjs is made from ath_decoder.template.mjs by build_decoder.py: edit the
 // template.
 
-const WASM = "@WASM@"; // zlib, base64
+const WASM = "@WASM@"; // zstd, base64
 
 // @include web/zstd.js
 // @include src/normals.js
@@ -73,16 +73,14 @@ const TYPES = {
 const SIMD = [0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0,
   253, 15, 253, 98, 11];
 
-export const supported = typeof WebAssembly === "object" && typeof DecompressionStream === "function"
-  && WebAssembly.validate(new Uint8Array(SIMD));
+export const supported = typeof WebAssembly === "object" && WebAssembly.validate(new Uint8Array(SIMD));
 
 let module = null, shared = null;
 
 async function compile() {
-  if (!supported) throw new Error("ath_decoder: got no WebAssembly SIMD, or no DecompressionStream");
+  if (!supported) throw new Error("ath_decoder: got no WebAssembly SIMD");
   const packed = Uint8Array.from(atob(WASM), (character) => character.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  module = await WebAssembly.compile(await new Response(stream).arrayBuffer());
+  module = await WebAssembly.compile(zstd.decompress(packed));
 }
 
 export const ready = compile();

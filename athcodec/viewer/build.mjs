@@ -1,7 +1,7 @@
 // Bundles src and page into the folder given: `node build.mjs FOLDER`, with the packages of package.json on NODE_PATH.
 // build_viewer.py calls it.
 
-import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -26,9 +26,54 @@ const onlyModels = (used) => ({ name: "three", setup({ onResolve, onLoad }) {
     (!/(Core|Geometries|Materials|Curves)\.js$/.test(importer) && used.includes(/(\w+)\.js$/.exec(path.replace("MathUtils", ""))?.[1]) ? page : null));
   onLoad({ filter: /Three.Core\.js$/ }, ({ path }) => // without its warning of a second three.js in the page
     ({ contents: readFileSync(path, "utf8").match(/^export .*/gm).join("\n"), resolveDir: dirname(path) }));
+  onResolve({ filter: /^whole-shaders$/ }, ({ path }) => ({ path, namespace: "shaders" }));
+  onLoad({ filter: /./, namespace: "shaders" }, () => ({
+    contents: `import { ShaderChunk } from "three"; Object.assign(ShaderChunk, ${JSON.stringify(wholeChunks())});`, resolveDir: modules }));
   onLoad({ filter: /./, namespace: "split" }, () => ({
     contents: `export { ${used.join(", ")} } from "page"; export * from "three/src/Three.Core.js";`, resolveDir: modules }));
 } });
+
+// What the materials of plants, sky and ground never have; those of models can have it, so model.js brings whole shaders.
+const NEVER = new RegExp(`^(${["USE_(CLEARCOAT|SHEEN|IRIDESCENCE|TRANSMISSION|ANISOTROPY|ENVMAP|MORPH|BATCHING|LIGHT_PROBES|SKINNING|DISPERSION|RETROREFLECT)\\w*",
+  "USE_(ALPHA|AO|BUMP|DISPLACEMENT|EMISSIVE|LIGHT|METALNESS|NORMAL|ROUGHNESS|SPECULAR\\w*|THICKNESS)_?MAP\\w*", "USE_NORMALMAP_\\w+", "USE_(MAP|MATCAP|GRADIENTMAP|ALPHAHASH)",
+  "USE_(LOGARITHMIC|REVERSED)_DEPTH_BUFFER", "USE_DIFFUSE_ROUGHNESS\\w*", "NUM_(RECT_AREA|SPOT|POINT|SUN)_LIGHT\\w*", "DITHERING", "PREMULTIPLIED_ALPHA", "ENVMAP_\\w+", "FLAT_SHADED", "IS_POINTS"].join("|")})$`);
+const NOT_DRAWN = /(meshtoon|meshmatcap|meshphong|meshnormal|sprite|linedashed|equirect|backgroundCube|background)\.glsl\.js$/;
+
+// Whether a condition can only be false: alternatives of such names, or a conjunction with one of them.
+function isNever(line) {
+  const [, word, condition] = /^#(ifdef|if)\s+(.*)$/.exec(line) ?? [];
+  if (!word || (condition.includes("&&") && condition.includes("||"))) return false;
+  const terms = condition.split(/&&|\|\|/).map((term) => term.replace(/[()\s]|defined/g, "").replace(/>0$/, "")), isOne = (term) => NEVER.test(term);
+  return condition.includes("&&") ? terms.some(isOne) : terms.every(isOne);
+}
+
+/** Takes the branches out that such conditions hide. */
+function pruned(text) {
+  const out = [], open = []; // of each condition that is open: whether it is cut, and whether its branch is left out
+  for (const line of text.split("\n")) {
+    const word = /^\s*#\s*(\w+)/.exec(line)?.[1], hidden = open.some(({ out: isOut }) => isOut);
+    if (word?.startsWith("if")) {
+      const never = !hidden && isNever(line.trim());
+      open.push({ cut: never, out: never });
+      if (!hidden && !never) out.push(line);
+    } else if (word === "elif" && open.at(-1).cut) {
+      const last = open.at(-1), outer = open.slice(0, -1).some(({ out: isOut }) => isOut);
+      if (last.out && !outer) {
+        Object.assign(last, { cut: false, out: false });
+        out.push(line.replace("elif", "if"));
+      }
+    } else if (word === "else" && open.at(-1).cut) open.at(-1).out = !open.at(-1).out;
+    else if (word === "endif") {
+      const { cut } = open.pop();
+      if (!cut && !open.some(({ out: isOut }) => isOut)) out.push(line);
+    } else if (!hidden) out.push(line);
+  }
+  return out.join("\n");
+}
+
+const CHUNKS = join(modules, "three/src/renderers/shaders/ShaderChunk");
+const glslOf = (file) => /`([^`]*)`/.exec(short(readFileSync(join(CHUNKS, file), "utf8")))?.[1] ?? "";
+const wholeChunks = () => Object.fromEntries(readdirSync(CHUNKS).map((file) => [file.replace(".glsl.js", ""), glslOf(file)]).filter(([, text]) => pruned(text) !== text));
 
 // three.js from its sources: without virtual reality and maps of surroundings, which no page here has, and with shaders in few bytes.
 const NO_XR = `export class WebXRManager {
@@ -40,7 +85,9 @@ const fewBytes = { name: "few bytes", setup: ({ onLoad }) => {
   onLoad({ filter: /WebXRManager\.js$/ }, () => ({ contents: NO_XR }));
   onLoad({ filter: /WebGLEnvironments\.js$/ }, ({ path }) => // pages have lights and no maps of surroundings
     ({ contents: readFileSync(path, "utf8").replace(/^import .*PMREMGenerator.*$/m, "class PMREMGenerator {}") }));
-  onLoad({ filter: /(ShaderChunk|ShaderLib).\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")) }));
+  onLoad({ filter: NOT_DRAWN }, ({ path }) => ({ contents: readFileSync(path, "utf8").replace(/`[^`]*`/g, '""') }));
+  onLoad({ filter: /ShaderLib.\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")) }));
+  onLoad({ filter: /ShaderChunk.\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")).replace(/`([^`]*)`/, (_, text) => `\`${pruned(text)}\``) }));
 } };
 
 // Pages name the files beside them and need no import map, which a site's policy may forbid.
@@ -83,7 +130,7 @@ await bundle({ entryPoints: [join(here, "page/start.js")], format: "iife" }, "st
 const gltf = "three/addons/loaders/GLTFLoader.js", alias = { [gltf]: join(modules, gltf.replace("addons", "examples/jsm")) };
 const controls = await bundle({ entryPoints: [join(modules, "three/examples/jsm/controls/OrbitControls.js")] }, "OrbitControls.js", ["three"]);
 // Models and scripts that look at what is drawn take these. All but Points are in the bundle anyway.
-const inside = ["ColorManagement", "Line", "Material", "MeshBasicMaterial", "OrthographicCamera", "Points", "Texture", "WebGLRenderTarget"];
+const inside = ["ColorManagement", "Line", "Material", "MeshBasicMaterial", "OrthographicCamera", "Points", "ShaderChunk", "Texture", "WebGLRenderTarget"];
 const used = [...new Set([loader, viewer, element, controls].flatMap(names)), ...inside].sort();
 await bundle({ entryPoints: [join(here, "page/model.js")], alias, plugins: [onlyModels(used)] }, "model.js", ["./three.js"]);
 await bundle({ stdin: { contents: `export { ${used.join(", ")} } from "three/src/Three.js";`, resolveDir: modules }, plugins: [fewBytes] }, "three.js", []);

@@ -2,7 +2,7 @@
 
 The compiler is Zig's, a pip package, at one version: the WebAssembly that it makes is the same on every
 machine. Exported is what the template calls, nothing is imported. The module is written only if its text or
-its WebAssembly would change: what zlib packs may differ between versions of zlib, what it unpacks does not.
+its WebAssembly would change: what zstd packs may differ between its versions, what it unpacks does not.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import re
 import subprocess
 import sys
 import tempfile
-import zlib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+import zstandard
 
 VIEWER = Path(__file__).resolve().parent
 CORE = VIEWER.parent / "core"
@@ -26,6 +27,7 @@ ZIG = "0.17.1"
 """Version of the package ziglang that the committed module was built with."""
 
 STACK_BYTES = 64 << 10
+PACKING = 22  # Level of zstd, whose decoder is in the module anyway, for arrays.
 SMALL = (
     "build.c",
     "container.c",
@@ -127,7 +129,7 @@ def _zig(folder: str, *arguments: str) -> None:
 
 def pack(template: str, wasm: bytes) -> str:
     """The module's text."""
-    payload = base64.b64encode(zlib.compress(wasm, 9)).decode("ascii")
+    payload = base64.b64encode(zstandard.ZstdCompressor(level=PACKING).compress(wasm)).decode("ascii")
     head, code = template.split("\n\n", 1)
     pieces = INCLUDE.split(code)  # Text of the template and names of files take turns.
     texts = [(VIEWER / text).read_text("utf-8") if i % 2 else text for i, text in enumerate(pieces)]
@@ -145,8 +147,8 @@ def unpack(module: str) -> tuple[str, bytes]:
     """(text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
     found = PAYLOAD.search(module)
     try:
-        return PAYLOAD.sub("", module, count=1), zlib.decompress(base64.b64decode(found[2]))
-    except (TypeError, ValueError, zlib.error):
+        return PAYLOAD.sub("", module, count=1), zstandard.ZstdDecompressor().decompress(base64.b64decode(found[2]))
+    except (TypeError, ValueError, zstandard.ZstdError):
         return "", b""
 
 

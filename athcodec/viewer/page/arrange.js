@@ -39,6 +39,7 @@ function arrange(first = null) {
   app.describe();
   app.enableControls(true);
   app.splitLabels();
+  app.tellLegend();
   if (state.forest) app.forestOn();
 }
 

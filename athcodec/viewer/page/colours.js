@@ -2,7 +2,7 @@
 // vertex colours of three.js are.
 
 const STOPS = [[33, 53, 121], [38, 117, 148], [57, 169, 128], [171, 206, 88], [252, 231, 98], [240, 120, 58], [180, 26, 50]];
-const ORDERS = [[86, 65, 48], [161, 108, 61], [88, 129, 66], [132, 176, 72], [70, 158, 158], [86, 110, 190], [150, 92, 180]];
+const ORDERS = [[176, 140, 110], [232, 182, 116], [150, 202, 128], [206, 222, 120], [128, 206, 204], [150, 174, 236], [206, 160, 228]];
 
 const linear = (value) => ((value / 255 + 0.055) / 1.055) ** 2.4;
 const asLinear = ([r, g, b]) => [linear(r), linear(g), linear(b)];
@@ -23,12 +23,14 @@ export function orderColour(order) {
   return asLinear(ORDERS[order % ORDERS.length]);
 }
 
-/** Neighbouring numbers get hues far from each other. */
+/** Pale colours; neighbouring numbers get hues far from each other. */
 export function nodeColour(number) {
-  const hue = (number * 0.61803398875) % 1, value = 150 + 60 * ((number * 0.381966) % 1);
-  const channel = (offset) => value * (0.62 + 0.38 * Math.cos(2 * Math.PI * (hue + offset)));
+  const hue = (number * 0.61803398875) % 1, value = 200 + 50 * ((number * 0.381966) % 1);
+  const channel = (offset) => value * (0.76 + 0.24 * Math.cos(2 * Math.PI * (hue + offset)));
   return asLinear([channel(0), channel(1 / 3), channel(2 / 3)]);
 }
+
+export const orderCss = (order) => `rgb(${ORDERS[order % ORDERS.length].join(" ")})`;
 
 /** Colours of the bark: paler towards the tips. `slim` is 0 for the trunk, 1 for twigs. */
 export function barkColour(slim) {

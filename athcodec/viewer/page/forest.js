@@ -5,7 +5,7 @@ import * as three from "three/webgpu";
 import * as loading from "athcodec-three";
 import { ATHLoader, radii } from "athcodec-three";
 import { ATHForest } from "athcodec-three/webgpu";
-import { ACESFilmicToneMapping, DoubleSide, MeshStandardNodeMaterial, PerspectiveCamera, Scene, Vector3, WebGPURenderer } from "three/webgpu";
+import { ACESFilmicToneMapping, DoubleSide, MeshStandardNodeMaterial, PerspectiveCamera, Scene, WebGPURenderer } from "three/webgpu";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { chance } from "./chance.js";
@@ -14,12 +14,10 @@ import { Stage, SUN } from "./forest_stage.js";
 import { forestMaterial } from "./forest_surfaces.js";
 import { feet, floorOf, floorPlaces, forestReach, rooted, treePlaces } from "./places.js";
 import { wordsOf } from "./trouble.js";
-import { Walk } from "./walk.js";
 
 const $ = (id) => document.getElementById(id), asked = new URLSearchParams(location.search);
 const COUNT = Number(asked.get("count") ?? 10000);
 const SPREAD = 0.85; // How far plants are apart: see forestReach.
-const EYES = 0.28, PACE = 0.7; // Height of a walker's eyes, and way per second, in radii.
 const SLOW_MS = 40, SLOW_FRAMES = 12; // After so many pictures as slow as this, less is drawn.
 const state = { modules: { three, loading }, frames: 0, milliseconds: 0, forest: null, ath: null, error: null };
 window.athcodecForest = state;
@@ -70,7 +68,6 @@ async function start() {
   const floor = await floors(renderer, feet(trees, ath), 0.9 * radius);
   const scene = new Scene(), camera = new PerspectiveCamera(40, 1, 0.02 * radius, 400 * radius), controls = new OrbitControls(camera, $("canvas"));
   const stage = new Stage(scene, radius), isSoftware = /swiftshader|llvmpipe/i.test(renderer.backend.device.adapterInfo?.architecture ?? "");
-  const walk = new Walk(camera, $("canvas"), $("stick"), { height: EYES * radius, speed: PACE * radius, changed: (on) => walks(on) });
   renderer.toneMapping = ACESFilmicToneMapping;
   renderer.shadowMap.enabled = true;
   stage.shadows = asked.get("quality") === "full" || !isSoftware;
@@ -80,19 +77,13 @@ async function start() {
   controls.maxPolarAngle = 0.49 * Math.PI;
   controls.maxDistance = 150 * radius;
   controls.enableDamping = true;
-  Object.assign(state, { ath, forest, floor: floor.map((each) => each.forest), renderer, camera, controls, scene, walk, time: null, seconds: 0, playing: true });
+  Object.assign(state, { ath, forest, floor: floor.map((each) => each.forest), renderer, camera, controls, scene, time: null, seconds: 0, playing: true });
   const moves = (on) => {
     state.moves = on;
     $("play").textContent = on ? "Pause" : "Play";
   };
   moves(!matchMedia("(prefers-reduced-motion: reduce)").matches);
   $("play").addEventListener("click", () => moves(!state.moves));
-  const walks = (on) => {
-    $("walk").setAttribute("aria-pressed", on);
-    controls.enabled = !on;
-    if (!on) controls.target.copy(camera.position).add(camera.getWorldDirection(new Vector3()).multiplyScalar(4 * radius)).setY(0.9 * radius);
-  };
-  $("walk").addEventListener("click", () => (walk.on ? walk.end() : walk.begin()));
   if (winds) Object.assign($("strength"), { min: winds.calm, max: winds.wild, step: (winds.wild - winds.calm) / 100, value: winds.wild });
   const blow = () => {
     const strength = Number($("strength").value), degrees = Number($("heading").value);
@@ -118,8 +109,7 @@ async function start() {
     const passed = before === null ? 0 : ms - before;
     before = ms;
     keepUp(passed);
-    walk.update(Math.min(passed, 1000) / 1000);
-    stage.around(walk.on ? camera.position : controls.target);
+    stage.around(controls.target);
     const { clientWidth: width, clientHeight: height } = $("canvas");
     if (width !== state.width || height !== state.height) {
       Object.assign(state, { width, height });
@@ -128,7 +118,7 @@ async function start() {
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
     }
-    if (!walk.on) controls.update();
+    controls.update();
     const begun = performance.now();
     if (state.moves) state.seconds += passed / 1000;
     for (const each of [forest, ...state.floor]) each.update(camera, height, state.time ?? state.seconds);

@@ -6,7 +6,7 @@ import { chance } from "./chance.js";
 
 const REACH = 60; // Radius of the disc, over the radius of the meadow.
 const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // Number of blades; height and width over the meadow's radius.
-const COLOURS = { day: [0x5f7a44, 0x86985a], dusk: [0x3d4c38, 0x556346] };
+const COLOURS = { day: [0x5f7a44, 0x86985a], dusk: [0x4a5b44, 0x657553] };
 
 const NOISE = /* glsl */`
 varying vec2 athMeadow;
@@ -94,6 +94,11 @@ function bladeMaterial() {
 /** Sets the wind that the blades of a meadow sway in. strength: 0 to 1; heading: degrees, clockwise from above. */
 export function blow(ground, seconds, strength, heading) {
   ground.getObjectByName("grass").material.userData.breeze.set(seconds, strength, (90 - heading) * Math.PI / 180);
+}
+
+/** Leaves a share of the blades, spread as all of them. */
+export function thin(ground, share) {
+  ground.getObjectByName("grass").count = Math.round(share * BLADES);
 }
 
 function grass() {

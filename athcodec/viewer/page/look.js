@@ -1,10 +1,10 @@
 // How the plant is looked at: its detail, its colours, what of it is shown, and two of it under one split.
 
 import { app, main, state } from "./app.js";
-import { heatGradient } from "./colours.js";
+import { heatGradient, orderCss } from "./colours.js";
 import { $, bytesText, Choice, detailText, lengthText, shortLength, upper } from "./ui.js";
 
-const MOST_BUTTONS = 9;
+const MOST_BUTTONS = 9, LEGEND = 7; // colours of orders, which then come again
 
 /** The error of a level in its clip, as text. */
 const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.metadata.unit);
@@ -57,14 +57,17 @@ function changeLevel(by) {
   setLevel(String(Math.max(0, Math.min(motion.levelCount - 1, from + by))));
 }
 
-/** Says what the level that is shown means on the screen. */
+/** Says which level is shown, in the figures of its chip, and what that means on the screen; marks the chips of what is here. */
 function tellLevel() {
-  const { motion, space } = main(), shown = Math.max(motion.level, 0), error = `error up to ${within(main(), shown)}`;
+  const { motion, space } = main(), shown = Math.max(motion.level, 0), [bytes, error] = levelText(main(), shown);
   const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, space.matrixWorld);
-  const name = upper(detailText(motion, shown));
-  $("level-hint").textContent = state.forest ? "Each plant as its distance asks for"
-    : motion.level < motion.target && !motion.failure ? `${name} now, ${error}; ${detailText(motion, motion.target)} is on its way`
-    : off <= 1 ? `${name}, ${error}: less than a pixel here for 99 of 100 points` : `${name}, ${error}`;
+  const means = motion.level < motion.target && !motion.failure ? ", sharpening…" : off <= 1 ? ", under a pixel" : "";
+  $("arrived").textContent = state.forest ? "Each plant as its distance asks for" : `Shown: ${bytes}, at most ${error} off${means}`;
+  $("arrived").title = off <= 1 ? "Under a pixel for 99 of 100 points" : "";
+  for (const { dataset } of app.level.buttons) {
+    dataset.here = dataset.value === "auto" || Number(dataset.value) <= motion.readyLevel;
+    dataset.shown = !state.forest && dataset.value === String(shown);
+  }
   if (motion.automatic) $("level").value = motion.target;
   readOut();
 }
@@ -105,12 +108,35 @@ function tellScale() {
   $("scale-high").textContent = `${text(heatMost)}, more`;
 }
 
+// ---- the legend of parts and orders ----
+
+const ORDERS = ["trunk", "limbs", "branches", "twigs"];
+
+/** Says what the colours of parts and orders mean. */
+function tellLegend() {
+  const { value } = app.colour, legend = $("legend"), plant = main();
+  legend.hidden = !plant || (value !== "part" && value !== "order");
+  if (legend.hidden) return;
+  if (value === "part") {
+    legend.textContent = "Each colour moves as one piece at this level";
+    return;
+  }
+  const { depth } = plant.ath.branches, most = depth.reduce((a, b) => Math.max(a, b), 0);
+  legend.replaceChildren(...Array.from({ length: Math.min(most + 1, LEGEND) }, (_, order) => {
+    const entry = document.createElement("span"), colour = document.createElement("i");
+    colour.style.background = orderCss(order);
+    entry.append(colour, plant.isTuft ? "blades" : ORDERS[order] ?? `order ${order}`);
+    return entry;
+  }));
+}
+
 export default function begin() {
-  Object.assign(app, { within, levelControls, levelText, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
+  Object.assign(app, { tellLegend, within, levelControls, levelText, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
   app.level = new Choice($("level-choice"), (value) => setLevel(value));
   app.colour = new Choice($("colour"), (value) => {
     for (const plant of app.plants) plant.setColour(value);
     $("scale").hidden = value !== "error";
+    tellLegend();
     app.colourForest();
     state.dirty = true;
   });

@@ -1,5 +1,6 @@
 // GLB files with ATH_motion, read by GLTFLoader of three.js: the page fetches this only where such a file is opened.
 
+import "whole-shaders"; // of three.js; made by build.mjs
 import { TextureLoader } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 

@@ -3,7 +3,7 @@
 import { app } from "./app.js";
 import { $ } from "./ui.js";
 
-const NEED_A_PLANT = "footer, #clip, #panel section:not(.grid), #picture, #video, #link, #embed";
+const NEED_A_PLANT = "footer, #clip, #levels, #panel section:not(.grid), #picture, #video, #link, #embed";
 
 function togglePanel() {
   const hidden = document.body.classList.toggle("no-panel");

@@ -7,7 +7,7 @@ import { flare, footOf } from "./root.js";
 import { barkColour, heat, nodeColour, orderColour } from "./colours.js";
 import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.js";
 
-const LEAF = [0.16, 0.29, 0.07], OVER = [0.55, 0.2, 0.06];
+const LEAF = [0.16, 0.29, 0.07], OVER = [0.30, 0.05, 0.01], PALE = [0.66, 0.68, 0.6]; // Of lines over a plant, and of the plant under them.
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
 
 export const meshMaterial = () => new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
@@ -48,6 +48,7 @@ export class Plant {
     upright(this.root, ath.metadata);
     this.root.updateMatrixWorld(true);
     const { depth } = ath.branches, branch = ath.vertexBranch;
+    this.isTuft = depth.length > 1 && depth.every((order) => order === 0);
     this.#orders = branch.map((b) => depth[b]);
     this.onArrays = () => this.#arrays();
     ath.addEventListener("arrays", this.onArrays);
@@ -128,7 +129,7 @@ export class Plant {
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
     for (const { object, plain, tinted } of this.#drawn) if (plain) Object.assign(object, this.colour === "plant" ? plain : tinted);
-    const drawn = this.#drawn.find(({ kind }) => kind === "plant"), wanted = Boolean(this.colour === "plant" && this.ath.hasFaces && this.surfaces);
+    const drawn = this.#drawn.find(({ kind }) => kind === "plant"), wanted = Boolean(this.colour === "plant" && this.show !== "both" && this.ath.hasFaces && this.surfaces);
     if (!drawn || drawn.plain || wanted === Boolean(drawn.other)) return;
     if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial(this.surfaces));
     [drawn.object.material, drawn.other] = wanted ? [this.#surface, drawn.object.material] : [drawn.other, null];
@@ -195,17 +196,32 @@ export class Plant {
   }
 
   #barks() {
+    if (this.isTuft) return () => LEAF; // blades
     const most = this.#orders.reduce((a, b) => Math.max(a, b), 1);
     const barks = Array.from({ length: most + 1 }, (_, order) => barkColour(order / most));
     return (vertex) => barks[this.#orders[vertex]];
   }
 
   #lines() {
-    const { rest, skeleton } = this.ath, geometry = new BufferGeometry();
-    geometry.setIndex(new BufferAttribute(skeleton, 1));
+    const { rest } = this.ath, geometry = new BufferGeometry();
+    geometry.setIndex(new BufferAttribute(this.#alongBranches(), 1));
     geometry.setAttribute("position", new BufferAttribute(rest, 3));
     geometry.userData.source = Uint32Array.from({ length: rest.length / 3 }, (_, i) => i);
     return geometry;
+  }
+
+  // One line along each branch that is a tube, from ring to ring, or that others grow on; where there are no tubes, all edges.
+  #alongBranches() {
+    const { skeleton, branches: { first, count, attach, parent, ring }, channel: { vertexPlaces } } = this.ath;
+    if (!ring.some((size) => size > 1)) return skeleton;
+    const vertex = new Uint32Array(this.ath.channel.info.placeCount), edges = [], bearing = new Set(parent);
+    vertexPlaces.forEach((place, i) => { vertex[place] = i; });
+    for (let b = 0; b < first.length; b++) {
+      if (!(ring[b] > 1) && !bearing.has(b)) continue;
+      for (let place = first[b], before = attach[b]; place < first[b] + count[b]; before = place, place += Math.max(ring[b], 1))
+        if (before >= 0) edges.push(vertex[before], vertex[place]);
+    }
+    return Uint32Array.from(edges);
   }
 
   get vertices() {
@@ -221,11 +237,12 @@ export class Plant {
       object.visible = show === "both" || show === kind;
       if (kind === "lines") object.material.depthTest = show !== "both";
     }
+    this.#dress();
     this.paint();
   }
 
   #showRoot() {
-    if (this.#flared) this.#flared.visible = this.show !== "lines" && this.colour === "plant";
+    if (this.#flared) this.#flared.visible = this.show === "plant" && this.colour === "plant";
   }
 
   setColour(colour) {
@@ -276,10 +293,10 @@ export class Plant {
     this.#stale = false;
     const colourOf = this.#colours(), leafy = this.colour === "plant" && this.ath.hasFaces;
     const stored = leafy ? this.ath.geometry.getAttribute("color") : null;
-    const line = this.show === "both" && this.colour === "plant" ? OVER : null;
+    const [line, under] = this.show === "both" && this.colour === "plant" ? [OVER, PALE] : [null, null];
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible || object.geometry !== geometry) continue; // a GLB in its own materials
-      const fixed = kind === "lines" ? line : null, own = stored && kind === "plant";
+      const fixed = kind === "lines" ? line : under, own = stored && kind === "plant";
       const vertexColour = leafy && kind !== "lines" ? this.#leafColours() : colourOf;
       for (const [name, source] of coloured(geometry)) {
         const colour = geometry.getAttribute(name), out = colour.array;

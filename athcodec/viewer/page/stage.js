@@ -4,7 +4,7 @@ import { ACESFilmicToneMapping, Box3, DirectionalLight, Fog, HemisphereLight, No
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Easel } from "./easel.js";
-import { blow, meadow, tintMeadow } from "./ground.js";
+import { blow, meadow, thin, tintMeadow } from "./ground.js";
 import { layShadow, shadowDisc } from "./shadow.js";
 import { discard } from "./sky.js";
 
@@ -12,11 +12,12 @@ const TONE = { toneMapping: ACESFilmicToneMapping, toneMappingExposure: 0.82 }, 
 const SLOW_MS = 20, PATIENCE = 24; // pictures that are slow, one behind the other, before there is less to draw
 const SHADED = 12; // plants, across a forest
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i;
-const QUALITY = [{ ratio: 2, shadows: true, grass: true }, { ratio: 1.25, shadows: true, grass: true }, { ratio: 1, shadows: false, grass: false }];
-const EYE = 0.14; // Height of the eye over the ground, in heights of the plant: the crown stands against the sky.
+const QUALITY = [{ ratio: 2, shadows: true, grass: 1 }, { ratio: 1.25, shadows: true, grass: 1 }, { ratio: 1, shadows: false, grass: 0.2 }]; // grass: share of the blades
+const EYE = 0.14, EYE_WIDE = 0.2; // Height of the eye over the ground, in heights of the plant or in its widths, whichever is more: the crown stands
+// against the sky, and of a low wide plant the ground under it is seen.
 const TALL = 0.7, WIDE = 1.02; // Size of the plant in the free part of the picture.
 const FROM = new Vector3(0.35, 0, 0.92).normalize();
-const HAZE_FROM = 0.6, HAZE_TO = 8; // Distances where the ground begins and ends to fade, in sizes of the ground.
+const HAZE_FROM = 0.4, HAZE_TO = 4.5; // Distances where the ground begins and ends to fade, in sizes of the ground.
 
 // Whether there is no graphics processor, so that each picture takes long.
 function isSoftware(gl) {
@@ -168,7 +169,7 @@ export class Stage {
   #draw(scenes = this.panes.map(({ scene }) => scene)) {
     for (const scene of scenes) {
       scene.getObjectByName("sun").castShadow = this.quality.shadows;
-      scene.getObjectByName("grass").visible = this.quality.grass;
+      thin(scene.getObjectByName("ground"), this.quality.grass);
     }
   }
 
@@ -206,7 +207,7 @@ export class Stage {
     const { camera, controls: { target } } = this, [left, top, right, bottom] = this.room, size = box.getSize(new Vector3());
     const half = Math.tan(camera.fov * Math.PI / 360), across = 0.5 * Math.max(Math.hypot(size.x * FROM.z, size.z * FROM.x), 1e-6);
     box.getCenter(target);
-    const eye = box.min.y + EYE * size.y - target.y, view = new Vector3(), seen = (distance) => {
+    const eye = box.min.y + Math.max(EYE * size.y, EYE_WIDE * 2 * across) - target.y, view = new Vector3(), seen = (distance) => {
       view.copy(FROM).multiplyScalar(distance).setY(eye).normalize(); // towards the eye
       const tips = [0.5, -0.5].map((part) => (part * size.y * Math.hypot(view.x, view.z)) / (Math.hypot(distance, eye) - part * size.y * view.y));
       return Math.max((tips[0] - tips[1]) / (2 * half * TALL), across / ((distance - 0.3 * across) * half * WIDE * (right - left) / (bottom - top)));

@@ -28,7 +28,7 @@ function tellSizes() {
   $("instead").hidden = $("source-size").textContent === "";
   $("sizes").title = `The whole file: ${countText(info.fileLength)} bytes. float32: ${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes. `
     + `GLB: a rotation and a translation of a joint for each of ${countText(info.branchCount)} branches × ${countText(info.frameCount)} frames × ${JOINT} bytes, before its meshes`;
-  $("sizes").hidden = $("replay").hidden = false;
+  $("sizes").hidden = $("levels").hidden = $("replay").hidden = false;
 }
 
 /** From now on this file is loading; null: none is. */
@@ -75,12 +75,10 @@ const seconds = (ms) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
 
 function tellArrived() {
   const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched } = motion;
-  const share = Math.min(1, bytesFetched / wanted), shown = Math.max(motion.level, 0), { first, whole } = counters.arrived;
-  const bar = $("progress"), settled = motion.level >= motion.target || motion.failure;
+  const share = Math.min(1, bytesFetched / wanted), { first, whole } = counters.arrived, bar = $("progress");
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
-  $("arrived").textContent = `${bytesText(bytesFetched)} here, ${shortLength(motion.error(shown).max, ath.metadata.unit)} off${settled ? "" : ", sharpening…"}`;
   $("timing").hidden = !bandwidth;
   $("timing").textContent = `First picture after ${seconds(first)}${whole ? `, full detail after ${seconds(whole)}` : ""}`;
 }
