@@ -154,6 +154,27 @@ def test_a_skin_over_a_fork_does_not_tear(fork):
             assert np.abs(now - length).max() < 0.05
 
 
+def test_short_edges_of_a_skin_over_a_fork_stretch_no_more_than_long_ones(fork):
+    """As in scans and meshes of other programs, whose tessellation knows nothing of the stems."""
+    trunk, quads = tube(0.0, LENGTH, 0.05, 41)
+    side, side_quads = tube(0.05, 0.9, 0.03, 90, axis=2, centre=(0.0, 1.0))
+    step = np.where(np.arange(89) % 2, 4e-4, 0.0182)
+    side.reshape(90, SIDES, 3)[..., 2] = (0.05 + np.append(0.0, np.cumsum(step)))[:, None]
+    ring, first = np.arange(SIDES), 20 * SIDES
+    bridge = np.stack([first + ring, first + (ring + 1) % SIDES, len(trunk) + (ring + 1) % SIDES, len(trunk) + ring], 1)
+    mesh, faces = np.concatenate([trunk, side]), np.concatenate([quads, len(trunk) + side_quads, bridge])
+    rings = len(trunk) + np.arange(len(side)).reshape(90, SIDES)
+    with opened(fork) as plant, athcodec.onto(plant, mesh, faces=faces) as moving:
+        moved = moving[:2]
+    long, short = (np.abs(apart_by(moved, rings, one) / apart_by(mesh[None], rings, one) - 1).max() for one in (0, 1))
+    assert 0.005 < long < 0.5 and short < 2 * long
+
+
+def apart_by(frames, rings, one):
+    """How far each other ring of a tube, from `one` on, is from the next, along all sides."""
+    return np.linalg.norm(frames[:, rings[one:-1:2]].astype(float) - frames[:, rings[one + 1 :: 2]], axis=-1)
+
+
 def test_vertices_on_the_nodes_move_as_each_level_does(fork):
     with opened(fork) as plant:
         for level in range(plant.file.level_count):
@@ -422,6 +443,24 @@ def test_a_mesh_on_surfaces_is_bound_to_their_slices(tmp_path):
     rest = np.array([document["nodes"][node]["translation"] for node in document["skins"][0]["joints"]])
     places = rest[bone] + np.reshape(slices["offset"], (-1, 3))
     np.testing.assert_allclose(places, surfaces().rest[slices["vertex"]], atol=1e-6)
+
+
+@pytest.mark.tools
+def test_a_scan_moves_and_is_bound_by_the_beams_of_its_tree():
+    """One closed skin of irregular triangles that share no vertices, with noise; its own motion rides on tubes."""
+    from bench.data import Canopy
+    from bench.onto import Case, measured
+    from bench.trees.scan import scanned, thickened
+
+    beams = thickened(Canopy(20, 1, 16, 1.2, 8.0, 0, "broadleaf", seed=5).skeleton(), 4.0)
+    scan = scanned(beams, 0.012, 2e-4, 1)
+    places, vertex = np.unique(scan.rest, axis=0, return_inverse=True)
+    sides = np.sort(vertex.reshape(-1, 3)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert len(places) < scan.vertex_count / 5 and set(np.unique(sides, axis=0, return_counts=True)[1]) == {2}
+    row = measured(Case("scan", beams, scan, np.ones(scan.vertex_count, bool)), 1e-4)
+    assert row["far"] == row["whole pieces"] == 0 and row["skeleton stretch"] < 1e-4
+    assert row["wood RMS"] < 1e-3 * row["size"] and row["bones max"] < 1e-3 * row["size"]
+    assert row["stretch"] < 0.02 + row["own stretch"] and row["gap"] < row["own gap"] + 1e-3 * row["size"]
 
 
 @pytest.mark.tools
