@@ -13,7 +13,7 @@ int32_t ath_kind_after(int32_t kind) { return kind == ATH_EXACT ? ATH_PREDICTED 
 
 const ath_chunk *ath_chunk_to_check(const ath_work *work) { return ath_chunk_of(work, work->next_kind, work->next); }
 
-/* Moves on to the next chunk of the level, or to the next level. */
+/* Moves on to the next chunk of the stage, or to the next stage. */
 static void next_to_check(ath_work *work)
 {
     work->crc = work->crc_at = 0;

@@ -52,7 +52,7 @@ static int read_exact_point(ath_work *work, size_t at)
     return 1;
 }
 
-/* Replaces the positions of the last lossy level by the source's own. */
+/* Replaces the positions of the last lossy stage by the source's own. */
 int ath_make_exact(ath_work *work, const ath_piece *piece)
 {
     size_t vertices = (size_t)work->segment->exact_vertices;

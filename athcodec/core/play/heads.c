@@ -111,7 +111,7 @@ static int open_predicted(ath_work *work)
                                           segment->is_float64, bytes_of(work->predicted), segment->positions));
 }
 
-/* Opens the streams of one level. */
+/* Opens the streams of one stage. */
 int ath_open_stage(ath_work *work)
 {
     int32_t d = work->next++, result = ATH_OK;

@@ -26,13 +26,13 @@ static void clear_piece(layer_work *layer, const ath_piece *piece)
     clear_row(layer->rows.rotation, T, layer->counts + ROTATION_SLOT);
 }
 
-/* Reads the shapes that a level adds to the piece. */
-static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
+/* Reads the shapes that a stage adds to the piece. */
+static int read_shapes(ath_work *work, const ath_piece *piece, int32_t stage)
 {
-    shapes_reader *reader = work->shapes + level;
+    shapes_reader *reader = work->shapes + stage;
     layer_work *layer = work->layers;
     int32_t known = layer->rows.shape_count;
-    int32_t count = code_shapes(&reader->coder, reader->model, piece, level, known, layer->shape_integers);
+    int32_t count = code_shapes(&reader->coder, reader->model, piece, stage, known, layer->shape_integers);
     if (count < 0) return ath_blame(work, reader->chunk, ATH_BAD_CHUNK);
     size_t from = (size_t)known * ATH_SHAPE_NUMBERS;
     if (!ath_unit_shapes(count - known, layer->shape_integers + from, layer->unit_shapes + from))
@@ -41,13 +41,13 @@ static int read_shapes(ath_work *work, const ath_piece *piece, int32_t level)
     return ATH_OK;
 }
 
-static int read_piece(ath_work *work, int32_t p, int32_t level)
+static int read_piece(ath_work *work, int32_t p, int32_t stage)
 {
-    stems_reader *reader = work->stems + level;
+    stems_reader *reader = work->stems + stage;
     ath_coder coder = reader->coder;
     layer_work *layer = work->layers;
-    if (work->shapes[level].chunk && read_shapes(work, layer->plan->pieces + p, level) != ATH_OK) return ATH_BAD_CHUNK;
-    code_piece(&coder, reader->model, layer->plan, work->streams + level, layer->motion.frames, p, level, &layer->rows);
+    if (work->shapes[stage].chunk && read_shapes(work, layer->plan->pieces + p, stage) != ATH_OK) return ATH_BAD_CHUNK;
+    code_piece(&coder, reader->model, layer->plan, work->streams + stage, layer->motion.frames, p, stage, &layer->rows);
     reader->coder = coder;
     return ath_blame(work, reader->chunk, reader->model->invalid ? ATH_BAD_CHUNK : ATH_OK);
 }
@@ -56,8 +56,8 @@ static int read_first_layer(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     int result = ATH_OK;
-    if (piece->low_level >= 0 && piece->low_level <= work->stage) result = read_piece(work, p, piece->low_level);
-    if (piece->level <= work->stage && result == ATH_OK) result = read_piece(work, p, piece->level);
+    if (piece->low_stage >= 0 && piece->low_stage <= work->stage) result = read_piece(work, p, piece->low_stage);
+    if (piece->stage <= work->stage && result == ATH_OK) result = read_piece(work, p, piece->stage);
     return result;
 }
 
@@ -65,7 +65,7 @@ static int read_first_layer(ath_work *work, int32_t p)
 
 static int refine_shapes(ath_work *work, int32_t q, const ath_piece *piece)
 {
-    shapes_reader *reader = work->shapes + piece->level;
+    shapes_reader *reader = work->shapes + piece->stage;
     layer_work *layer = work->layers + q, *before = layer - 1;
     if (!reader->chunk) return ATH_OK;
     int32_t count = code_refined_shapes(&reader->coder, reader->refined, piece, before->rows.shape_count,
@@ -83,7 +83,7 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     const layer_work *coarse = layer - 1;
     const ath_piece *piece = coarse->plan->pieces + p;
     ath_piece_before *before = &layer->before;
-    int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].level].root;
+    int32_t T = layer->motion.frames, root = work->streams[layer->plan->pieces[p].stage].root;
     int same = ath_base_stream(&coarse->motion, piece)->root == root;
     before->rotation = coarse->counts[ROTATION_SLOT] > 0 ? coarse->scratch.rotation : 0;
     before->shift = coarse->counts[SHIFT_SLOT] > 0 ? coarse->scratch.shift : 0;
@@ -152,8 +152,8 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p)
 {
     layer_work *layer = work->layers + q;
     const ath_piece *piece = layer->plan->pieces + p;
-    const ath_stream *stream = work->streams + piece->level;
-    stems_reader *reader = work->stems + piece->level;
+    const ath_stream *stream = work->streams + piece->stage;
+    stems_reader *reader = work->stems + piece->stage;
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
     look_before(work, q, p);
@@ -240,8 +240,8 @@ static void show_node(ath_work *work, int32_t n)
 static int read_node(ath_work *work, int32_t n)
 {
     const ath_node *node = work->file->plan.nodes + n;
-    affines_reader *reader = work->affines + node->level;
-    if (!node->coded || node->level > work->stage || !reader->chunk) return ATH_OK;
+    affines_reader *reader = work->affines + node->stage;
+    if (!node->coded || node->stage > work->stage || !reader->chunk) return ATH_OK;
     memset(work->node.rows, 0, 4 * 3 * (size_t)work->segment->frames * sizeof *work->node.rows);
     int valid = code_node(&reader->coder, reader->model, work->layers->plan, work->segment->frames, n, &work->node);
     return ath_blame(work, reader->chunk, valid ? ATH_OK : ATH_BAD_CHUNK);
@@ -263,7 +263,7 @@ int ath_do_piece(ath_work *work)
         result = read_node(work, n);
         if (result == ATH_OK && ath_is_shown(plan->nodes + n, work->stage)) show_node(work, n);
     }
-    if (result == ATH_OK && piece->level <= work->stage) result = show_piece(work, p);
+    if (result == ATH_OK && piece->stage <= work->stage) result = show_piece(work, p);
     for (int32_t q = work->first_layer; q <= work->layer; q++) clear_piece(work->layers + q, piece);
     return result;
 }

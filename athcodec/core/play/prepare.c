@@ -6,13 +6,13 @@
 
 /* ---- start ---- */
 
-static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
+static int32_t steps_of(const ath_file *file, int32_t segment, int32_t stage)
 {
-    int32_t checks = 0, heads = level + 2;
-    for (int32_t d = 0; d <= level; d++)
+    int32_t checks = 0, heads = stage + 2;
+    for (int32_t d = 0; d <= stage; d++)
         for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind = ath_kind_after(kind))
-            checks += ath_checksum_steps(ath_wanted_chunk(file, segment, level, kind, d));
-    int32_t predictions = file->header.is_predicted && level > 0
+            checks += ath_checksum_steps(ath_wanted_chunk(file, segment, stage, kind, d));
+    int32_t predictions = file->header.is_predicted && stage > 0
                               ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment))
                               : 0;
     return checks + heads + predictions + file->plan.piece_count + 1;
@@ -21,8 +21,8 @@ static int32_t steps_of(const ath_file *file, int32_t segment, int32_t level)
 int32_t ath_prepare_steps(const ath_file *file, int32_t segment, int32_t level)
 {
     int32_t before = ath_joined_to(file, segment, level);
-    level = ath_file_stage(file, level);
-    return steps_of(file, segment, level) + (before < 0 ? 0 : 1 + steps_of(file, before, level));
+    int32_t stage = ath_file_stage(file, level);
+    return steps_of(file, segment, stage) + (before < 0 ? 0 : 1 + steps_of(file, before, stage));
 }
 
 /* Returns a chunk of the segment, null if it has none, and notes the first that has not been fed. */
@@ -36,7 +36,7 @@ static const ath_chunk *fed_chunk(ath_work *work, int32_t kind, int32_t d)
 
 static int find_chunks(ath_work *work)
 {
-    int32_t shown = ath_min(work->stage, ath_lossy_levels(work->file) - 1);
+    int32_t shown = ath_min(work->stage, ath_lossy_stages(work->file) - 1);
     for (int32_t d = 0; d <= work->stage; d++) {
         work->stems[d].chunk = fed_chunk(work, ATH_STEMS, d);
         work->affines[d].chunk = fed_chunk(work, ATH_AFFINES, d);
@@ -99,7 +99,7 @@ static void ready_motion(ath_work *work)
 }
 
 /* Begins to prepare the segment asked for or, for its end, the one before that. */
-static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
+static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t stage)
 {
     const ath_file *file = asked->file;
     ath_segment *segment = (ath_segment *)asked->memory;
@@ -108,14 +108,14 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
     memset(work, 0, sizeof *work);
     memset(segment, 0, sizeof *segment);
     ath_carve_work(work, file, frames, (uint8_t *)work);
-    ath_carve_segment(segment, file, ath_level_of(&file->header, level), frames, asked->is_full, (uint8_t *)segment);
+    ath_carve_segment(segment, file, ath_level_of(&file->header, stage), frames, asked->is_full, (uint8_t *)segment);
     segment->index = segment->level = segment->stage = -1;
     work->file = file;
     work->segment = segment;
     work->asked = *asked;
     work->only_end = index != asked->index;
     work->index = index;
-    work->stage = level;
+    work->stage = stage;
     work->next_kind = ATH_STEMS;
     if (!work->only_end) {
         join.maps = work->join.maps;
@@ -149,7 +149,7 @@ static int start(void *memory, size_t work_bytes, const ath_file *file, int32_t 
     int is_full = segment_bytes >= full;
     preparation asked = {file, segment_memory, is_full, 0, index, stage, before, kept, 0, {0, 0}, 0};
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (stage > file->built_level || !ath_level_plan(file, stage)->bases
+    if (stage > file->built_stage || !ath_stage_plan(file, stage)->bases
         || !ath_fits(memory, work_bytes, ath_work_size(file))
         || !ath_fits(segment_memory, segment_bytes, is_full ? full : ath_segment_size_to(file, index, level)))
         return ATH_NO_MEMORY;
@@ -190,7 +190,7 @@ static int go_back(ath_work *work)
 {
     preparation asked = work->asked;
     return begin(work, &asked, ath_segment_before(work->file, asked.index),
-                 ath_min(asked.stage, ath_lossy_levels(work->file) - 1));
+                 ath_min(asked.stage, ath_lossy_stages(work->file) - 1));
 }
 
 static int go_on(ath_work *work)
@@ -273,7 +273,7 @@ static int32_t cost_of_step(const ath_work *work)
         cost *= frames;
     } else {
         int32_t layers = work->layer - work->first_layer + (work->exact_level.chunk ? 16 : 1);
-        if (plan->pieces[p].level <= work->stage) cost += plan->pieces[p].count * layers * frames;
+        if (plan->pieces[p].stage <= work->stage) cost += plan->pieces[p].count * layers * frames;
         if (n < plan->node_count && plan->nodes[n].piece == p && ath_is_shown(plan->nodes + n, work->stage))
             cost += 6 * frames;
     }
@@ -299,14 +299,14 @@ int ath_prepare(void *work, size_t work_bytes, const ath_file *file, int32_t seg
     return result;
 }
 
-static int is_last_lossy(const ath_file *file, int32_t level) { return level == ath_lossy_levels(file) - 1; }
+static int is_last_lossy(const ath_file *file, int32_t stage) { return stage == ath_lossy_stages(file) - 1; }
 
 int ath_goes_on(const ath_file *file, const ath_segment *from, const void *kept, int32_t level)
 {
     const kept_head *head = (const kept_head *)kept;
     if (from->level < 0 || from->level >= level || level >= file->info.level_count) return 0;
     if (is_last_lossy(file, from->stage)) return 1;
-    return head && head->bytes > 0 && head->segment == from->index && head->level == from->stage;
+    return head && head->bytes > 0 && head->segment == from->index && head->stage == from->stage;
 }
 
 int ath_prepare_onward(void *work, size_t work_bytes, const ath_file *file, const ath_segment *from, const void *kept,

@@ -44,7 +44,7 @@ uint64_t ath_carve_work(ath_work *work, const ath_file *file, int32_t frames, ui
     ath_take(&arena, sizeof *work);
     if (file->has_joins) ath_carve_end(&work->join, file, &arena);
     for (int32_t d = 0; d < file->header.stage_count; d++) {
-        if (file->stems_levels >> d & 1) carve_stems(work, file, d, frames, &arena);
+        if (file->stems_stages >> d & 1) carve_stems(work, file, d, frames, &arena);
         if (file->shown_affines >> d & 1) {
             work->affines[d].model = (affine_model *)ath_take(&arena, sizeof(affine_model));
             work->affines[d].history = (uint32_t *)ath_take(&arena, history_size(frames));
@@ -114,7 +114,7 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
     head->bytes = 0;
     if (!ath_can_be_kept(work->file, work->stage)) return ATH_OK;
     head->segment = work->index;
-    head->level = work->stage;
+    head->stage = work->stage;
     work->asked.keeps = work->keeps = head;
     work->keeping.at = (uint8_t *)(head + 1);
     work->keeping.end = (uint8_t *)memory + memory_bytes;
@@ -129,9 +129,9 @@ int32_t ath_watched_level(const ath_work *work) { return ath_level_of(&work->fil
 /* The observer follows the segment asked for, not the one before it. */
 ath_watcher *ath_watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }
 
-const ath_chunk *ath_wanted_chunk(const ath_file *file, int32_t segment, int32_t level, int32_t kind, int32_t d)
+const ath_chunk *ath_wanted_chunk(const ath_file *file, int32_t segment, int32_t stage, int32_t kind, int32_t d)
 {
-    return ath_file_needs(file, kind, d, level) ? ath_file_chunk(file, kind, d, segment) : 0;
+    return ath_file_needs(file, kind, d, stage) ? ath_file_chunk(file, kind, d, segment) : 0;
 }
 
 const ath_chunk *ath_chunk_of(const ath_work *work, int32_t kind, int32_t d)

@@ -31,7 +31,7 @@ typedef struct {
     shape_model *model;
     refined_shape_model *refined; /* replaces `model` in a refinement */
     int32_t shift;                /* see ath_parse_refined_shapes */
-    const ath_chunk *chunk;       /* null: no piece of the level has shapes */
+    const ath_chunk *chunk;       /* null: no piece of the stage has shapes */
 } shapes_reader;
 
 typedef struct {
@@ -40,7 +40,7 @@ typedef struct {
     refinement_model *refined; /* replaces `model` in a refinement */
     uint32_t *history;
     double *temporal;
-    const ath_chunk *chunk; /* null: the level has none, or this preparation does not need it */
+    const ath_chunk *chunk; /* null: the stage has none, or this preparation does not need it */
 } stems_reader;
 
 typedef struct {
@@ -138,7 +138,7 @@ int ath_are_copied(const ath_file *file, int32_t index, int32_t level);
 ath_watcher *ath_watcher_of(const ath_work *work);
 
 /* Returns a chunk that a segment needs for a stage, null if it has none: of any segment, and of the one in preparation. */
-const ath_chunk *ath_wanted_chunk(const ath_file *file, int32_t segment, int32_t level, int32_t kind, int32_t d);
+const ath_chunk *ath_wanted_chunk(const ath_file *file, int32_t segment, int32_t stage, int32_t kind, int32_t d);
 const ath_chunk *ath_chunk_of(const ath_work *work, int32_t kind, int32_t d);
 
 /* Note a fault in a chunk, and return its code. ath_blame: a content that is not valid, unless the result is ATH_OK. */
