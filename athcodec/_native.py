@@ -53,11 +53,11 @@ BRANCH = np.dtype(fields("<i4", "parent count attach flags lag first subtree dep
 PIECE = np.dtype(
     fields(
         *("<i8", "modes basis attach_cache", "<u8", "attached"),
-        *("<i4", "first count parent attach branch flags rank level low_level low_modes last_attached ring"),
-        *("<i4", "modes_level tip_weight"),
+        *("<i4", "first count parent attach branch flags rank stage low_stage low_modes last_attached ring"),
+        *("<i4", "modes_stage tip_weight"),
     )
 )
-NODE = np.dtype(fields("9<f8", "whitening", "<i4", "branch piece first count level last coded rank"))
+NODE = np.dtype(fields("9<f8", "whitening", "<i4", "branch piece first count stage last_stage coded rank"))
 CHUNK = np.dtype(fields("<u8", "bytes offset", "<u4", "length checksum segment", "<u2", "kind", "u1", "level stage"))
 
 

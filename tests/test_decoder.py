@@ -152,10 +152,10 @@ def test_stems_above_a_level_have_their_final_shape_but_for_corrections_and_join
             Plan(decoder.file.tables.branches, decoder.file.vertex_count).pieces,
             decoder.file.tables.header.stages,
         )
-        last -= stages[last] > pieces["level"].max()  # A refinement shows other stems.
+        last -= stages[last] > pieces["stage"].max()  # A refinement shows other stems.
         final = bare.positions(level=last)[:, order]
         for level in range(1, last):
-            exact = np.isin(branch, pieces["branch"][pieces["level"] <= stages[level]])
+            exact = np.isin(branch, pieces["branch"][pieces["stage"] <= stages[level]])
             shown = decoder.affines(0, level)
             assert np.array_equal(exact, np.repeat(shown.is_stem, shown.vertex_count))
             positions = decoder.positions(level=level)[:, order]

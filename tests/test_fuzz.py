@@ -63,7 +63,7 @@ MISTAKES = {
         "prelude",
         "crash",
     ),
-    "memory that is not cleared": ("play/prepare.c", ROWS, "* 0);\n    int valid", "motion", "wrong"),
+    "memory that is not cleared": ("play/pieces.c", ROWS, "* 0);\n    int valid", "motion", "wrong"),
     "a prefix that is not checked": ("container/container.c", ALL_THERE, "return result;", "container", "wrong"),
     "a time that is not checked": ("play/play.c", CLOCK, "", "decode", "crash"),
 }

@@ -30,12 +30,14 @@ STACK_BYTES = 64 << 10
 PACKING = 22  # Level of zstd, whose decoder is in the module anyway, for arrays.
 SMALL = (
     "build.c",
+    "checksums.c",
     "container.c",
     "decode.c",
     "fault_text.c",
     "file.c",
     "foresee.c",
     "gpu.c",
+    "heads.c",
     "join.c",
     "keep.c",
     "maps.c",
@@ -49,9 +51,10 @@ SMALL = (
     "rest.c",
     "static.c",
     "store.c",
+    "work.c",
 )
 """Run once per file, or little: compiled for size, all else for speed."""
-SCALAR = (*SMALL, "prepare.c")
+SCALAR = (*SMALL, "correct.c", "pieces.c", "prepare.c")
 """Vectors make the loops of these files larger and no faster."""
 FLAGS = [
     "-target",

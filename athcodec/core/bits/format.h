@@ -7,7 +7,7 @@
 enum {
     ATH_PIECE_VERTICES = 64,  /* vertices of the longest piece of a stem */
     ATH_SEGMENT_FRAMES = 256, /* frames of the longest segment */
-    ATH_LEVELS = 32,          /* largest number of levels */
+    ATH_LEVELS = 32,          /* largest number of stages, and so of levels */
     ATH_LAYERS = 8            /* largest number of layers of precision */
 };
 

@@ -626,6 +626,6 @@ void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath
     for (int32_t n = first; n < stop; n++) {
         const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
-        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->level], rounding);
+        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->stage], rounding);
     }
 }

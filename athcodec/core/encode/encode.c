@@ -286,7 +286,7 @@ int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const a
     affine_model_init(maps, motion->frames, (uint32_t *)(maps + 1));
     for (int32_t n = 0; n < plan->node_count && valid; n++) {
         ath_node_rows node = ath_rows_of_node(integers, motion->frames, n);
-        if (plan->nodes[n].coded && plan->nodes[n].level == level)
+        if (plan->nodes[n].coded && plan->nodes[n].stage == level)
             valid = code_node(&coder, maps, plan, motion->frames, n, &node);
     }
     return written(&coder, valid);

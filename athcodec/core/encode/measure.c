@@ -116,7 +116,7 @@ void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
         ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
-        if (piece->level > level) continue;
+        if (piece->stage > level) continue;
         const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
         ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }

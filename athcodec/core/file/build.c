@@ -16,7 +16,7 @@ static uint64_t carve_build(ath_file *file, uint8_t *base)
         for (int32_t of_nodes = 0; of_nodes < 2; of_nodes++)
             are_there[wave_kind(file, s, of_nodes)][ath_file_frames(file, s)] = 1;
     file->plan.bases = file->bases = (double *)ath_take(&arena, file->bases_count * sizeof(double));
-    file->built_level = file->planned_level = -1;
+    file->built_stage = file->planned_stage = -1;
     file->next_piece = file->next_waves = 0;
     for (int32_t kind = 0; kind < ATH_WAVE_KINDS; kind++)
         for (uint64_t frames = 1; frames <= ATH_SEGMENT_FRAMES; frames++)
@@ -31,8 +31,8 @@ size_t ath_build_size(const ath_file *file)
     return ath_size_or_most(carve_build(&counted, 0));
 }
 
-/* Fills the waves, then nodes and bases that levels up to one take: a coarse picture waits for no others. */
-static int build_to(ath_file *file, int32_t level, int32_t *cost)
+/* Fills the waves, then nodes and bases that stages up to one take: a coarse picture waits for no others. */
+static int build_to(ath_file *file, int32_t stage, int32_t *cost)
 {
     int result = ATH_OK;
     for (; file->next_waves < ATH_WAVE_KINDS * (ATH_SEGMENT_FRAMES + 1); file->next_waves++) {
@@ -41,17 +41,17 @@ static int build_to(ath_file *file, int32_t level, int32_t *cost)
         if (!ath_spend(cost, frames * (frames + 128))) return ATH_MORE;
         ath_waves(frames, kind, file->waves[kind][frames]);
     }
-    while (result == ATH_OK && file->built_level < level) {
-        int32_t next = file->built_level + 1;
-        if (file->planned_level < next) {
+    while (result == ATH_OK && file->built_stage < stage) {
+        int32_t next = file->built_stage + 1;
+        if (file->planned_stage < next) {
             if (!ath_spend(cost, file->info.place_count)) return ATH_MORE;
             ath_plan_nodes(&file->plan, file->nodes, next, next);
-            file->planned_level = next;
+            file->planned_stage = next;
         }
         if (file->bases_count > 0)
             result = ath_basis_fill(file->pieces, &file->next_piece, file->plan.piece_count, next, next, file->rest, 0,
                                     (double *)file->scratch, file->bases, cost);
-        if (result == ATH_OK) file->built_level = next;
+        if (result == ATH_OK) file->built_stage = next;
     }
     return result;
 }
@@ -103,14 +103,14 @@ static int start_layer_rest(ath_file *file, int32_t q, ath_bytes chunk)
     return ATH_OK;
 }
 
-/* All pieces of a refinement belong to its level. */
+/* All pieces of a refinement belong to its stage. */
 static void plan_pieces(const ath_file *file, int32_t q)
 {
     const ath_layer *layer = &file->layers[q];
     memcpy(layer->pieces, file->pieces, (size_t)file->plan.piece_count * sizeof *layer->pieces);
     for (int32_t p = 0; q > 0 && p < file->plan.piece_count; p++) {
-        layer->pieces[p].level = ath_level_of_layer(file, q);
-        layer->pieces[p].low_level = -1;
+        layer->pieces[p].stage = ath_stage_of_layer(file, q);
+        layer->pieces[p].low_stage = -1;
         layer->pieces[p].low_modes = 0;
     }
     ath_plan_rigid(&layer->plan, layer->pieces, q);
@@ -120,7 +120,7 @@ static void plan_pieces(const ath_file *file, int32_t q)
 static int read_layer_rest(ath_file *file, int32_t q, int32_t *cost, ath_fault_info *fault)
 {
     ath_layer *layer = &file->layers[q];
-    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_level_of_layer(file, q) : 1, 0);
+    const ath_chunk *chunk = ath_file_chunk(file, ATH_REFINED_REST, q > 0 ? ath_stage_of_layer(file, q) : 1, 0);
     layer->plan.rest = plan_before(file, q)->rest;
     if (!file->is_reading) plan_pieces(file, q);
     if (!chunk) {

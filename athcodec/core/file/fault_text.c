@@ -243,7 +243,7 @@ size_t ath_level_name(const ath_file *file, int32_t level, char *text, size_t ca
     if (level <= file->plan.height) {
         write_text(&out, "depth ");
         put_integer(&out, (uint64_t)level);
-    } else if (level >= ath_lossy_levels(file)) {
+    } else if (level >= ath_lossy_stages(file)) {
         write_text(&out, "lossless");
     } else if (layers == 1) {
         write_text(&out, "all branches");

@@ -97,7 +97,7 @@ int32_t ath_segment_before(const ath_file *file, int32_t segment)
 
 int32_t ath_join_at(const ath_file *file, int32_t segment, int32_t stage)
 {
-    int32_t shown = ath_level_of(&file->header, ath_min(stage, ath_lossy_levels(file) - 1));
+    int32_t shown = ath_level_of(&file->header, ath_min(stage, ath_lossy_stages(file) - 1));
     return file->has_joins ? file->joins[shown * file->info.segment_count + segment] : 0;
 }
 
@@ -163,26 +163,26 @@ int ath_load(const ath_file *file, int32_t kind, ath_bytes *content, ath_fault_i
     return ATH_OK;
 }
 
-const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment)
+const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t stage, int32_t segment)
 {
-    return ath_find_chunk(file->chunks, file->header.chunk_count, kind, level,
+    return ath_find_chunk(file->chunks, file->header.chunk_count, kind, stage,
                           ath_is_shared(kind) ? 0 : (uint32_t)segment);
 }
 
-/* If nothing of level 0 serves other levels, level 1 may refine the rest pose. */
-static int stands_alone(const ath_file *file) { return !((file->stems_levels | file->affine_levels[1]) & 1); }
+/* If nothing of stage 0 serves other stages, stage 1 may refine the rest pose. */
+static int stands_alone(const ath_file *file) { return !((file->stems_stages | file->affine_stages[1]) & 1); }
 
-int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level)
+int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t stage)
 {
-    if (kind == ATH_STEMS) return d <= level && (file->stems_levels >> d & 1);
-    if (kind == ATH_AFFINES) return file->affine_levels[level] >> d & 1;
-    if (kind == ATH_SHAPES) return d <= level && (file->stems_levels >> d & 1);
-    int32_t shown = ath_min(level, ath_lossy_levels(file) - 1);
+    if (kind == ATH_STEMS) return d <= stage && (file->stems_stages >> d & 1);
+    if (kind == ATH_AFFINES) return file->affine_stages[stage] >> d & 1;
+    if (kind == ATH_SHAPES) return d <= stage && (file->stems_stages >> d & 1);
+    int32_t shown = ath_min(stage, ath_lossy_stages(file) - 1);
     if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height && !file->header.is_predicted;
     if (kind == ATH_PREDICTED) return d == shown && d > file->plan.height && file->header.is_predicted;
     if (kind == ATH_REFINED_REST && d <= shown && file->header.layer_count > 1)
         return d > file->plan.height + 1 || (d == 1 && stands_alone(file));
-    return kind == ATH_EXACT && d == level && d > shown;
+    return kind == ATH_EXACT && d == stage && d > shown;
 }
 
 static int find_polygons(const ath_file *file, int kind, ath_polygons *shape, ath_bytes *body, ath_fault_info *fault)
@@ -235,7 +235,7 @@ static void walk_cut(const ath_file *file, int32_t level, ath_part *parts, int32
     count[0] = count[1] = count[2] = 0;
     for (int32_t p = 0; p <= plan->piece_count; p++) {
         const ath_piece *piece = plan->pieces + p;
-        int exact = p < plan->piece_count && piece->level <= stage;
+        int exact = p < plan->piece_count && piece->stage <= stage;
         if (run.count > 0 && !exact) {
             if (parts) parts[count[0]] = run;
             count[0]++;

@@ -6,8 +6,8 @@
 #include "model/basis.h"
 #include "model/mesh.h"
 
-/* The plant about a finer rest pose: the first layer, from level 1 on, or a refinement, whose pieces are all of its
- * level. A refinement without a rest pose of its own has the rest pose and the bases of the layer before. */
+/* The plant about a finer rest pose: the first layer, from stage 1 on, or a refinement, whose pieces are all of its
+ * stage. A refinement without a rest pose of its own has the rest pose and the bases of the layer before. */
 typedef struct {
     ath_plan plan; /* plan.bases null: not built yet */
     ath_piece *pieces;
@@ -58,19 +58,19 @@ struct ath_file {
     ath_fault_info fault;
     ath_rest_head rest_head;
     ath_bytes rest_body;
-    int32_t built_level;       /* level up to which `bases` are filled; -1: none */
-    int32_t planned_level;     /* the same of `nodes` */
+    int32_t built_stage;       /* stage up to which `bases` are filled; -1: none */
+    int32_t planned_stage;     /* the same of `nodes` */
     int32_t is_reading;        /* 1: a layer's rest pose is read in part */
     int32_t next_piece;        /* where filling the bases that come next goes on */
     int32_t next_waves;        /* where filling the waves goes on, by number of frames and kind */
     int32_t rest_known;        /* 0 until the host gives it */
     int32_t source_rest_known; /* 0 until SOURCE_REST has been read */
-    int32_t first_layer;       /* 0 where level 1 has a rest pose of its own, else 1 */
+    int32_t first_layer;       /* 0 where stage 1 has a rest pose of its own, else 1 */
     int32_t rest_is_exact;     /* the reference pose is in the very numbers of source_rest */
     int32_t longest;           /* frames of the longest segment */
     int32_t has_joins;
-    uint32_t stems_levels;              /* bit d: stage d has STEMS */
-    uint32_t affine_levels[ATH_LEVELS]; /* bit d of entry L: AFFINES of stage d serve to show stage L */
+    uint32_t stems_stages;              /* bit d: stage d has STEMS */
+    uint32_t affine_stages[ATH_LEVELS]; /* bit d of entry L: AFFINES of stage d serve to show stage L */
     uint32_t shown_affines;             /* bit d: AFFINES of stage d serve to show a stored level */
 };
 
@@ -97,9 +97,9 @@ void ath_fill_places(const ath_file *file, void *xyz, size_t stride, size_t byte
 
 /* ---- chunks ---- */
 
-const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t level, int32_t segment);
-/* Returns whether decoding a segment at `level` takes the chunk of this kind and level d. */
-int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t level);
+const ath_chunk *ath_file_chunk(const ath_file *file, int32_t kind, int32_t stage, int32_t segment);
+/* Returns whether decoding a segment at `stage` takes the chunk of this kind and stage d. */
+int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t stage);
 int ath_refuse_missing(ath_fault_info *fault, int32_t kind, int32_t level, uint32_t segment);
 /* Checks a chunk of the prelude and gives its bytes. Until the next chunk is loaded, the fault is that the content of
  * this one is not valid. */
@@ -123,35 +123,35 @@ void ath_know_rest(ath_file *file);
 const double *ath_file_waves(const ath_file *file, int32_t segment);
 const double *ath_file_node_waves(const ath_file *file, int32_t segment);
 
-/* ---- levels and layers: from here on, and in what prepares segments, `level` and `d` are stages ---- */
+/* ---- stages and layers ---- */
 
 ATH_INLINE int32_t ath_file_stage(const ath_file *file, int32_t level) { return ath_stage_of(&file->header, level); }
 
-ATH_INLINE int ath_has_stream(const ath_file *file, int32_t level) { return file->stems_levels >> level & 1; }
+ATH_INLINE int ath_has_stream(const ath_file *file, int32_t stage) { return file->stems_stages >> stage & 1; }
 
-/* Returns the number of levels that are not exact. */
-ATH_INLINE int32_t ath_lossy_levels(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }
+/* Returns the number of stages that are not exact. */
+ATH_INLINE int32_t ath_lossy_stages(const ath_file *file) { return file->plan.height + 1 + file->header.layer_count; }
 
-/* Returns whether the file stores the level behind the last lossy one. */
-ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.stage_count > ath_lossy_levels(file); }
+/* Returns whether the file stores the stage behind the last lossy one. */
+ATH_INLINE int ath_file_is_lossless(const ath_file *file) { return file->header.stage_count > ath_lossy_stages(file); }
 
-/* Returns the layer of precision of a level: 0 for the levels of the branch hierarchy. */
-ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t level)
+/* Returns the layer of precision of a stage: 0 for the stages of the branch hierarchy. */
+ATH_INLINE int32_t ath_layer_of(const ath_file *file, int32_t stage)
 {
-    return ath_max(0, ath_min(level, ath_lossy_levels(file) - 1) - file->plan.height - 1);
+    return ath_max(0, ath_min(stage, ath_lossy_stages(file) - 1) - file->plan.height - 1);
 }
 
-ATH_INLINE int32_t ath_level_of_layer(const ath_file *file, int32_t layer) { return file->plan.height + 1 + layer; }
+ATH_INLINE int32_t ath_stage_of_layer(const ath_file *file, int32_t layer) { return file->plan.height + 1 + layer; }
 
-/* Returns the plan of a layer as it serves to show `level`. */
-ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer, int32_t level)
+/* Returns the plan of a layer as it serves to show `stage`. */
+ATH_INLINE const ath_plan *ath_layer_plan(const ath_file *file, int32_t layer, int32_t stage)
 {
-    return level > 0 && layer >= file->first_layer ? &file->layers[layer].plan : &file->plan;
+    return stage > 0 && layer >= file->first_layer ? &file->layers[layer].plan : &file->plan;
 }
 
-ATH_INLINE const ath_plan *ath_level_plan(const ath_file *file, int32_t level)
+ATH_INLINE const ath_plan *ath_stage_plan(const ath_file *file, int32_t stage)
 {
-    return ath_layer_plan(file, ath_layer_of(file, level), level);
+    return ath_layer_plan(file, ath_layer_of(file, stage), stage);
 }
 
 #endif

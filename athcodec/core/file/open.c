@@ -279,25 +279,25 @@ static void plan_layers(ath_file *file)
     file->layers[0].plan.nodes = file->layers[0].nodes;
 }
 
-/* Notes which levels have which chunks. */
-static void plan_levels(ath_file *file)
+/* Notes which stages have which chunks. */
+static void plan_stages(ath_file *file)
 {
     const ath_plan *plan = &file->plan;
-    file->stems_levels = 0;
-    memset(file->affine_levels, 0, sizeof file->affine_levels);
+    file->stems_stages = 0;
+    memset(file->affine_stages, 0, sizeof file->affine_stages);
     for (int32_t p = 0; p < plan->piece_count && !file->header.is_predicted; p++) {
-        file->stems_levels |= 1u << plan->pieces[p].level;
-        if (plan->pieces[p].low_level >= 0) file->stems_levels |= 1u << plan->pieces[p].low_level;
+        file->stems_stages |= 1u << plan->pieces[p].stage;
+        if (plan->pieces[p].low_stage >= 0) file->stems_stages |= 1u << plan->pieces[p].low_stage;
     }
-    for (int32_t q = 1; q < file->header.layer_count; q++) file->stems_levels |= 1u << ath_level_of_layer(file, q);
+    for (int32_t q = 1; q < file->header.layer_count; q++) file->stems_stages |= 1u << ath_stage_of_layer(file, q);
     for (int32_t n = 0; n < plan->node_count; n++) {
         const ath_node *node = plan->nodes + n;
-        for (int32_t level = node->level; node->coded && level <= node->last; level++)
-            file->affine_levels[level] |= 1u << node->level;
+        for (int32_t stage = node->stage; node->coded && stage <= node->last_stage; stage++)
+            file->affine_stages[stage] |= 1u << node->stage;
     }
     file->shown_affines = 0;
     for (int32_t level = 0; level < file->info.level_count; level++)
-        file->shown_affines |= file->affine_levels[ath_file_stage(file, level)];
+        file->shown_affines |= file->affine_stages[ath_file_stage(file, level)];
 }
 
 /* Returns whether a stored level needs, or may have, chunks of this kind at a stage. */
@@ -344,7 +344,7 @@ static int check_motion_chunks(const ath_file *file, ath_fault_info *fault)
 
 static int check_joins(ath_file *file, ath_fault_info *fault)
 {
-    int32_t segments = file->info.segment_count, lossy = ath_lossy_levels(file);
+    int32_t segments = file->info.segment_count, lossy = ath_lossy_stages(file);
     if (file->header.is_predicted) lossy = 1; /* only maps are joined, not predicted motion */
     for (int32_t i = 0; i < file->info.level_count * segments; i++) {
         int32_t level = i / segments, segment = i % segments, width = file->joins[i] % ATH_JOIN_SLOPED;
@@ -408,7 +408,7 @@ static void set_info(ath_file *file, uint64_t prelude)
 /* A file may have one level beyond the last lossy one, which is exact and goes on from it. */
 static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
-    int32_t lossy = ath_lossy_levels(file), last = file->info.full_level_count - 1;
+    int32_t lossy = ath_lossy_stages(file), last = file->info.full_level_count - 1;
     int32_t found = ath_file_stage(file, last) + 1;
     int placed = file->plan.height == 0 || !file->header.is_predicted;
     if (placed && found == lossy) return ATH_OK;
@@ -423,7 +423,7 @@ static int read_plan(ath_file *file, ath_fault_info *fault)
     file->info.node_count = file->plan.node_count;
     file->info.depth_levels = ath_min(file->info.level_count, ath_level_of(&file->header, file->plan.height + 1) + 1);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;
-    plan_levels(file);
+    plan_stages(file);
     if ((result = check_motion_chunks(file, fault)) != ATH_OK) return result;
     if ((result = check_joins(file, fault)) == ATH_OK) plan_layers(file);
     return result;

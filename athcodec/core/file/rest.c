@@ -175,7 +175,7 @@ int ath_level_rest(const ath_file *file, int32_t level, ath_order order, double 
     if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
     int32_t stage = ath_file_stage(file, level), layer = ath_layer_of(file, stage);
-    const ath_plan *plan = ath_level_plan(file, stage);
+    const ath_plan *plan = ath_stage_plan(file, stage);
     if (plan != &file->plan && !file->layers[layer].rest_known) return ATH_BAD_ARGUMENT;
     for (size_t v = 0; v < file->header.place_count; v++) {
         double *out = (double *)(void *)((char *)xyz + place_of(file, order, v) * stride);

@@ -12,7 +12,7 @@ static uint32_t to_words(size_t bytes) { return (uint32_t)(bytes / sizeof(uint32
 static int is_baked(const ath_file *file, int32_t level)
 {
     int32_t stage = ath_file_stage(file, level);
-    return stage >= ath_lossy_levels(file) || (file->header.is_predicted && stage > 0);
+    return stage >= ath_lossy_stages(file) || (file->header.is_predicted && stage > 0);
 }
 
 /* ---- bodies of a level ---- */
@@ -29,7 +29,7 @@ typedef struct {
 static body_walk walk_bodies(const ath_file *file, int32_t level)
 {
     int32_t stage = ath_file_stage(file, level);
-    body_walk walk = {file, ath_level_plan(file, stage), level, stage, 0, 0, 0, 0};
+    body_walk walk = {file, ath_stage_plan(file, stage), level, stage, 0, 0, 0, 0};
     return walk;
 }
 
@@ -44,7 +44,7 @@ static int next_body(body_walk *walk)
             if (ath_is_shown(walk->node, walk->stage)) return 1;
         }
         walk->node = 0;
-        if (walk->piece->level > walk->stage) continue;
+        if (walk->piece->stage > walk->stage) continue;
         walk->p++;
         return 1;
     }
@@ -248,7 +248,7 @@ static void put_order(level_writer *writer, int32_t count)
 static void bind_vertices(level_writer *writer, const ath_file *file, int32_t level)
 {
     int32_t stage = ath_file_stage(file, level);
-    const ath_plan *plan = ath_level_plan(file, stage);
+    const ath_plan *plan = ath_stage_plan(file, stage);
     const ath_node *node = plan->nodes, *end = node + plan->node_count;
     uint32_t position = 0, matrix = 0;
     for (int32_t v = 0; v < plan->vertex_count;) {
@@ -274,7 +274,7 @@ int ath_gpu_build_level(const ath_file *file, int32_t level, void *memory, size_
     level_writer writer;
     if (level < 0 || level >= file->info.level_count) return ATH_BAD_ARGUMENT;
     if (!file->rest_known) return ATH_NEEDS_HOST_MESH;
-    if (!file->bases || !ath_level_plan(file, ath_file_stage(file, level))->bases
+    if (!file->bases || !ath_stage_plan(file, ath_file_stage(file, level))->bases
         || !ath_fits(memory, memory_bytes, ath_gpu_level_size(file, level)))
         return ATH_NO_MEMORY;
     memset(&writer, 0, sizeof writer);
@@ -728,7 +728,7 @@ static void widen(double box[6], const double x[3])
 
 static void widen_node(const ath_file *file, const ath_segment *segment, const ath_part *part, double box[6])
 {
-    const ath_plan *plan = ath_level_plan(file, segment->stage);
+    const ath_plan *plan = ath_stage_plan(file, segment->stage);
     const ath_branch *branch = plan->branches + part->branch;
     const double *a = ath_rest_of(plan, branch->attach >= 0 ? branch->attach : branch->first);
     for (size_t t = 0; t < (size_t)segment->frames; t++) {

@@ -360,11 +360,11 @@ int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *r
         piece_gaps(piece, rest, gaps + piece->first);
         piece->tip_weight = tip_weight(piece, rest);
         ath_piece *owner = pieces + owner_of_basis(pieces, p, gaps, table, (uint32_t)size - 1);
-        int32_t level = ath_base_level(piece);
+        int32_t stage = ath_base_stage(piece);
         piece->rank = piece->count;
         piece->modes = owner == piece ? next : owner->modes;
-        piece->modes_level = -1;
-        owner->modes_level = owner == piece ? level : ath_min(owner->modes_level, level);
+        piece->modes_stage = -1;
+        owner->modes_stage = owner == piece ? stage : ath_min(owner->modes_stage, stage);
         if (owner == piece) next += (int64_t)piece->count * piece->count;
         piece->basis = piece->modes;
         if (piece->flags & ATH_SHEET) {
@@ -387,7 +387,7 @@ static int take_modes(const ath_plan *before, int32_t p, const ath_piece *piece,
     return 1;
 }
 
-static int is_between(int32_t level, int32_t first, int32_t last) { return first <= level && level <= last; }
+static int is_between(int32_t stage, int32_t first, int32_t last) { return first <= stage && stage <= last; }
 
 static void fill_modes(const ath_piece *pieces, int32_t p, const double *rest, const ath_plan *before, double *work,
                        double *bases)
@@ -403,7 +403,7 @@ void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const
                      double *bases)
 {
     for (int32_t p = first; p < stop; p++)
-        if (pieces[p].modes_level >= 0) fill_modes(pieces, p, rest, 0, work, bases);
+        if (pieces[p].modes_stage >= 0) fill_modes(pieces, p, rest, 0, work, bases);
 }
 
 static void fill_sheet(ath_piece *piece, const double *rest, double *bases)
@@ -418,13 +418,13 @@ void ath_basis_sheets(ath_piece *pieces, int32_t first, int32_t stop, const doub
         if (piece->flags & ATH_SHEET && !(piece->flags & ATH_RIGID)) fill_sheet(piece, rest, bases);
 }
 
-int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_level, int32_t last_level,
+int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_stage, int32_t last_stage,
                    const double *rest, const ath_plan *before, double *work, double *bases, int32_t *cost)
 {
     for (; *next < piece_count; ++*next) { /* a sheet shares modes with a piece before it alone */
         ath_piece *piece = pieces + *next;
-        int has_modes = is_between(piece->modes_level, first_level, last_level);
-        int is_sheet = piece->flags & ATH_SHEET && is_between(ath_base_level(piece), first_level, last_level);
+        int has_modes = is_between(piece->modes_stage, first_stage, last_stage);
+        int is_sheet = piece->flags & ATH_SHEET && is_between(ath_base_stage(piece), first_stage, last_stage);
         if (!ath_spend(cost, 1 + 4 * (has_modes + is_sheet) * piece->count * piece->count)) return ATH_MORE;
         if (has_modes) fill_modes(pieces, *next, rest, before, work, bases);
         if (is_sheet) fill_sheet(piece, rest, bases);

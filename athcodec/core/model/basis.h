@@ -6,15 +6,15 @@
 
 /* int32_t that ath_basis_layout needs as `table`. */
 ATH_ENCODER_API size_t ath_basis_table_size(int32_t piece_count);
-/* Fills the pieces' offsets, levels and tip weights, and `gaps` (vertex_count bytes, scratch). Returns the doubles that all bases
+/* Fills the pieces' offsets, stages and tip weights, and `gaps` (vertex_count bytes, scratch). Returns the doubles that all bases
  * need together. */
 ATH_ENCODER_API int64_t ath_basis_layout(ath_piece *pieces, int32_t piece_count, const double *rest, uint8_t *gaps,
                                          int32_t *table);
-/* Fills the bases that some of the levels are the first to take, from piece *next on, which counts up, for a budget.
+/* Fills the bases that some of the stages are the first to take, from piece *next on, which counts up, for a budget.
  * `before` is null, or a plan of the same pieces about another rest pose: equal modes are copied from it. work:
  * ATH_BASIS_WORK doubles. Returns ATH_OK, or ATH_MORE once the budget is spent. */
 enum { ATH_BASIS_WORK = 2 * ATH_PIECE_VERTICES * ATH_PIECE_VERTICES };
-int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_level, int32_t last_level,
+int ath_basis_fill(ath_piece *pieces, int32_t *next, int32_t piece_count, int32_t first_stage, int32_t last_stage,
                    const double *rest, const ath_plan *before, double *work, double *bases, int32_t *cost);
 /* Fill the bases of a range of pieces in two passes: a sheet may need the modes of any piece. */
 ATH_ENCODER_API void ath_basis_modes(const ath_piece *pieces, int32_t first, int32_t stop, const double *rest,

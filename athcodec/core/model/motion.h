@@ -6,19 +6,19 @@
 
 enum { ATH_NO_ROOT = -1 }; /* root of streams without a learned basis */
 
-/* How the integers of one level and segment are to be read. */
+/* How the integers of one stage and segment are to be read. */
 typedef struct ath_stream {
     double step;                 /* quantisation step, scene units */
     double rotation_step_factor; /* step of rotation tracks over `step`; 0: no rotations are coded */
     const double *temporal;      /* temporal_rank x frames, orthonormal rows */
     int32_t temporal_rank;
-    int32_t root;     /* level of the first stream whose learned basis begins with the same rows, or ATH_NO_ROOT */
+    int32_t root;     /* stage of the first stream whose learned basis begins with the same rows, or ATH_NO_ROOT */
     double turn_step; /* largest rotation step of rigid pieces; 0: no limit */
 } ath_stream;
 
 /* The inputs and memory from which the pieces and nodes of one segment are placed. */
 typedef struct ath_motion {
-    const ath_stream *streams;       /* one per level, 0 to height + 1 */
+    const ath_stream *streams;       /* one per stage, 0 to height + 1 */
     const double *waves;             /* frames x frames, see ath_waves: the basis of node maps */
     double *attach_caches;           /* ath_attach_cache_size(attach_cache_rows, frames) doubles */
     double *work;                    /* ath_motion_work(longest, frames) doubles */
@@ -152,22 +152,22 @@ ATH_ENCODER_API int ath_unit_shapes(int32_t count, const int32_t *integers, doub
 /* Returns the stream of a piece's rotation and translation tracks and of its first modes. */
 ATH_INLINE const ath_stream *ath_base_stream(const ath_motion *motion, const ath_piece *piece)
 {
-    return motion->streams + ath_base_level(piece);
+    return motion->streams + ath_base_stage(piece);
 }
 
 /* Returns the stream that holds row m of a piece: its mode, or three shapes. */
 ATH_INLINE const ath_stream *ath_mode_stream(const ath_motion *motion, const ath_piece *piece, int32_t m)
 {
-    return m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->level;
+    return m < piece->low_modes ? ath_base_stream(motion, piece) : motion->streams + piece->stage;
 }
 
 /* Returns how many of a piece's modes its shapes are made of. */
 ATH_INLINE int32_t ath_shape_modes(const ath_piece *piece) { return ath_min(ath_rank(piece), ATH_SHAPE_MODES); }
 
-/* Returns the most shapes that the stream of the piece's base level may hold. */
+/* Returns the most shapes that the stream of the piece's base stage may hold. */
 ATH_INLINE int32_t ath_base_shapes(const ath_piece *piece)
 {
-    return 3 * (piece->low_level >= 0 ? ath_min(piece->low_modes, ath_shape_modes(piece)) : ath_shape_modes(piece));
+    return 3 * (piece->low_stage >= 0 ? ath_min(piece->low_modes, ath_shape_modes(piece)) : ath_shape_modes(piece));
 }
 
 /* Returns whether row r holds shapes. A piece with shapes has no other rows below ath_shape_modes. */

@@ -1,4 +1,4 @@
-/* From branches to pieces and nodes: cuts stems, attaches pieces, assigns them to the streams of levels. */
+/* From branches to pieces and nodes: cuts stems, attaches pieces, assigns them to the streams of stages. */
 #include "model/plan.h"
 
 /* Smallest second moment that counts as a direction, relative to the largest. */
@@ -79,7 +79,7 @@ static void split_branch(const ath_branch *branches, int32_t b, ath_piece *piece
         piece->flags = j == 0 ? branch->flags : branch->flags & ~ATH_LOOSE;
         piece->ring = branch->ring;
         piece->rank = piece->count;
-        piece->low_level = -1;
+        piece->low_stage = -1;
         piece->attach_cache = piece->last_attached = -1;
         for (int32_t v = piece->first; v < piece->first + piece->count; v++) piece_of_vertex[v] = next + j;
     }
@@ -112,7 +112,7 @@ static void place_attach_caches(ath_plan *plan, ath_piece *pieces, int32_t *stac
     }
 }
 
-/* A leaf that is one short stem needs no map of its own: its first modes come with its node's level. */
+/* A leaf that is one short stem needs no map of its own: its first modes come with its node's stage. */
 static void plan_node(const ath_plan *plan, ath_piece *pieces, ath_node *node, int32_t b, int32_t piece)
 {
     const ath_branch *branch = plan->branches + b;
@@ -121,11 +121,11 @@ static void plan_node(const ath_plan *plan, ath_piece *pieces, ath_node *node, i
     node->piece = piece;
     node->first = branch->first;
     node->count = subtree_vertices(plan->branches, b);
-    node->level = branch->depth;
-    node->last = branch->flags & ATH_WHOLE ? plan->height : branch->depth;
+    node->stage = branch->depth;
+    node->last_stage = branch->flags & ATH_WHOLE ? plan->height : branch->depth;
     node->coded = branch->subtree > 1 || pieces_of(branch) > 1;
     if (!node->coded) {
-        pieces[piece].low_level = node->level;
+        pieces[piece].low_stage = node->stage;
         pieces[piece].low_modes = branch->ring > 0 ? ath_min(ath_rings(pieces + piece), 2)
                                                    : ath_min(branch->count, branch->flags & ATH_SHEET ? 3 : 2);
     }
@@ -139,14 +139,14 @@ void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node *nodes, int32_t 
     for (int32_t b = 0; b < plan->branch_count; b = next_node(branches, b))
         plan->height = ath_max(plan->height, branches[b].depth);
     for (int32_t b = 0; b < plan->branch_count; b++) {
-        int32_t parts = pieces_of(branches + b), level = plan->height + 1;
+        int32_t parts = pieces_of(branches + b), stage = plan->height + 1;
         split_branch(branches, b, pieces, next_piece, memory);
         if (b == following) {
             plan_node(plan, pieces, nodes + node++, b, next_piece);
             following = next_node(branches, b);
-            if (!(branches[b].flags & ATH_WHOLE)) level = branches[b].depth + 1;
+            if (!(branches[b].flags & ATH_WHOLE)) stage = branches[b].depth + 1;
         }
-        for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].level = level;
+        for (int32_t j = 0; j < parts; j++) pieces[next_piece + j].stage = stage;
         next_piece += parts;
     }
     place_attach_caches(plan, pieces, memory, keep);
@@ -204,15 +204,15 @@ void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes)
 {
     for (int32_t n = 0; n < plan->node_count; n++) nodes[n].coded = 1;
     for (int32_t p = 0; p < plan->piece_count; p++) {
-        pieces[p].low_level = -1;
+        pieces[p].low_stage = -1;
         pieces[p].low_modes = 0;
     }
 }
 
-void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_level, int32_t high_level)
+void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_stage, int32_t high_stage)
 {
     for (int32_t n = 0; n < plan->node_count; n++) {
-        if (nodes[n].level < low_level || nodes[n].level > high_level) continue;
+        if (nodes[n].stage < low_stage || nodes[n].stage > high_stage) continue;
         memset(nodes[n].whitening, 0, sizeof nodes[n].whitening);
         whiten(plan, nodes + n);
     }

@@ -19,21 +19,21 @@ typedef struct ath_piece {
     int32_t branch;
     int32_t flags;
     int32_t rank;
-    int32_t level;     /* level whose stream completes it */
-    int32_t low_level; /* level whose stream holds its tracks and first modes, -1 when `level` does */
+    int32_t stage;     /* stage whose stream completes it */
+    int32_t low_stage; /* stage whose stream holds its tracks and first modes, -1 when `stage` does */
     int32_t low_modes;
     int32_t last_attached; /* last piece that hangs on it, -1: none */
     int32_t ring;          /* vertices of each of its rings, 0: it has none */
-    int32_t modes_level;   /* first level that takes its modes; -1: an earlier piece has the same */
+    int32_t modes_stage;   /* first stage that takes its modes; -1: an earlier piece has the same */
     int32_t tip_weight;    /* weight of its last vertex in products of its modes, which are orthonormal under it */
 } ath_piece;
 
-/* A node of the ATH: the subtree of a branch, moved by one affine map per frame at levels `level` to `last`. */
+/* A node of the ATH: the subtree of a branch, moved by one affine map per frame at stages `stage` to `last_stage`. */
 typedef struct ath_node {
     double whitening[9]; /* rows: functionals that are orthonormal over the subtree's rest vertices */
     int32_t branch, piece;
     int32_t first, count; /* vertices of the subtree */
-    int32_t level, last;
+    int32_t stage, last_stage;
     int32_t coded; /* 1: its map has a stream of its own; 0: it follows from the stem's first modes */
     int32_t rank;  /* dimensions that the rest vertices span about the attach point */
 } ath_node;
@@ -41,7 +41,7 @@ typedef struct ath_node {
 typedef struct ath_plan {
     int32_t vertex_count, branch_count, piece_count, node_count;
     int64_t attach_cache_rows; /* memory of all attach caches, in vertices */
-    int32_t height;            /* deepest node: levels run from 0 to height + 1 */
+    int32_t height;            /* deepest node: stages run from 0 to height + 1 */
     int32_t longest;           /* vertices of the longest piece */
     const ath_branch *branches;
     const ath_piece *pieces;
@@ -65,11 +65,11 @@ ATH_ENCODER_API void ath_build_plan(ath_plan *plan, ath_piece *pieces, ath_node 
 /* Marks the pieces of branches that are rigid in a layer. */
 ATH_ENCODER_API void ath_plan_rigid(const ath_plan *plan, ath_piece *pieces, int32_t layer);
 
-/* Adapts a plan to predicted motion: every node's map is coded, and no piece begins at the levels of nodes. */
+/* Adapts a plan to predicted motion: every node's map is coded, and no piece begins at the stages of nodes. */
 ATH_ENCODER_API void ath_without_stems(const ath_plan *plan, ath_piece *pieces, ath_node *nodes);
 
 /* Completes the nodes once the rest pose is known. */
-ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_level, int32_t high_level);
+ATH_ENCODER_API void ath_plan_nodes(const ath_plan *plan, ath_node *nodes, int32_t low_stage, int32_t high_stage);
 
 ATH_INLINE const double *ath_rest_of(const ath_plan *plan, int32_t vertex) { return plan->rest + 3 * (size_t)vertex; }
 
@@ -79,11 +79,14 @@ ATH_INLINE const double *ath_rest_attach(const ath_plan *plan, const ath_piece *
     return ath_rest_of(plan, piece->attach >= 0 ? piece->attach : piece->first);
 }
 
-ATH_INLINE int ath_is_shown(const ath_node *node, int32_t level) { return node->level <= level && level <= node->last; }
-
-ATH_INLINE int32_t ath_base_level(const ath_piece *piece)
+ATH_INLINE int ath_is_shown(const ath_node *node, int32_t stage)
 {
-    return piece->low_level >= 0 ? piece->low_level : piece->level;
+    return node->stage <= stage && stage <= node->last_stage;
+}
+
+ATH_INLINE int32_t ath_base_stage(const ath_piece *piece)
+{
+    return piece->low_stage >= 0 ? piece->low_stage : piece->stage;
 }
 
 /* Returns how many modes move a piece. */

@@ -11,19 +11,19 @@ typedef struct {
 
 static size_t row_most(int32_t frames) { return KEPT_NUMBER * (1 + 3 * (size_t)frames); }
 
-int ath_can_be_kept(const ath_file *file, int32_t level)
+int ath_can_be_kept(const ath_file *file, int32_t stage)
 {
-    return level > file->plan.height && level < ath_min(file->header.stage_count, ath_lossy_levels(file)) - 1;
+    return stage > file->plan.height && stage < ath_min(file->header.stage_count, ath_lossy_stages(file)) - 1;
 }
 
 size_t ath_keep_size(const ath_file *file, int32_t level)
 {
     const ath_plan *plan = &file->plan;
-    level = ath_file_stage(file, level);
-    if (!ath_can_be_kept(file, level)) return 0;
+    int32_t stage = ath_file_stage(file, level);
+    if (!ath_can_be_kept(file, stage)) return 0;
     uint64_t T = (uint64_t)file->longest, pieces = (uint64_t)plan->piece_count, size = sizeof(kept_head);
     size += ((uint64_t)plan->vertex_count + 2 * pieces) * row_most(file->longest) + pieces * KEPT_NUMBER;
-    for (int32_t d = 0; d <= level; d++) {
+    for (int32_t d = 0; d <= stage; d++) {
         if (!ath_has_stream(file, d)) continue;
         size += sizeof(kept_stream) + T * T * sizeof(float);
         if (ath_file_chunk(file, ATH_SHAPES, d, 0)) size += pieces * ATH_MOST_SHAPES * row_most(ATH_SHAPE_MODES);

@@ -1,5 +1,5 @@
 /* Keeps a prepared segment for a layer that refines it, as bytes without pointers, so that their owner may move them.
- * First a head, then the streams of all levels so far (later streams may begin with their bases), then, piece by piece,
+ * First a head, then the streams of all stages so far (later streams may begin with their bases), then, piece by piece,
  * the integers of the layer's rows, most of which are small. */
 #ifndef ATH_PLAY_KEEP_H
 #define ATH_PLAY_KEEP_H
@@ -9,15 +9,15 @@
 
 typedef struct {
     uint64_t bytes; /* 0: nothing is kept, or not all of it yet */
-    int32_t segment, level;
+    int32_t segment, stage;
 } kept_head;
 
 typedef struct {
     uint8_t *at, *end; /* at null: nothing is kept, or there was no room for it */
 } kept_writer;
 
-/* Returns whether a level holds all of the plant at a precision that a stored level refines. */
-int ath_can_be_kept(const ath_file *file, int32_t level);
+/* Returns whether a stage holds all of the plant at a precision that a later one of the file refines. */
+int ath_can_be_kept(const ath_file *file, int32_t stage);
 
 void ath_keep_stream(kept_writer *to, const ath_stream *stream, int32_t frames);
 /* shape_integers: ATH_SHAPE_NUMBERS of each of the piece's shapes. */

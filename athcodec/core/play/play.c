@@ -302,14 +302,14 @@ static void put_part(const ath_file *file, const shown_frames *shown, const ath_
         return;
     }
     blend_map(shown, part->index, map);
-    put_node(file, ath_level_plan(file, shown->segment[0]->stage), part, map, posed->rest, first, count, vertex, to);
+    put_node(file, ath_stage_plan(file, shown->segment[0]->stage), part, map, posed->rest, first, count, vertex, to);
 }
 
 static void put_all(const ath_file *file, const shown_frames *shown, const target *to)
 {
     const ath_segment *segment = shown->segment[0];
     for (const ath_part *part = segment->parts; part < segment->parts + segment->part_count; part++)
-        put_part(file, shown, part, ath_level_plan(file, segment->stage), (size_t)part->first, (size_t)part->count,
+        put_part(file, shown, part, ath_stage_plan(file, segment->stage), (size_t)part->first, (size_t)part->count,
                  (size_t)part->first, to);
 }
 
@@ -407,7 +407,7 @@ static int matrices(const ath_file *file, const ath_segment *const *segments, in
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, -1, &shown);
     if (result == ATH_NOT_PREPARED) return result;
-    const ath_plan *plan = ath_level_plan(file, shown.segment[0]->stage);
+    const ath_plan *plan = ath_stage_plan(file, shown.segment[0]->stage);
     for (int32_t i = 0; i < shown.segment[0]->part_count; i++) {
         const ath_part *part = shown.segment[0]->parts + i;
         double map[ATH_MAP], matrix[12];
@@ -526,7 +526,7 @@ static void fade_matrices(const ath_file *file, const faded_frames *found, int32
 {
     const shown_frames *shown = found->shown + index;
     const ath_segment *cut = found->cut;
-    const ath_plan *plan = ath_level_plan(file, shown->segment[0]->stage);
+    const ath_plan *plan = ath_stage_plan(file, shown->segment[0]->stage);
     const ath_part *moves = shown->segment[0]->parts;
     double map[ATH_MAP], matrix[12];
     for (const ath_part *part = cut->parts; part < cut->parts + cut->part_count; part++) {
@@ -552,7 +552,7 @@ int ath_faded_matrices(const ath_file *file, const ath_segment *const *segments,
 static void fade_exact(const ath_file *file, const shown_frames *shown, const ath_segment *cut, const target *to)
 {
     const ath_part *moves = shown->segment[0]->parts;
-    const ath_plan *posed = ath_level_plan(file, cut->stage > 0 ? 1 : 0);
+    const ath_plan *posed = ath_stage_plan(file, cut->stage > 0 ? 1 : 0);
     for (const ath_part *part = cut->parts; part < cut->parts + cut->part_count; part++) {
         int32_t end = part->first + part->count, next;
         for (int32_t first = part->first; part->branch < 0 && first < end; first = next) {

@@ -1,5 +1,5 @@
 /* The streams of a segment: stems, maps of nodes, corrections. Compiled once for each direction. A call codes one unit,
- * so that a decoder reads all levels side by side, piece by piece. */
+ * so that a decoder reads all stages side by side, piece by piece. */
 #ifndef ATH_STREAMS_MOTION_STREAMS_INL
 #define ATH_STREAMS_MOTION_STREAMS_INL
 
@@ -23,15 +23,15 @@ static void shape_model_init(shape_model *model)
     model->count_before[0] = model->count_before[1] = 0;
 }
 
-/* Codes the shapes of a piece that the stream of one level holds: the base level has the first ones and, if it is full,
- * the piece's own level the others. integers: ATH_SHAPE_NUMBERS per shape, zero on entry when decoding. count: all
+/* Codes the shapes of a piece that the stream of one stage holds: the base stage has the first ones and, if it is full,
+ * the piece's own stage the others. integers: ATH_SHAPE_NUMBERS per shape, zero on entry when decoding. count: all
  * shapes when encoding, else those that are known. Returns the new count; -1: it is not valid. */
-static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece *piece, int32_t level, int32_t count,
+static int32_t code_shapes(ath_coder *coder, shape_model *model, const ath_piece *piece, int32_t stage, int32_t count,
                            int32_t *integers)
 {
-    int32_t most = ath_base_shapes(piece), from = 0, part = level != ath_base_level(piece), above_count = -1;
+    int32_t most = ath_base_shapes(piece), from = 0, part = stage != ath_base_stage(piece), above_count = -1;
     if (part) {
-        if (piece->level != level || count < most) return count;
+        if (piece->stage != stage || count < most) return count;
         from = most;
         most = 3 * ath_shape_modes(piece);
     }
@@ -87,20 +87,20 @@ static void note_count(const ath_piece_rows *rows, int32_t slot, int32_t count)
     if (rows->counts) rows->counts[slot] = count;
 }
 
-/* Codes the rows of a piece that the stream of one level holds. */
+/* Codes the rows of a piece that the stream of one stage holds. */
 static void code_piece(ath_coder *coder, coefficient_model *model, const ath_plan *plan, const ath_stream *stream,
-                       int32_t frames, int32_t p, int32_t level, const ath_piece_rows *rows)
+                       int32_t frames, int32_t p, int32_t stage, const ath_piece_rows *rows)
 {
     const ath_piece *piece = plan->pieces + p;
     int32_t from = 0, to = 0, above_count = -1, rank = stream->temporal_rank;
-    if (level == ath_base_level(piece)) {
+    if (stage == ath_base_stage(piece)) {
         if (ath_has_shift(piece))
             note_count(rows, SHIFT_SLOT, code_row(coder, model, frames, rank, SHIFT_SLOT, -1, rows->shift));
         if (ath_has_rotation(plan, piece, stream))
             note_count(rows, ROTATION_SLOT, code_row(coder, model, frames, rank, ROTATION_SLOT, -1, rows->rotation));
     }
-    if (piece->low_level == level) to = ath_min(piece->low_modes, ath_rank(piece));
-    if (piece->level == level) {
+    if (piece->low_stage == stage) to = ath_min(piece->low_modes, ath_rank(piece));
+    if (piece->stage == stage) {
         from = piece->low_modes;
         to = ath_rank(piece);
     }

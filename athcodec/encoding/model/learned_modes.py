@@ -79,7 +79,7 @@ def _products(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, count: int
     products, first = np.empty((len(pieces), count, count)), plan.first_rows[pieces]
     rows = address(segment.coefficients, np.int32, 0)
     lib.ath_row_products(len(pieces), first.ctypes.data, count, segment.frames, rows, products.ctypes.data)
-    steps = np.array([stream.step for stream in segment.streams])[plan.pieces["level"][pieces]]
+    steps = np.array([stream.step for stream in segment.streams])[plan.pieces["stage"][pieces]]
     scale = np.repeat(steps[:, None] * _mode_weights(plan.pieces[pieces])[:, : count // 3], 3, axis=1)
     products *= scale[:, :, None] * scale[:, None, :]
     return products

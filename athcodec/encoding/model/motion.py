@@ -118,7 +118,7 @@ class Plan:
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         lib.ath_plan_rigid(self.core, self.pieces.ctypes.data, layer)
         if refined:
-            self.pieces["level"], self.pieces["low_level"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
+            self.pieces["stage"], self.pieces["low_stage"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
         if predicted:
             lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
         self.rest = self.bases = None
@@ -212,9 +212,9 @@ class Plan:
         return self._samples[part]
 
     @property
-    def base_level(self) -> np.ndarray:
+    def base_stage(self) -> np.ndarray:
         """Per piece the level whose stream holds its tracks and first modes, (P,)."""
-        return np.where(self.pieces["low_level"] >= 0, self.pieces["low_level"], self.pieces["level"])
+        return np.where(self.pieces["low_stage"] >= 0, self.pieces["low_stage"], self.pieces["stage"])
 
     @cached_property
     def first_rows(self) -> np.ndarray:
@@ -242,28 +242,28 @@ class Plan:
     def main_level(self) -> int:
         """The level whose stream holds the most rows."""
         low, rotations = np.minimum(self.pieces["low_modes"], self.ranks), self.is_rigid
-        rows = np.bincount(self.base_level, low + rotations, self.level_count)
-        return int((rows + np.bincount(self.pieces["level"], self.ranks - low, self.level_count)).argmax())
+        rows = np.bincount(self.base_stage, low + rotations, self.level_count)
+        return int((rows + np.bincount(self.pieces["stage"], self.ranks - low, self.level_count)).argmax())
 
     def has_stems(self, level: int) -> bool:
         """Return whether the level has a coefficient stream."""
-        return bool(((self.pieces["level"] == level) | (self.pieces["low_level"] == level)).any())
+        return bool(((self.pieces["stage"] == level) | (self.pieces["low_stage"] == level)).any())
 
     def has_affines(self, level: int) -> bool:
         """Return whether nodes of the level have maps of their own."""
-        return bool(((self.nodes["level"] == level) & (self.nodes["coded"] == 1)).any())
+        return bool(((self.nodes["stage"] == level) & (self.nodes["coded"] == 1)).any())
 
     def serves(self, kind: int, level: int, shown: Sequence[int]) -> bool:
         """Return whether the chunks of a kind and level are stored where these levels are shown."""
         if kind == ct.AFFINES:
-            last = self.nodes["last"][(self.nodes["level"] == level) & (self.nodes["coded"] == 1)].max(initial=-1)
+            last = self.nodes["last_stage"][(self.nodes["stage"] == level) & (self.nodes["coded"] == 1)].max(initial=-1)
             return any(level <= one <= last for one in shown)
         return kind != ct.CORRECTIONS or level in shown
 
     @property
     def level_0_stands_alone(self) -> bool:
         """Whether nothing of level 0 serves other levels, so that level 1 may refine the rest pose."""
-        return not self.has_stems(0) and not (self.nodes["last"][self.nodes["level"] == 0] > 0).any()
+        return not self.has_stems(0) and not (self.nodes["last_stage"][self.nodes["stage"] == 0] > 0).any()
 
 
 @dataclass(frozen=True)
@@ -291,8 +291,8 @@ class LearnedModes:
     def levels(self, plan: Plan) -> np.ndarray:
         """Return the levels whose streams hold tracks of learned modes."""
         pieces, learned = plan.pieces, self.counts > 0
-        full = learned & (pieces["low_level"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
-        return np.union1d(plan.base_level[learned], pieces["level"][full])
+        full = learned & (pieces["low_stage"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
+        return np.union1d(plan.base_stage[learned], pieces["stage"][full])
 
 
 @dataclass
@@ -351,7 +351,7 @@ class SegmentMotion:
         same = np.array([stream.root == self.streams[-1].root for stream in before.streams])
         pieces = before.plan.pieces
         all_at_base = before.plan.ranks <= pieces["low_modes"]
-        return (same[before.plan.base_level] & (same[pieces["level"]] | all_at_base)).astype(np.uint8)
+        return (same[before.plan.base_stage] & (same[pieces["stage"]] | all_at_base)).astype(np.uint8)
 
     def waves_of(self, stream: LevelStream) -> np.ndarray:
         """Return the waves of a stream, or what is learned in their place, (rank, frames)."""
@@ -476,7 +476,7 @@ class SegmentMotion:
 
     def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
         plan = self.plan
-        of_level = [(n, n + 1) for n in np.flatnonzero(plan.nodes["level"] == level).tolist()]
+        of_level = [(n, n + 1) for n in np.flatnonzero(plan.nodes["stage"] == level).tolist()]
         plan.pool.map(self._with_scratch(call), plan.node_ranges if level is None else of_level)
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:

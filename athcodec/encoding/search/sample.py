@@ -121,9 +121,9 @@ class ExtrapolationFactors:
 def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows of stems, and the nodes with maps, per level."""
     pieces, levels = plan.pieces, plan.level_count
-    low = np.bincount(plan.base_level, pieces["low_modes"], levels)
-    high = np.bincount(pieces["level"], pieces["count"] - pieces["low_modes"], levels)
-    return low + high, np.bincount(plan.nodes["level"], plan.nodes["coded"], levels)
+    low = np.bincount(plan.base_stage, pieces["low_modes"], levels)
+    high = np.bincount(pieces["stage"], pieces["count"] - pieces["low_modes"], levels)
+    return low + high, np.bincount(plan.nodes["stage"], plan.nodes["coded"], levels)
 
 
 def sample_plant(source: Source, ath: Ath, effort: str, with_faces: bool = False) -> PlantSample | None:

@@ -254,7 +254,7 @@ class Trials:
             levels[level], heads[level] = len(stream), coded.heads[level]
         corrections = len(coded.corrections.chunk) / coded.sample_share
         if corrections:
-            level_of_vertex = np.repeat(coded.segment.plan.base_level, coded.segment.plan.pieces["count"])
+            level_of_vertex = np.repeat(coded.segment.plan.base_stage, coded.segment.plan.pieces["count"])
             counts = np.bincount(level_of_vertex[coded.corrected], minlength=self.levels)
             levels += corrections * (counts / counts.sum())
         levels += (levels - heads) * (self.extrapolation.rows - 1)

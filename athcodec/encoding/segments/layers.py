@@ -631,7 +631,7 @@ class CodedMotion:
         what maps place only after."""
         origin, dtype = self._output
         positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
-        is_stem = np.repeat(pieces["level"] <= level, pieces["count"])
+        is_stem = np.repeat(pieces["stage"] <= level, pieces["count"])
         for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
             run[:] = run.astype(dtype)
         return positions
@@ -685,7 +685,7 @@ class _EvenLevels:
 
     def _set(self, moved: int, factor: float) -> None:
         nodes = self._shown[moved].plan.nodes
-        last = int(nodes["last"][nodes["level"] == moved].max())
+        last = int(nodes["last_stage"][nodes["stage"] == moved].max())
         self._steps, self.errors = self._steps.copy(), [*self.errors]
         self._steps[moved] *= factor
         self._analyse(moved)

@@ -544,12 +544,12 @@ def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarra
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
     few = pieces["low_modes"]
-    for low, high, at in ((0 * few, few, pieces["low_level"]), (few, rows, pieces["level"])):
+    for low, high, at in ((0 * few, few, pieces["low_stage"]), (few, rows, pieces["stage"])):
         for piece in np.flatnonzero((at == level) & (rows > 0)):
             slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
-    return _moments(segment, (*parts, segment.tracks[segment.plan.base_level == level]))
+    return _moments(segment, (*parts, segment.tracks[segment.plan.base_stage == level]))
 
 
 def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:

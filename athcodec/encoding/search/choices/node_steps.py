@@ -108,7 +108,7 @@ def _level_errors(trials: Trials, plan: Plan, bound: float) -> np.ndarray:
     some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
     frames = np.empty((len(some), *sample.shape[:2]))
     frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
-    nodes = np.bincount(plan.nodes["level"], plan.nodes["coded"], trials.levels)
+    nodes = np.bincount(plan.nodes["stage"], plan.nodes["coded"], trials.levels)
     errors = np.full(trials.levels, bound)
     for level in np.flatnonzero(nodes).tolist():
         if level not in trials.map_errors:
