@@ -206,14 +206,32 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
     return ath_size_or_most(carve_segment(&counted, file, level, file->longest, 1, 0));
 }
 
-/* Returns whether ath_positions only copies the positions of a segment at a level. */
+/* Returns whether the vertices of each piece stand side by side in the source, which may have the pieces in another
+ * order. Predicted motion is written by vertex, not by piece. */
+static int are_side_by_side(const ath_file *file)
+{
+    const int32_t *source = file->vertex_source;
+    if (file->header.is_predicted) return 0;
+    for (const ath_piece *piece = file->plan.pieces; piece < file->plan.pieces + file->plan.piece_count; piece++)
+        for (int32_t v = piece->first; v < piece->first + piece->count; v++)
+            if (source[v] - source[piece->first] != v - piece->first) return 0;
+    return 1;
+}
+
+static int is_source_order(const ath_file *file)
+{
+    int32_t vertex = 0;
+    while (vertex < file->plan.vertex_count && file->vertex_source[vertex] == vertex) vertex++;
+    return vertex == file->plan.vertex_count;
+}
+
+/* Returns whether ath_positions only copies the positions of a segment at a level, piece by piece. */
 static int are_copied(const ath_file *file, int32_t index, int32_t level)
 {
-    int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index), vertex = 0;
+    int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index);
     ath_cut_size(file, level, 0, 0, &exact);
     if (ath_is_split(file) || exact < file->plan.vertex_count || frames != ath_file_frames(file, index)) return 0;
-    while (vertex < exact && file->vertex_source[vertex] == vertex) vertex++;
-    return vertex == exact;
+    return is_source_order(file) || are_side_by_side(file);
 }
 
 size_t ath_segment_size_to(const ath_file *file, int32_t segment, int32_t level)
@@ -370,6 +388,12 @@ static void ready_motion(ath_work *work)
     }
 }
 
+static void put_elsewhere(ath_segment *segment, const ath_file *file, void *positions)
+{
+    segment->positions = positions;
+    segment->in_source_order = !is_source_order(file);
+}
+
 /* Begins to prepare the segment asked for or, for its end, the one before that. */
 static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t level)
 {
@@ -395,7 +419,7 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
         work->join = join;
         work->keeps = asked->keeps;
         work->keeping = asked->keeping;
-        if (asked->positions) segment->positions = asked->positions;
+        if (asked->positions) put_elsewhere(segment, file, asked->positions);
     }
     if (asked->from && !work->only_end) {
         work->first_level = asked->from->stage + 1;
@@ -453,7 +477,8 @@ int ath_prepare_to(ath_work *work, void *positions)
 {
     if (!are_copied(work->file, work->asked.index, ath_level_of(&work->file->header, work->asked.level)))
         return ATH_BAD_ARGUMENT;
-    work->asked.positions = work->segment->positions = positions;
+    work->asked.positions = positions;
+    put_elsewhere(work->segment, work->file, positions);
     return ATH_OK;
 }
 
@@ -761,6 +786,12 @@ static void look_before(ath_work *work, int32_t q, int32_t p)
     layer->rows.coarse_shift = same ? coarse->rows.shift : 0;
 }
 
+/* Returns the place of the piece's first vertex among the positions. */
+static size_t position_of_piece(const ath_work *work)
+{
+    return ath_position_of(work->file, work->segment, (size_t)work->exact);
+}
+
 static const double *placed_piece(layer_work *layer, int32_t p, const ath_float_frames *to)
 {
     if (!layer->placed)
@@ -774,7 +805,7 @@ static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
 {
     const ath_piece *piece = layer->plan->pieces + p;
     ath_segment *segment = work->segment;
-    ath_float_frames to = {(float *)ath_vertex_at(segment, segment->positions, 0, (size_t)work->exact),
+    ath_float_frames to = {(float *)ath_vertex_at(segment, segment->positions, 0, position_of_piece(work)),
                            3 * (size_t)segment->exact_vertices, work->file->info.origin};
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
@@ -805,9 +836,10 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p)
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
     look_before(work, q, p);
+    ath_attach(layer->plan, &layer->motion, piece, layer->scratch.at);
     ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
     code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
-    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    ath_turn_attached(layer->plan, &layer->motion, piece, &layer->rows, &layer->scratch);
     predict_modes(layer, p);
     code_refined_modes(&coder, reader->refined, stream, &layer->motion, piece, &layer->rows);
     reader->coder = coder;
@@ -824,14 +856,14 @@ static void correct(ath_segment *segment, size_t at, double parts, double step)
 }
 
 static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
-                           size_t vertex)
+                           size_t position)
 {
     ath_corrected_parts parts;
     correction_parts(row, segment->frames, parts);
     for (int32_t from = 0; from < segment->frames; from += CORRECTION_BLOCK)
         for (int32_t t = from; is_reached(row, from) && t < ath_min(from + CORRECTION_BLOCK, segment->frames); t++)
             for (size_t k = 0; k < 3; k++)
-                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k],
+                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + position) * 3 + k, parts[t][k],
                         reader->step);
 }
 
@@ -846,9 +878,10 @@ static void correct_piece(ath_work *work, const ath_piece *piece)
 {
     corrections_reader *reader = &work->corrections;
     ath_coder coder = reader->coder;
+    size_t position = position_of_piece(work);
     for (int32_t i = 0; i < piece->count; i++) {
         const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
-        if (row) correct_vertex(reader, row, work->segment, (size_t)(work->exact + i));
+        if (row) correct_vertex(reader, row, work->segment, position + (size_t)i);
         if (row && watcher_of(work)) watch_corrections(work, row, work->exact + i);
     }
     reader->coder = coder;
@@ -870,10 +903,10 @@ static int read_exact_point(ath_work *work, size_t at)
 /* Replaces the positions of the last lossy level by the source's own. */
 static int make_exact(ath_work *work, const ath_piece *piece)
 {
-    size_t vertices = (size_t)work->segment->exact_vertices;
+    size_t vertices = (size_t)work->segment->exact_vertices, position = position_of_piece(work);
     for (int32_t i = 0; i < piece->count; i++)
         for (size_t t = 0; t < (size_t)work->segment->frames; t++)
-            if (!read_exact_point(work, (t * vertices + (size_t)(work->exact + i)) * 3))
+            if (!read_exact_point(work, (t * vertices + position + (size_t)i) * 3))
                 return blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
     return ATH_OK;
 }
@@ -905,7 +938,7 @@ static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
-    size_t vertex = (size_t)work->exact;
+    size_t vertex = (size_t)work->exact, position = position_of_piece(work);
     if (work->first_layer == work->layer || !is_idle(layer, layer->plan->pieces + p)) {
         ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
         pose_piece(work, layer, p);
@@ -917,10 +950,10 @@ static int place_piece(ath_work *work, int32_t p)
         ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (watcher_of(work)) watch_piece(work, p);
     if (work->segment->is_float64)
-        ath_store_doubles(work->segment, work->file->info.origin, vertex, piece->count, layer->placed);
-    ath_keep_end(work->segment, vertex, (size_t)piece->count);
+        ath_store_doubles(work->segment, work->file->info.origin, position, piece->count, layer->placed);
+    ath_keep_end(work->segment, position, vertex, (size_t)piece->count);
     if (work->join.width > 0)
-        ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, watcher_of(work));
+        ath_join_vertices(&work->join, work->segment, position, vertex, (size_t)piece->count, watcher_of(work));
     if (work->corrections.chunk) correct_piece(work, piece);
     return ATH_OK;
 }
@@ -929,7 +962,7 @@ static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
-        ath_copy_vertices(work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
+        ath_copy_vertices(work->file, work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
     else if (!work->predicted && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? make_exact(work, piece) : ATH_OK;
