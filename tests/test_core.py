@@ -715,13 +715,28 @@ def test_threads_prepare_from_one_file_at_the_same_time(player):
         ("tree", {"segment_frames": 50, "ladder": LADDER, "rel_error": 1e-4}, True),
         ("tree", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3, "lossless": True}, True),
         ("growth", {"segment_frames": 50, "ladder": "none", "rel_error": 1e-3}, True),
-        (None, {"rel_error": 1e-2}, False),
+        ("last branches first", {"segment_frames": 16, "ladder": "none", "rel_error": 1e-3}, True),
+        ("last branches first", {"segment_frames": 16, "ladder": LADDER, "rel_error": 1e-4}, True),
+        ("last branches first", {"segment_frames": 16, "ladder": "none", "rel_error": 1e-3, "lossless": True}, True),
+        ("doubles", {"segment_frames": 16, "ladder": "none", "rel_error": 1e-3}, True),
+        ("predicted", {"segment_frames": 16, "ladder": LADDER, "rel_error": 1e-4}, False),
+        ("mixed", {"rel_error": 1e-2}, False),
     ],
-    ids=["transformed", "layers", "lossless", "predicted", "another order"],
+    ids=[
+        *("transformed", "layers", "lossless", "predicted"),
+        *(f"branches in another order, {how}" for how in ("one layer", "layers", "lossless", "doubles", "predicted")),
+        "branches mixed",
+    ],
 )
 def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_order_of_the_source(name, options, goes):
     """The segments are joined, too; frames of the growth repeat. What cannot go there is not touched."""
-    clip = awkward(6, branches=6, shuffled=True) if name is None else athcodec.read(athcodec.sample_path(name))
+    clips = {
+        "last branches first": lambda: last_branches_first(7),
+        "predicted": lambda: last_branches_first(6),
+        "doubles": lambda: last_branches_first(7, dtype=np.float64, offset=1e3, scale=1e6),
+        "mixed": lambda: awkward(6, branches=6, shuffled=True),
+    }
+    clip = clips[name]() if name in clips else athcodec.read(athcodec.sample_path(name))
     player, went = Player(athcodec.encode(clip, attributes="none", effort="fast", **options)), set()
     for level, segment in itertools.product(player.levels, player.segments):
         alone, work = player.prepare(segment, level), player.work()
@@ -759,6 +774,15 @@ def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_ord
 
 def levels_to_go_on_from(player: Player) -> range:
     return range(player.info.depth_levels - 1, player.info.level_count - 1)
+
+
+def last_branches_first(seed: int, **how) -> athcodec.MotionClip:
+    """A plant whose branches stand in the source from the last to the first, the vertices of each side by side."""
+    clip = awkward(seed, branches=8, frames=40, **how)
+    order = np.argsort(-clip.vertex_branch, kind="stable")
+    return clip.replace(
+        positions=clip.positions[:, order], rest=clip.rest[order], vertex_branch=clip.vertex_branch[order]
+    )
 
 
 def shown_of(player: Player, segment: Memory) -> np.ndarray:

@@ -604,10 +604,13 @@ static void record_correction(ath_watcher *watcher, int32_t position, int32_t fr
 
 static void record_baked(recorder *record, const ath_segment *segment)
 {
-    size_t count = 3 * (size_t)segment->frames * (size_t)segment->exact_vertices;
-    const double *origin = record->file->info.origin;
-    for (size_t i = 0; i < count; i++)
-        push_float(record, BAKED, ath_number_at(segment->positions, i, segment->is_float64) - origin[i % 3]);
+    const ath_file *file = record->file;
+    for (size_t t = 0; t < (size_t)segment->frames; t++)
+        for (size_t v = 0; v < (size_t)segment->exact_vertices; v++) {
+            const void *x = ath_vertex_at(segment, segment->positions, t, ath_position_of(file, segment, v));
+            for (size_t k = 0; k < 3; k++)
+                push_float(record, BAKED, ath_number_at(x, k, segment->is_float64) - file->info.origin[k]);
+        }
 }
 
 static void record_waves(recorder *record, uint32_t first[ATH_GPU_WAVE_SETS])

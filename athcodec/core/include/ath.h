@@ -517,8 +517,8 @@ ATH_API int ath_follow(ath_work *work, const ath_segment *before);
 /* Call ath_prepare_to before the first step to have the segment's positions written to `positions`: frame by frame, 3
  * floats (doubles if info.is_float64 is 1) per vertex, as ath_positions would copy them. Leave them in place while you
  * use the segment. Their part of the segment's own memory stays unused. Returns ATH_BAD_ARGUMENT, and changes nothing,
- * if ath_positions would not just copy: the file's order differs from the source's, frames repeat, or the level has
- * nodes.
+ * if ath_positions would not just copy: vertices share a place, the source mixes the vertices of several branches,
+ * frames repeat, the level has nodes, or motion is predicted and the file's order differs from the source's.
  *     ath_segment_size_to: returns the bytes that ath_prepare_start needs as `memory` if ath_prepare_to follows: without
  * that part, or ath_segment_size where the positions cannot be written elsewhere or the segment is joined. */
 ATH_API int ath_prepare_to(ath_work *work, void *positions);

@@ -516,13 +516,11 @@ static int32_t count_of(const ath_piece_rows *rows, int32_t slot, const ath_stre
     return rows->counts ? rows->counts[slot] : stream->temporal_rank;
 }
 
-void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
-                       const ath_scratch *scratch)
+void ath_turn_attached(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_rows *rows, const ath_scratch *scratch)
 {
     int32_t T = motion->frames;
-    const ath_piece *piece = plan->pieces + p;
     const ath_stream *base = ath_base_stream(motion, piece);
-    ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) {
         ath_inverse_track(base, T, count_of(rows, SHIFT_SLOT, base), ath_shift_step(piece, base), rows->shift,
                           scratch->shift);
@@ -536,6 +534,13 @@ void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p
         ath_out_of_axes(T, &turning, scratch->rotation);
         ath_turn(T, scratch->rotation, scratch->at.rotation);
     }
+}
+
+void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
+                       const ath_scratch *scratch)
+{
+    ath_attach(plan, motion, plan->pieces + p, scratch->at);
+    ath_turn_attached(plan, motion, plan->pieces + p, rows, scratch);
 }
 
 void ath_inverse_row(const ath_motion *motion, const ath_piece *piece, const ath_piece_rows *rows, int32_t r,

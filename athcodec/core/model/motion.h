@@ -92,6 +92,9 @@ ath_scratch ath_motion_scratch(const ath_plan *plan, const ath_motion *motion);
 
 /* Fills the attach frame of a piece before its own tracks are applied. */
 void ath_attach(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece, ath_frames at);
+/* Applies a piece's own tracks to its attach frame in scratch->at. */
+void ath_turn_attached(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
+                       const ath_piece_rows *rows, const ath_scratch *scratch);
 /* Leaves the attach frame with the piece's own tracks applied in scratch->at. */
 void ath_turned_attach(const ath_plan *plan, const ath_motion *motion, int32_t p, const ath_piece_rows *rows,
                        const ath_scratch *scratch);

@@ -172,7 +172,6 @@ void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const 
 void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                         const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows)
 {
-    if (before->frames) ath_attach(plan, motion, piece, scratch->at);
     if (ath_has_shift(piece)) ath_predict_shift(motion, piece, before, scratch, rows);
     if (ath_has_rotation(plan, piece, ath_base_stream(motion, piece)))
         ath_predict_rotation(plan, motion, piece, before, scratch, rows);

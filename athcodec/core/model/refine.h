@@ -17,7 +17,7 @@ void ath_predict_shift(const ath_motion *motion, const ath_piece *piece, const a
                        const ath_scratch *scratch, ath_piece_rows *rows);
 void ath_predict_rotation(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                           const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
-/* Predicts both tracks of a piece, as far as it has them. */
+/* Predicts both tracks of a piece, as far as it has them, after ath_attach. */
 void ath_predict_tracks(const ath_plan *plan, const ath_motion *motion, const ath_piece *piece,
                         const ath_piece_before *before, const ath_scratch *scratch, ath_piece_rows *rows);
 /* Predicts the integers of a piece's modes from its vertices in the layer before, seen from scratch->at. */

@@ -9,14 +9,14 @@ static void correct(ath_segment *segment, size_t at, double parts, double step)
 }
 
 static void correct_vertex(const corrections_reader *reader, const correction_row *row, ath_segment *segment,
-                           size_t vertex)
+                           size_t position)
 {
     ath_corrected_parts parts;
     correction_parts(row, segment->frames, parts);
     for (int32_t from = 0; from < segment->frames; from += CORRECTION_BLOCK)
         for (int32_t t = from; is_reached(row, from) && t < ath_min(from + CORRECTION_BLOCK, segment->frames); t++)
             for (size_t k = 0; k < 3; k++)
-                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + vertex) * 3 + k, parts[t][k],
+                correct(segment, ((size_t)t * (size_t)segment->exact_vertices + position) * 3 + k, parts[t][k],
                         reader->step);
 }
 
@@ -31,9 +31,10 @@ void ath_correct_piece(ath_work *work, const ath_piece *piece)
 {
     corrections_reader *reader = &work->corrections;
     ath_coder coder = reader->coder;
+    size_t position = ath_position_of_piece(work);
     for (int32_t i = 0; i < piece->count; i++) {
         const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
-        if (row) correct_vertex(reader, row, work->segment, (size_t)(work->exact + i));
+        if (row) correct_vertex(reader, row, work->segment, position + (size_t)i);
         if (row && ath_watcher_of(work)) watch_corrections(work, row, work->exact + i);
     }
     reader->coder = coder;
@@ -55,10 +56,10 @@ static int read_exact_point(ath_work *work, size_t at)
 /* Replaces the positions of the last lossy stage by the source's own. */
 int ath_make_exact(ath_work *work, const ath_piece *piece)
 {
-    size_t vertices = (size_t)work->segment->exact_vertices;
+    size_t vertices = (size_t)work->segment->exact_vertices, position = ath_position_of_piece(work);
     for (int32_t i = 0; i < piece->count; i++)
         for (size_t t = 0; t < (size_t)work->segment->frames; t++)
-            if (!read_exact_point(work, (t * vertices + (size_t)(work->exact + i)) * 3))
+            if (!read_exact_point(work, (t * vertices + position + (size_t)i) * 3))
                 return ath_blame(work, work->exact_level.chunk, ATH_BAD_CHUNK);
     return ATH_OK;
 }

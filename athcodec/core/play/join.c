@@ -73,12 +73,13 @@ static void watch_join(const ath_join *join, ath_watcher *watcher, const void *s
     watcher->join(watcher, join->width, join->jumps, join->slopes, (int32_t)count, off);
 }
 
-void ath_join_vertices(const ath_join *join, ath_segment *segment, size_t vertex, size_t count, ath_watcher *watcher)
+void ath_join_vertices(const ath_join *join, ath_segment *segment, size_t position, size_t vertex, size_t count,
+                       ath_watcher *watcher)
 {
     size_t numbers = 3 * count, frame_size = 3 * (size_t)segment->exact_vertices;
     const void *start = ath_vertex_at(segment, join->positions, 0, vertex);
     const void *end = ath_vertex_at(segment, join->positions, 1, vertex);
-    void *x = ath_vertex_at(segment, segment->positions, 0, vertex);
+    void *x = ath_vertex_at(segment, segment->positions, 0, position);
     watch_join(join, watcher, start, end, x, numbers, frame_size, segment->is_float64);
     if (segment->is_float64)
         join_doubles(join, (const double *)start, (const double *)end, (double *)x, numbers, frame_size);

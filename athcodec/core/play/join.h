@@ -18,8 +18,9 @@ void ath_carve_end(ath_join *join, const ath_file *file, ath_arena *arena);
 void ath_take_end(ath_join *join, const ath_segment *before);
 /* Sets the width and the shares for an entry of ath_joins. */
 void ath_set_join(ath_join *join, int32_t how);
-/* Join `count` exact vertices, and the map of a node. watcher: null, or told by how much they are off. */
-void ath_join_vertices(const ath_join *join, ath_segment *segment, size_t vertex, size_t count, ath_watcher *watcher);
+/* Join `count` exact vertices, whose first has this position (ath_position_of), and the map of a node. watcher: null, or told by how much they are off. */
+void ath_join_vertices(const ath_join *join, ath_segment *segment, size_t position, size_t vertex, size_t count,
+                       ath_watcher *watcher);
 void ath_join_map(const ath_join *join, ath_segment *segment, size_t index, ath_watcher *watcher);
 
 #endif

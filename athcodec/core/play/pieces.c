@@ -126,7 +126,7 @@ static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
 {
     const ath_piece *piece = layer->plan->pieces + p;
     ath_segment *segment = work->segment;
-    ath_float_frames to = {(float *)ath_vertex_at(segment, segment->positions, 0, (size_t)work->exact),
+    ath_float_frames to = {(float *)ath_vertex_at(segment, segment->positions, 0, ath_position_of_piece(work)),
                            3 * (size_t)segment->exact_vertices, work->file->info.origin};
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
@@ -157,9 +157,10 @@ static int refine_piece(ath_work *work, int32_t q, int32_t p)
     ath_coder coder = reader->coder;
     if (refine_shapes(work, q, piece) != ATH_OK) return ATH_BAD_CHUNK;
     look_before(work, q, p);
+    ath_attach(layer->plan, &layer->motion, piece, layer->scratch.at);
     ath_predict_tracks(layer->plan, &layer->motion, piece, &layer->before, &layer->scratch, &layer->rows);
     code_refined_tracks(&coder, reader->refined, layer->plan, stream, &layer->motion, piece, &layer->rows);
-    ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
+    ath_turn_attached(layer->plan, &layer->motion, piece, &layer->rows, &layer->scratch);
     predict_modes(layer, p);
     code_refined_modes(&coder, reader->refined, stream, &layer->motion, piece, &layer->rows);
     reader->coder = coder;
@@ -188,7 +189,7 @@ static int place_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     layer_work *layer = work->layers + work->first_layer;
-    size_t vertex = (size_t)work->exact;
+    size_t vertex = (size_t)work->exact, position = ath_position_of_piece(work);
     if (work->first_layer == work->layer || !is_idle(layer, layer->plan->pieces + p)) {
         ath_turned_attach(layer->plan, &layer->motion, p, &layer->rows, &layer->scratch);
         pose_piece(work, layer, p);
@@ -200,10 +201,10 @@ static int place_piece(ath_work *work, int32_t p)
         ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (ath_watcher_of(work)) watch_piece(work, p);
     if (work->segment->is_float64)
-        ath_store_doubles(work->segment, work->file->info.origin, vertex, piece->count, layer->placed);
-    ath_keep_end(work->segment, vertex, (size_t)piece->count);
+        ath_store_doubles(work->segment, work->file->info.origin, position, piece->count, layer->placed);
+    ath_keep_end(work->segment, position, vertex, (size_t)piece->count);
     if (work->join.width > 0)
-        ath_join_vertices(&work->join, work->segment, vertex, (size_t)piece->count, ath_watcher_of(work));
+        ath_join_vertices(&work->join, work->segment, position, vertex, (size_t)piece->count, ath_watcher_of(work));
     if (work->corrections.chunk) ath_correct_piece(work, piece);
     return ATH_OK;
 }
@@ -212,7 +213,7 @@ static int show_piece(ath_work *work, int32_t p)
 {
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
-        ath_copy_vertices(work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
+        ath_copy_vertices(work->file, work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
     else if (!work->predicted && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? ath_make_exact(work, piece) : ATH_OK;

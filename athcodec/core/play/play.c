@@ -244,14 +244,19 @@ static void scatter_floats(const float *from, size_t count, size_t vertex, const
         memcpy(out + (place ? (size_t)place[i] : vertex + i) * stride, from + 3 * i, 3 * sizeof(float));
 }
 
-/* Puts `count` exact vertices from `index` on at `vertex` and those behind it. */
-static void put_floats(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+/* Returns where an exact vertex stands in one of the two frames. */
+static const void *exact_at(const ath_file *file, const shown_frames *shown, size_t i, size_t index)
+{
+    const ath_segment *segment = shown->segment[i];
+    return ath_vertex_at(segment, segment->positions, shown->frame[i], ath_position_of(file, segment, index));
+}
+
+/* Puts `count` exact vertices, which stand side by side, from `index` on at `vertex` and those behind it. */
+static void put_floats(const ath_file *file, const shown_frames *shown, size_t index, size_t count, size_t vertex,
+                       const target *to)
 {
     const float *at[2];
-    for (size_t i = 0; i < 2; i++) {
-        const ath_segment *segment = shown->segment[i];
-        at[i] = (const float *)segment->positions + (shown->frame[i] * (size_t)segment->exact_vertices + index) * 3;
-    }
+    for (size_t i = 0; i < 2; i++) at[i] = (const float *)exact_at(file, shown, i, index);
     float weight = (float)shown->weight, block[3 * BLOCK];
     if (is_packed(to)) {
         blend_floats(at[0], at[1], weight, 3 * count, (float *)(void *)to->out + 3 * vertex);
@@ -269,14 +274,12 @@ static void put_floats(const shown_frames *shown, size_t index, size_t count, si
     }
 }
 
-static void put_doubles(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+static void put_doubles(const ath_file *file, const shown_frames *shown, size_t index, size_t count, size_t vertex,
+                        const target *to)
 {
     const double *at[2];
     double w = shown->weight, x[3];
-    for (size_t i = 0; i < 2; i++) {
-        const ath_segment *segment = shown->segment[i];
-        at[i] = (const double *)segment->positions + (shown->frame[i] * (size_t)segment->exact_vertices + index) * 3;
-    }
+    for (size_t i = 0; i < 2; i++) at[i] = (const double *)exact_at(file, shown, i, index);
     for (size_t i = 0; i < count; i++) {
         const double *a = at[0] + 3 * i, *b = at[1] + 3 * i;
         for (size_t k = 0; k < 3; k++) x[k] = w > 0.0 ? a[k] + (b[k] - a[k]) * w : a[k];
@@ -284,12 +287,14 @@ static void put_doubles(const shown_frames *shown, size_t index, size_t count, s
     }
 }
 
-static void put_exact(const shown_frames *shown, size_t index, size_t count, size_t vertex, const target *to)
+static void put_exact(const ath_file *file, const shown_frames *shown, size_t index, size_t count, size_t vertex,
+                      const target *to)
 {
-    if (shown->segment[0]->is_float64)
-        put_doubles(shown, index, count, vertex, to);
-    else
-        put_floats(shown, index, count, vertex, to);
+    int moved = shown->segment[0]->in_source_order || shown->segment[1]->in_source_order;
+    size_t side_by_side = moved ? 1 : count;
+    for (size_t i = 0; i < count; i += side_by_side)
+        (shown->segment[0]->is_float64 ? put_doubles : put_floats)(file, shown, index + i, side_by_side, vertex + i,
+                                                                   to);
 }
 
 /* Puts vertices first to first + count - 1 of one part at `vertex` and those behind it. Nodes move `posed`. */
@@ -298,7 +303,7 @@ static void put_part(const ath_file *file, const shown_frames *shown, const ath_
 {
     double map[ATH_MAP];
     if (part->branch < 0) {
-        put_exact(shown, (size_t)part->index + (first - (size_t)part->first), count, vertex, to);
+        put_exact(file, shown, (size_t)part->index + (first - (size_t)part->first), count, vertex, to);
         return;
     }
     blend_map(shown, part->index, map);
@@ -319,7 +324,7 @@ static const void *whole_frame(const ath_file *file, const shown_frames *shown, 
     const ath_segment *segment = shown->segment[0];
     int is_whole = segment->part_count == 1 && segment->parts->branch < 0
                    && segment->exact_vertices == (int32_t)file->header.place_count;
-    if (!is_whole || shown->weight > 0.0 || segment->is_float64 != to->is_float64) return 0;
+    if (!is_whole || shown->weight > 0.0 || segment->in_source_order || segment->is_float64 != to->is_float64) return 0;
     size_t bytes = 3 * (segment->is_float64 ? sizeof(double) : sizeof(float));
     return (const char *)segment->positions + shown->frame[0] * (size_t)segment->exact_vertices * bytes;
 }
@@ -378,7 +383,7 @@ static int exact(const ath_file *file, const ath_segment *const *segments, int32
 {
     shown_frames shown;
     int result = find_frames(file, segments, count, frame, -1, &shown);
-    if (result != ATH_NOT_PREPARED) put_exact(&shown, 0, (size_t)shown.segment[0]->exact_vertices, 0, &to);
+    if (result != ATH_NOT_PREPARED) put_exact(file, &shown, 0, (size_t)shown.segment[0]->exact_vertices, 0, &to);
     return result;
 }
 

@@ -98,6 +98,12 @@ static void ready_motion(ath_work *work)
     }
 }
 
+static void put_elsewhere(ath_segment *segment, const ath_file *file, void *positions)
+{
+    segment->positions = positions;
+    segment->in_source_order = !ath_is_source_order(file);
+}
+
 /* Begins to prepare the segment asked for or, for its end, the one before that. */
 static int begin(ath_work *work, const preparation *asked, int32_t index, int32_t stage)
 {
@@ -123,7 +129,7 @@ static int begin(ath_work *work, const preparation *asked, int32_t index, int32_
         work->join = join;
         work->keeps = asked->keeps;
         work->keeping = asked->keeping;
-        if (asked->positions) segment->positions = asked->positions;
+        if (asked->positions) put_elsewhere(segment, file, asked->positions);
     }
     if (asked->from && !work->only_end) {
         work->first_stage = asked->from->stage + 1;
@@ -181,7 +187,8 @@ int ath_prepare_to(ath_work *work, void *positions)
 {
     if (!ath_are_copied(work->file, work->asked.index, ath_level_of(&work->file->header, work->asked.stage)))
         return ATH_BAD_ARGUMENT;
-    work->asked.positions = work->segment->positions = positions;
+    work->asked.positions = positions;
+    put_elsewhere(work->segment, work->file, positions);
     return ATH_OK;
 }
 

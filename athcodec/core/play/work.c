@@ -90,14 +90,31 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
     return ath_size_or_most(ath_carve_segment(&counted, file, level, file->longest, 1, 0));
 }
 
-/* Returns whether ath_positions only copies the positions of a segment at a level. */
+/* Returns whether the vertices of each piece stand side by side in the source, which may have the pieces in another
+ * order. Predicted motion is written by vertex, not by piece. */
+static int are_side_by_side(const ath_file *file)
+{
+    const int32_t *source = file->vertex_source;
+    if (file->header.is_predicted) return 0;
+    for (const ath_piece *piece = file->plan.pieces; piece < file->plan.pieces + file->plan.piece_count; piece++)
+        for (int32_t v = piece->first; v < piece->first + piece->count; v++)
+            if (source[v] - source[piece->first] != v - piece->first) return 0;
+    return 1;
+}
+
+int ath_is_source_order(const ath_file *file)
+{
+    int32_t vertex = 0;
+    while (vertex < file->plan.vertex_count && file->vertex_source[vertex] == vertex) vertex++;
+    return vertex == file->plan.vertex_count;
+}
+
 int ath_are_copied(const ath_file *file, int32_t index, int32_t level)
 {
-    int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index), vertex = 0;
+    int32_t exact, frames = ath_segment_start(file, index + 1) - ath_segment_start(file, index);
     ath_cut_size(file, level, 0, 0, &exact);
     if (ath_is_split(file) || exact < file->plan.vertex_count || frames != ath_file_frames(file, index)) return 0;
-    while (vertex < exact && file->vertex_source[vertex] == vertex) vertex++;
-    return vertex == exact;
+    return ath_is_source_order(file) || are_side_by_side(file);
 }
 
 size_t ath_segment_size_to(const ath_file *file, int32_t segment, int32_t level)
@@ -150,6 +167,11 @@ int ath_refuse_chunk(ath_work *work, int code, ath_field field, const ath_chunk 
 int ath_blame(ath_work *work, const ath_chunk *chunk, int result)
 {
     return result == ATH_OK ? ATH_OK : ath_refuse_chunk(work, result, ATH_FIELD_CONTENT, chunk, 0, 0);
+}
+
+size_t ath_position_of_piece(const ath_work *work)
+{
+    return ath_position_of(work->file, work->segment, (size_t)work->exact);
 }
 
 void ath_next_phase(ath_work *work, prepare_phase phase)

@@ -131,8 +131,14 @@ uint64_t ath_carve_work(ath_work *work, const ath_file *file, int32_t frames, ui
 uint64_t ath_carve_segment(ath_segment *segment, const ath_file *file, int32_t level, int32_t frames, int is_full,
                            uint8_t *base);
 
-/* Returns whether ath_positions only copies the positions of a segment at a level. */
+/* Returns whether the file has the vertices in the order of the source. */
+int ath_is_source_order(const ath_file *file);
+
+/* Returns whether ath_positions only copies the positions of a segment at a level, piece by piece. */
 int ath_are_copied(const ath_file *file, int32_t index, int32_t level);
+
+/* Returns the place among the positions of the first vertex of the piece in preparation. */
+size_t ath_position_of_piece(const ath_work *work);
 
 /* Returns who observes the segment in preparation; null for the segment before the one asked for, and if nobody does. */
 ath_watcher *ath_watcher_of(const ath_work *work);
