@@ -1,5 +1,6 @@
 """What the documentation's gallery shows besides the samples: files of a tree that grows and of a bare one, and a still
-picture of every plant and of the forest, drawn by Chromium. And the stills of the samples, which the viewer's page shows before they move.
+picture of every plant and of the forest, drawn by Chromium. And the stills beside the samples, which the
+viewer's page shows before they move.
 """
 
 from __future__ import annotations
