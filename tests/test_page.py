@@ -209,10 +209,11 @@ def test_a_double_tap_fits_by_touch(opened_file, sample_ath):
 def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
     page.click("#compare [data-value=levels]")
     assert page.evaluate("athcodecViewer.plants.length") == 2 and page.is_visible("#split")
-    page.wait_for_function("() => document.getElementById('split-left').textContent.startsWith('Less detail: ')")
-    left, right = (page.wait_for_selector(f"#split-{side}").inner_text() for side in ("left", "right"))
     chips = [", ".join(text.split("\n")) for text in page.locator("#level-choice button").all_inner_texts()]
-    assert left == f"Less detail: {chips[2]} off" and right == f"All of it: {chips[-1]} off"
+    for side, text in (("left", f"Less detail: {chips[2]} off"), ("right", f"All of it: {chips[-1]} off")):
+        page.wait_for_function(
+            "([side, text]) => document.getElementById(`split-${side}`).innerText === text", arg=[side, text]
+        )
     x, y = centre(page, "#split svg")
     drag(page, (x, y), (x - 150, y))
     share = page.evaluate("athcodecViewer.stage.split")
