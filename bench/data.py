@@ -117,7 +117,7 @@ SUITES = {
     "foreign": tuple(name for name, clip in foreign.CLIPS.items() if not clip.held_out),
     "held-out": tuple(name for name, clip in foreign.CLIPS.items() if clip.held_out),
 }
-RECIPES |= odd.CLIPS | odd.MESHES | foreign.CLIPS
+RECIPES |= odd.CLIPS | odd.SAMPLES | odd.MESHES | foreign.CLIPS
 RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15)
 
 

@@ -1,5 +1,6 @@
 """What the documentation's gallery shows besides the samples: files of a tree that grows and of a bare one, and a still
-picture of every plant and of the forest, drawn by Chromium.
+picture of every plant and of the forest, drawn by Chromium. And the stills beside the samples, which the
+viewer's page shows before they move.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
 FLOOR = {"fern": 4.0, "grass": 9.0}  # plants around each tree of the forest
 TREES = 40
 SIZE = (640, 480)
+CARD = (330, 272)  # pixels, of the stills beside the samples
 QUALITY = 78
 TIMEOUT = 300_000  # ms
 
@@ -39,7 +41,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     args.out.mkdir(parents=True, exist_ok=True)
-    plants = {name: athcodec.sample_path(name) for name in ("leafed", "fern", "grass")} | _encoded(args.out)
+    samples = {name: athcodec.sample_path(name) for name in ("leafed", "fern", "grass")}
+    for path in samples.values():
+        path.with_suffix(".webp").write_bytes(picture.still(path, CARD))
+    plants = samples | _encoded(args.out)
     for name, path in plants.items():
         (args.out / f"{name}.webp").write_bytes(picture.still(path, SIZE))
     (args.out / "forest.webp").write_bytes(_forest())

@@ -1,5 +1,5 @@
 """The samples with surfaces: a leafed tree, a fern and a tuft of grass in a calm wind and in a gale, grown, moved and
-encoded.
+encoded; and the tree that grows, as HDF5.
 
 It writes the files that ship with athcodec, and measures them against the clips that they were made of.
 """
@@ -15,6 +15,7 @@ import numpy as np
 
 import athcodec
 from athcodec.options import DEFAULT_LADDER
+from bench import data
 from bench.clips import add_effort, measure
 from bench.tables import table
 from bench.trees.leafed import leafed
@@ -29,6 +30,7 @@ PLANTS: dict[str, Callable[[], athcodec.MotionClip]] = {
     "fern": lambda: fern(fronds=12, pairs=15, height=0.8, frames=FRAMES, winds=WINDS, seed=7, fps=FPS),
     "grass": lambda: grass(blades=100, height=0.45, frames=FRAMES, winds=WINDS, seed=5, fps=FPS),
 }
+GROWTH, GRID = "growth", 2.0**-12  # The grid, in metres, that its positions are rounded to, so that the file is small.
 REL_ERROR = 1e-3
 LADDERS = {"grass": (3e-2, 1e-2, 4e-3)}  # A tuft has no branches on branches, whose depth would make levels.
 
@@ -40,7 +42,12 @@ frame to its first, over the largest between two frames after each other.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--only", nargs="+", choices=PLANTS, default=list(PLANTS), metavar="PLANT", help=f"of {', '.join(PLANTS)}"
+        "--only",
+        nargs="+",
+        choices=[*PLANTS, GROWTH],
+        default=[*PLANTS, GROWTH],
+        metavar="PLANT",
+        help=f"of {', '.join([*PLANTS, GROWTH])}",
     )
     parser.add_argument("--out", type=Path, default=athcodec.sample_path("leafed").parent, metavar="FOLDER")
     parser.add_argument("--rel-error", type=float, default=REL_ERROR, metavar="FRACTION")
@@ -48,8 +55,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    made = [_made(name, args) for name in args.only]
+    made = [_grown(args.out) if name == GROWTH else _made(name, args) for name in args.only]
     return {"tables": [each for each, _ in made], "broken": [line for _, lines in made for line in lines]}
+
+
+def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
+    """The table of the tree that grows."""
+    clip = data.RECIPES["growth_flowing"].make()
+    positions = (np.round(np.asarray(clip.positions) / GRID) * GRID).astype(np.float32)
+    out = folder / athcodec.sample_path(GROWTH).name
+    athcodec.write_hdf5(clip.replace(positions=positions), out, gzip=True)
+    still = int((np.diff(positions, axis=0) == 0).all(axis=(1, 2)).sum())
+    rows = [{"vertices": clip.vertex_count, "frames": clip.frame_count, "steps without motion": still}]
+    return table(f"{out.name}: {out.stat().st_size:,} bytes", rows), []
 
 
 def _made(name: str, args: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import athcodec
 from athcodec.metrics import MotionMeter, ShapeMeter, SmoothnessMeter, Spread, edges_of
 from athcodec.motion.clip import MotionClip
 
@@ -273,3 +274,24 @@ def test_a_nan_among_the_values_is_infinite():
     assert spread.rms == spread.quantile(0.999) == inf
     assert spread.quantile(0.5) == pytest.approx(1, rel=0.004)
     assert Spread().quantile(0.5) == Spread().rms == 0
+
+
+# ---- the samples ----
+
+
+def second_differences(frames: np.ndarray) -> np.ndarray:
+    """(T, N) of a loop, over its wrap."""
+    return np.linalg.norm(np.roll(frames, -1, axis=0) - 2 * frames + np.roll(frames, 1, axis=0), axis=2)
+
+
+@pytest.mark.parametrize("wind", ["calm", "gale"])
+@pytest.mark.parametrize("name", ["fern", "grass", pytest.param("leafed", marks=pytest.mark.slow)])
+def test_no_level_of_a_sample_jerks_by_more_than_the_file_and_the_error_of_the_level(name, wind):
+    """Each vertex is seen over the wrap of the loop; a third of the leafed tree's vertices."""
+    every = 3 if name == "leafed" else 1
+    with athcodec.open(athcodec.sample_path(name), clip=wind) as decoder:
+        assert decoder.clip.loop
+        full = second_differences(np.asarray(decoder[:, ::every], np.float64)).max()
+        for level in decoder.levels:
+            shown = second_differences(np.asarray(decoder.at_level(level.level)[:, ::every], np.float64))
+            assert shown.max() <= full + level.max_error, (level.level, np.unravel_index(shown.argmax(), shown.shape))

@@ -209,9 +209,11 @@ def test_a_double_tap_fits_by_touch(opened_file, sample_ath):
 def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
     page.click("#compare [data-value=levels]")
     assert page.evaluate("athcodecViewer.plants.length") == 2 and page.is_visible("#split")
-    page.wait_for_function("() => document.getElementById('split-left').textContent.startsWith('Detail 1')")
-    left, right = (page.wait_for_selector(f"#split-{side}").inner_text() for side in ("left", "right"))
-    assert "Detail 1" in left and "error up to" in right
+    chips = [", ".join(text.split("\n")) for text in page.locator("#level-choice button").all_inner_texts()]
+    for side, text in (("left", f"Less detail: {chips[2]} off"), ("right", f"All of it: {chips[-1]} off")):
+        page.wait_for_function(
+            "([side, text]) => document.getElementById(`split-${side}`).innerText === text", arg=[side, text]
+        )
     x, y = centre(page, "#split svg")
     drag(page, (x, y), (x - 150, y))
     share = page.evaluate("athcodecViewer.stage.split")
@@ -365,12 +367,11 @@ def test_a_file_of_one_clip_has_no_wind_to_choose(page):
 def test_sliders_are_read_out_with_units(page):
     page.wait_for_function("() => document.getElementById('time').getAttribute('aria-valuetext')")
     assert re.fullmatch(r"[\d.]+ of [\d.]+ seconds", page.get_attribute("#time", "aria-valuetext"))
-    page.locator("#level").focus()
+    page.click("#compare [data-value=levels]")
+    page.locator("#compare-level").focus()
     page.keyboard.press("Home")
-    assert (
-        "error up to" in page.get_attribute("#level", "aria-valuetext")
-        and page.evaluate("athcodecViewer.motion.target") == 0
-    )
+    assert "error up to" in page.get_attribute("#compare-level", "aria-valuetext")
+    assert page.evaluate("athcodecViewer.plants[0].motion.target") == 0
     assert page.get_attribute("#forest-count", "aria-valuetext").endswith(" plants")
 
 

@@ -81,10 +81,14 @@ const NO_XR = `export class WebXRManager {
   addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {} getCamera() {}
   hasDepthSensing() { return false; } getEnvironmentBlendMode() { return null; } getDepthSensingMesh() { return null; }
 }`;
+// Methods that no page calls: scenes as JSON.
+const UNUSED = /\n\t(?:toJSON|fromJSON)\([^\n]*\{\n[^]*?\n\t\}(?=\n)/g;
 const fewBytes = { name: "few bytes", setup: ({ onLoad }) => {
   onLoad({ filter: /WebXRManager\.js$/ }, () => ({ contents: NO_XR }));
   onLoad({ filter: /WebGLEnvironments\.js$/ }, ({ path }) => // pages have lights and no maps of surroundings
     ({ contents: readFileSync(path, "utf8").replace(/^import .*PMREMGenerator.*$/m, "class PMREMGenerator {}") }));
+  onLoad({ filter: /three.src.(animation|core|extras|lights|materials|objects|textures|cameras|math).*\.js$/ }, ({ path }) =>
+    ({ contents: readFileSync(path, "utf8").replace(UNUSED, "") }));
   onLoad({ filter: NOT_DRAWN }, ({ path }) => ({ contents: readFileSync(path, "utf8").replace(/`[^`]*`/g, '""') }));
   onLoad({ filter: /ShaderLib.\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")) }));
   onLoad({ filter: /ShaderChunk.\w+\.glsl\.js$/ }, ({ path }) => ({ contents: short(readFileSync(path, "utf8")).replace(/`([^`]*)`/, (_, text) => `\`${pruned(text)}\``) }));

@@ -39,7 +39,7 @@ FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
 
 _STILL_QUALITY = 78
 _STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
-_TIMEOUT = 120_000  # ms
+_TIMEOUT = 300_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
 _ALONE = """() => {
   athcodecViewer.stage.keepClear([]);
@@ -116,12 +116,12 @@ def save_picture(
 
 
 def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
-    """A plant as WebP, with all of the viewer's scenery, late in its clip, when it has grown where it grows; raises as
+    """A plant as WebP, late in its clip, when it has grown where it grows; raises as
     `save_picture`."""
     image = _packages()
     with open_ath(path) as decoder:
         time = _STILL_AT * decoder.clip.duration
-    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None, "&quality=full")
+    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None)
     data = io.BytesIO()
     image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
     return data.getvalue()
@@ -164,8 +164,8 @@ def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
             browser.close()
 
 
-def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[bytes]:
-    """Each picture as PNG."""
+def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
+    """Each picture as PNG, with all of the scenery, also without a graphics processor."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip
         steps = max(playing.frame_count - 1, 1)
@@ -174,7 +174,7 @@ def _drawn(path, kind, clip, size, fps, time, host_mesh, asked="") -> Iterator[b
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         export_page(path, Path(folder) / "page.html", clip, host_mesh)
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-        page.goto((Path(folder) / "page.html").as_uri() + "?intro=off" + asked)
+        page.goto((Path(folder) / "page.html").as_uri() + "?intro=off&quality=full")
         page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
         page.evaluate(_ALONE)
         for at in times:

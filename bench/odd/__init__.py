@@ -68,11 +68,25 @@ def _morph(text: str, reach: tuple[float, float]) -> Odd:
     return _odd("morph_targets", text, plant=False, **options)
 
 
+SAMPLES: dict[str, Odd] = {
+    "growth_flowing": _odd(
+        "growth",
+        "branches grow as the eased tips of their parents pass: the sample",
+        seed=4,
+        frames=120,
+        vertices=1001,
+        eased=True,
+        carried=True,
+        flowing=True,
+    )
+}
+"""Clips that ship with athcodec; the tables of the odd clips are without them."""
+
 CLIPS: dict[str, Odd] = {
     "growth": _odd("growth", "branches grow one after the other", frames=120, vertices=1001),
     "growth_eased": _odd("growth", "as growth, eased", seed=2, frames=120, vertices=1001, eased=True),
     "growth_carried": _odd(
-        "growth", "as growth, those that wait are carried: the sample", seed=4, frames=120, vertices=1001, carried=True
+        "growth", "as growth, those that wait are carried", seed=4, frames=120, vertices=1001, carried=True
     ),
     "growth_in_wind": _odd("growth_in_wind", "grows while it sways", seed=3, frames=120, vertices=1001),
     "unfolding": _odd("unfolding_leaves", "leaves unfold on a twig", frames=120, leaves=60),

@@ -10,14 +10,19 @@ from bench.trees.plant import grow
 from bench.trees.ride import rotations, sideways
 
 PARTS = 4  # Parts of the clip: trunk, orders 1 and 2 on each other, and rest.
+HELD = 1.0  # Seconds at the end of growth without a stop, in which nothing moves.
 
 
-def growth(seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False) -> MotionClip:
-    """A tree whose branches grow out of their parents when these have stopped, and stop too. Until then they wait where
-    they will be attached, or are `carried` there by what grows.
+def growth(
+    seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False, flowing: bool = False
+) -> MotionClip:
+    """A tree whose branches grow out of their parents when these have stopped, and stop too, or, `flowing`, as soon as
+    the parent's tip has passed. Until then they wait where they will be attached, or are `carried` there by what grows.
     """
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
-    grown = growing(bones, frames, np.random.default_rng(seed), eased)
+    rng = np.random.default_rng(seed)
+    times = flowing_begin_and_end(bones, frames, rng) if flowing else begin_and_end(bones, frames, rng)
+    grown = growing(times, frames, eased)
     if carried:
         return clip_of(bones, bones.bent(np.zeros((*grown.shape, 3)), grown))
     rest = bones.rest
@@ -29,7 +34,7 @@ def growth_in_wind(seed: int, frames: int, vertices: int, amount: float = 0.15) 
     """A tree whose branches grow out of their parents, on which they are carried, while all that is there sways."""
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
     rng = np.random.default_rng(seed)
-    grown = growing(bones, frames, rng, eased=True)
+    grown = growing(begin_and_end(bones, frames, rng), frames, eased=True)
     turns = gusty(np.arange(frames) / FPS, len(bones.branch_parent), amount, 0.0, rng)
     return clip_of(bones, bones.bent(turns, grown))
 
@@ -54,9 +59,25 @@ def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.nda
     return times
 
 
-def growing(bones: Bones, frames: int, rng: np.random.Generator, eased: bool) -> np.ndarray:
+def flowing_begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
+    """(B, 2) frames at which branches begin and stop growing: as the eased tip of their parent passes, so that
+    something grows in every frame but those of the last second."""
+    times = np.zeros((len(bones.branch_parent), 2))
+    times[0] = 0.0, 1.0
+    node = attach_node(bones)
+    for branch, below in enumerate(bones.branch_parent[1:].tolist(), start=1):
+        along = bones.branch == below
+        height = (node[branch] - np.flatnonzero(along)[0] + 1) / along.sum()
+        begin, end = times[below]
+        passed = 0.5 - np.sin(np.arcsin(1.0 - 2.0 * min(height, 1.0)) / 3.0)  # where 3 x^2 - 2 x^3 is the height
+        times[branch, 0] = begin + (end - begin) * passed
+        times[branch, 1] = times[branch, 0] + (end - begin) * rng.uniform(0.5, 0.9)
+    return times / times.max() * (frames - 1 - HELD * FPS)
+
+
+def growing(begin_and_end: np.ndarray, frames: int, eased: bool) -> np.ndarray:
     """(T, B) lengths of the branches, from 0 to 1, in a straight line or `eased` at both ends."""
-    begin, end = begin_and_end(bones, frames, rng).T
+    begin, end = begin_and_end.T
     share = np.clip((np.arange(frames)[:, None] - begin) / (end - begin), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share) if eased else share
 

@@ -121,11 +121,12 @@ function tellLegend() {
     legend.textContent = "Each colour moves as one piece at this level";
     return;
   }
-  const { depth } = plant.ath.branches, most = depth.reduce((a, b) => Math.max(a, b), 0);
+  const { depth, ring } = plant.ath.branches, most = depth.reduce((a, b) => Math.max(a, b), 0);
+  const tubes = new Set(depth.filter((_, branch) => ring[branch] > 1)), isLeaf = (order) => tubes.size > 0 && !tubes.has(order);
   legend.replaceChildren(...Array.from({ length: Math.min(most + 1, LEGEND) }, (_, order) => {
     const entry = document.createElement("span"), colour = document.createElement("i");
     colour.style.background = orderCss(order);
-    entry.append(colour, plant.isTuft ? "blades" : ORDERS[order] ?? `order ${order}`);
+    entry.append(colour, plant.isTuft ? "blades" : isLeaf(order) ? "leaves" : ORDERS[order] ?? `order ${order}`);
     return entry;
   }));
 }

@@ -17,6 +17,8 @@ function beginStart() {
     const element = button.querySelector(ATHViewerElement.tag);
     element.addEventListener("error", () => dropSample(button), { once: true });
     element.setAttribute("clip", CLIP);
+    const still = element.querySelector("img");
+    still.src = FOLDER + still.dataset.still;
     element.src = FOLDER + button.dataset.file;
   }
 }

@@ -20,11 +20,13 @@ void main() {
   bool far = position.x > 0.5;
   vec4 p = modelViewMatrix * vec4(athMoved(rest, athPart), 1.0);
   vec4 q = modelViewMatrix * vec4(athMoved(restOther, athPartOther), 1.0);
+  float age = distance(p.xyz, q.xyz) / max(distance((modelViewMatrix * vec4(rest, 1.0)).xyz, (modelViewMatrix * vec4(restOther, 1.0)).xyz), 1e-9);
   vec2 along = isOrthographic ? p.xy - q.xy : p.xy / -p.z - q.xy / -q.z;
   vec2 across = length(along) > 1e-9 ? normalize(vec2(-along.y, along.x)) : vec2(1.0, 0.0);
   if (far) p = q;
   float pixel = (isOrthographic ? 1.0 : -p.z) * 2.0 / (projectionMatrix[1][1] * screen.y);
-  float wide = max(far ? radiusOther : radius, 0.55 * pixel);
+  float grown = min(age, 1.0); // An edge that is shorter than in the rest pose is young, and as thin as it is short.
+  float wide = max((far ? radiusOther : radius) * grown, 0.55 * pixel);
   p.xy += wide * (across * position.y + vec2(across.y, -across.x) * (far ? -0.6 : 0.6)); // Joints, where limbs bend, are covered.
   gl_Position = projectionMatrix * p;
   vColor = far ? colorOther : color;
