@@ -105,8 +105,8 @@ def make_parser() -> argparse.ArgumentParser:
         verb(
             "encode",
             "compress a motion into an .ath file",
-            f"Without --max-error, --rel-error and --target-size it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
-            f"{LOSSLESS_REL_ERROR:g}.",
+            "Without --max-error, --rel-error and --target-size it is --rel-error "
+            f"{DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g}.",
         )
     )
     _batch_arguments(
