@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.exporters.scene_objects import face_materials, said_scene
+from athcodec.exporters.scene_objects import face_materials, names_and_scene
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
 
@@ -237,7 +237,7 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
 
 def _ply_said(motion: Motion) -> dict[str, Any]:
     """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
-    said = said_scene(motion)
+    said = names_and_scene(motion)
     if face_materials(motion) is not None:
         labels = motion.attributes[FACE_MATERIAL]
         starts = np.flatnonzero(np.diff(labels, prepend=labels[:1] - 1))

@@ -115,7 +115,7 @@ def is_double_sided(details: Any) -> bool:
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
-def said_names(motion: Motion) -> dict[str, Any]:
+def stated_names(motion: Motion) -> dict[str, Any]:
     """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
     and copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
     found: dict[str, Any] = {}
@@ -130,10 +130,10 @@ def said_names(motion: Motion) -> dict[str, Any]:
     return found
 
 
-def said_scene(motion: Motion) -> dict[str, Any]:
-    """said_names, with unit, up axis and frame rate."""
+def names_and_scene(motion: Motion) -> dict[str, Any]:
+    """Return `stated_names`, and with them unit, up axis and frame rate."""
     given = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
-    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | said_names(motion)
+    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | stated_names(motion)
 
 
 def _copies(motion: Motion, object_count: int) -> list[int]:

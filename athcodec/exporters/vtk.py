@@ -20,7 +20,7 @@ import numpy as np
 
 from athcodec.exporters import FILES, Progress, WriteOptions
 from athcodec.exporters.cells import arrays_in, cell_and_point_data, cells_of
-from athcodec.exporters.scene_objects import lost_arrays, said_scene
+from athcodec.exporters.scene_objects import lost_arrays, names_and_scene
 from athcodec.exporters.sequence import file_names, write_frames
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
@@ -77,7 +77,7 @@ class _VtuWriter:
         cells = cells_of(motion)
         self._packed = packed
         compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
-        said = json.dumps(said_scene(motion)).encode()
+        said = json.dumps(names_and_scene(motion)).encode()
         parts = [
             _HEAD.format(compressor).encode(),
             *self._section("FieldData", {OWN: np.frombuffer(said, np.uint8)}),

@@ -21,7 +21,7 @@ import numpy as np
 from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.cells import Cells, arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
-from athcodec.exporters.scene_objects import lost_arrays, said_names
+from athcodec.exporters.scene_objects import lost_arrays, stated_names
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
@@ -75,7 +75,7 @@ class _Writer:
         for key in ("fps", "start_frame", "unit", "up_axis"):
             if motion.metadata.get(key) is not None:
                 ElementTree.SubElement(domain, "Information", Name=key, Value=str(motion.metadata[key]))
-        for key, names in said_names(motion).items():
+        for key, names in stated_names(motion).items():
             ElementTree.SubElement(domain, "Information", Name=key, Value=json.dumps(names, ensure_ascii=False))
         series = ElementTree.SubElement(domain, "Grid", Name=SERIES, GridType="Collection", CollectionType="Temporal")
         static, rest = self._static_elements(), np.asarray(motion.rest, np.float64)
