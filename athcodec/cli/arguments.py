@@ -105,8 +105,8 @@ def make_parser() -> argparse.ArgumentParser:
         verb(
             "encode",
             "compress a motion into an .ath file",
-            f"Without one of the first three options it is --rel-error {DEFAULT_REL_ERROR:g}, with --lossless "
-            f"{LOSSLESS_REL_ERROR:g}.",
+            "Without --max-error, --rel-error and --target-size it is --rel-error "
+            f"{DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g}.",
         )
     )
     _batch_arguments(
@@ -175,53 +175,57 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("paths", metavar="OUT.ath", nargs="+", help=WRITTEN)
     verb.add_argument(
-        "-o", "--output", metavar="OUT.ath", action=_Output, help="the same, with all of IN in front of it or behind"
+        "-o",
+        "--output",
+        metavar="OUT.ath",
+        action=_Output,
+        help="file to write; every path without an option is then an input",
     )
     verb.add_argument(
         "--into",
         metavar="OUT.glb",
         action=_Output,
-        help="of an animated GLB in place of OUT.ath: the same GLB, its vertices moved by the extension ATH_motion; "
-        "every animation is a clip, where they do not run together",
+        help="write a GLB in place of OUT.ath: a copy of IN, an animated GLB, whose vertices the extension ATH_motion "
+        "moves; each animation becomes a clip, unless they are played together",
     )
     verb.add_argument(
         "--keep-animation",
         action="store_true",
-        help="with --into: leave skins and morph targets in the GLB too, for programs that do not know ATH_motion",
+        help="with --into: keep skins and morph targets in the GLB, for programs that do not know ATH_motion",
     )
     _gltf_motion_argument(verb, "with --into: the name of the motion, of which a GLB may have several")
     verb.add_argument(
         "--names",
         metavar="NAME,...",
         type=_argument(_names),
-        help="of the clips (default: their own, such as those of takes; else, of several, their files' "
-        "names without suffix)",
+        help="names of the clips (default: those that the sources state, such as names of takes; if there are none, "
+        "and several clips, the names of their files without suffix)",
     )
     verb.add_argument(
         "--loop",
         metavar="NAME,...",
         type=_argument(_names),
-        help="clips that are loops, their first frame following their last; all: every one",
+        help="names of the clips that are loops: their first frame follows their last; all: every clip is",
     )
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",
         type=_argument(_whole),
         default=0,
-        help="for loops that do not end where they began: take so many frames off their end and blend "
-        "them into those at their beginning",
+        help="number of frames to take off the end of each loop and to blend into its beginning, for loops that do "
+        "not end where they began",
     )
     verb.add_argument(
         "--strength",
         metavar="S,...",
         type=_argument(_numbers),
-        help="of the wind of each clip, in any unit that they share: by it players choose what to blend",
+        help="strength of the wind in each clip, in a unit of your choice; players choose clips to blend by it",
     )
     verb.add_argument(
         "--heading",
         metavar="DEG,...",
         type=_argument(_numbers),
-        help="where the wind of each clip blows to, degrees about the up axis (default: 0), with --strength",
+        help="with --strength: direction that the wind of each clip blows to, degrees about the up axis (default 0)",
     )
     _source_arguments(verb)
     _coding_arguments(verb)
@@ -269,18 +273,20 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="of a running Dask cluster that sees the same paths, in place of processes on this machine",
+        help="address of a running Dask cluster to use in place of processes on this machine; it must see the same "
+        "paths",
     )
     verb.add_argument(
         "--split",
         metavar="SEGMENTS",
         type=_argument(_jobs),
-        help="clips of more segments are coded so many at a time by whatever worker is free (default 4)",
+        help="code clips of more segments than this in parts of so many, each by any worker that is free (default 4)",
     )
     verb.add_argument(
         "--manifest",
         metavar="FILE.jsonl",
-        help="what is done and what failed (default: athcodec-batch.jsonl in DIR; needed where that is a URL)",
+        help="file that lists what is done and what failed (default: athcodec-batch.jsonl in DIR; required if DIR is "
+        "a URL)",
     )
     verb.add_argument("--redo", action="store_true", help="encode everything again")
     verb.add_argument("--verify", action="store_true", help="decode every level of a file before it counts as done")
@@ -290,9 +296,8 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
         "--loop-blend",
         metavar="FRAMES",
         type=_argument(_whole),
-        help="make loops of clips that do not "
-        "end where they began: take so many frames off their end and blend them into those at their "
-        "beginning",
+        help="number of frames to take off the end of each clip and to blend into its beginning, which makes a loop "
+        "of a clip that does not end where it began",
     )
     _source_arguments(verb)
     _coding_arguments(verb)
@@ -311,14 +316,15 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--rel-error",
         metavar="FRACTION",
         type=_argument(_fraction),
-        help="the same as a fraction of the diagonal of the bounding box over all frames "
+        help="--max-error as a fraction of the diagonal of the bounding box over all frames "
         f"(default {DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g})",
     )
     bound.add_argument(
         "--target-size",
         metavar="SIZE",
         type=_argument(parse_size),
-        help="the smallest error whose file is not larger: bytes, 50kB, 1.5MB (1 kB = 1,000 bytes), 48KiB",
+        help="largest size of the file, which gets the smallest error that fits: bytes, 50kB, 1.5MB (1 kB = 1,000 "
+        "bytes), 48KiB",
     )
     verb.add_argument(
         "--segment-frames",
@@ -332,8 +338,8 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--tam",
         metavar="EPS,ETA,XI,LAMBDA",
         type=_argument(_tam),
-        help="which subtrees move as one below the last level: thresholds of the paper's test, EPS and XI "
-        "lengths, ETA frames, LAMBDA vertices (default: those that the error bound allows)",
+        help="thresholds of the paper's test of which subtrees move as one at coarse levels: lengths EPS and XI, ETA "
+        "frames, LAMBDA vertices (default: those that the error bound allows)",
     )
     verb.add_argument(
         "--hierarchy",
@@ -346,19 +352,19 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--rest-error",
         metavar="FRACTION|LENGTH",
         type=_argument(_rest_error),
-        help="how far the rest pose may be off: a fraction of the diagonal, a length such as 2mm, or bound (default: "
-        "with faces, so little that these keep their shape; else as the bound has it)",
+        help="largest error of the rest pose: a fraction of the diagonal, a length such as 2mm, or bound for the error "
+        "bound (default: for a mesh with faces, small enough for these to keep their shape; else the error bound)",
     )
     verb.add_argument("--exact-rest", action="store_true", help="keep the rest pose bit for bit")
     verb.add_argument(
         "--lossless",
         action="store_true",
-        help="one more level gives positions and rest pose bit for bit; the bound is for the one before",
+        help="add a last level with positions and rest pose bit for bit; the error bound is that of the level before",
     )
     verb.add_argument(
         "--weights",
         metavar="NAME",
-        help="attribute with a factor on the bound for each vertex: 4 where it may be four times as far off",
+        help="name of an attribute with a factor on the error bound of each vertex: 4 allows four times the error",
     )
     verb.add_argument(
         "--attributes",
@@ -373,17 +379,17 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--smoothness",
         choices=tuple(SMOOTHNESS),
         default="default",
-        help="bytes that steady errors of predicted motion, as of growth, may cost: up to 15 %% (default), none "
-        "(bytes), or as many again (motion)",
+        help="bytes that may be spent on predicted motion, such as growth, without flicker: up to 15 %% (default), "
+        "none (bytes), or as many again (motion)",
     )
     verb.add_argument(
         "--ladder",
         metavar="ERROR,...",
         type=_argument(ladder_of),
         default=ladder_of(DEFAULT_LADDER),
-        help="layers of precision to stop at, by the largest errors that they hold, as fractions of the diagonal, such "
-        "as 1e-2,1e-3; decades: 1e-2, 1e-3 and so on down to the bound; none: one layer, a few percent smaller, for "
-        "archives (default decades)",
+        help="error bounds of the layers of precision before the last one, as fractions of the diagonal, such as "
+        "1e-2,1e-3; decades: 1e-2, 1e-3 and so on down to the error bound; none: a single layer, a few percent "
+        "smaller, for archives (default decades)",
     )
     verb.add_argument(
         "--rest",
@@ -400,7 +406,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
     source.add_argument(
         "--source-format",
         metavar="NAME",
-        help="of `athcodec formats` (default: known by the file's content and suffix)",
+        help="name of the source's format, one of `athcodec formats` (default: known by the file's content and suffix)",
     )
     source.add_argument(
         "--fps",
@@ -693,22 +699,28 @@ def _counted(text: str) -> tuple[str, float]:
 def _picture_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     kind = verb.add_mutually_exclusive_group(required=True)
-    kind.add_argument("--gif", metavar="OUT.gif", help="one round of the clip")
-    kind.add_argument("--webp", metavar="OUT.webp", help="the same in more colours and fewer bytes")
-    kind.add_argument("--png", metavar="OUT.png", help="one picture")
-    verb.add_argument("--clip", metavar="NAME", help="of this clip (default: the file's first)")
+    kind.add_argument("--gif", metavar="OUT.gif", help="write one round of the clip as a GIF")
+    kind.add_argument(
+        "--webp", metavar="OUT.webp", help="write one round of the clip as a WebP: more colours, fewer bytes"
+    )
+    kind.add_argument("--png", metavar="OUT.png", help="write one picture")
+    verb.add_argument("--clip", metavar="NAME", help="clip to show (default: the file's first)")
     verb.add_argument(
         "--size",
         metavar="WxH",
         type=_argument(_width_and_height),
         default=(640, 480),
-        help="in pixels (default: 640x480)",
+        help="width and height in pixels (default: 640x480)",
     )
     verb.add_argument(
         "--fps", metavar="N", type=_argument(_above_zero), default=15, help="pictures a second (default: %(default)s)"
     )
     verb.add_argument(
-        "--time", metavar="SECONDS", type=float, default=0.0, help="of --png, from the clip's first frame"
+        "--time",
+        metavar="SECONDS",
+        type=float,
+        default=0.0,
+        help="with --png: seconds from the first frame of the clip to the picture (default: 0)",
     )
     _host_mesh_argument(verb)
 

@@ -25,6 +25,7 @@ from athcodec.exporters.samples import with_samples
 from athcodec.exporters.scene_objects import NOT_WRITTEN, not_written
 from athcodec.files.atomic import check_target, keeping
 from athcodec.files.kinds import add_kind, kind_by_suffix
+from athcodec.motion.protocol import Motion
 from athcodec.options import COARSE_SHARE, set_numbers
 from athcodec.sources import ATH, Format, format_by_suffix, format_named
 from athcodec.sources.registry import registered
@@ -153,7 +154,12 @@ def formats() -> Iterator[Format]:
 
 
 def write(
-    motion: Any, path: str | PathLike[str], format: str | None = None, *, progress: Report | None = None, **options: Any
+    motion: Motion | Decoder,
+    path: str | PathLike[str],
+    format: str | None = None,
+    *,
+    progress: Report | None = None,
+    **options: Any,
 ) -> Written:
     """Write a motion to a file of any known format, which appears under its name only when it is complete.
 
@@ -209,11 +215,11 @@ def write(
         check_target(path, kind.suffixes[0])
         write_clip = kind.function("write_clip", __name__)
         is_rounded = kind.name in SINGLES and motion.dtype == np.float64
-        shown = motion if wanted.samples == 1 else with_samples(motion, wanted.samples)
-        shown = in_singles(shown, kind.name in HAVE_TRANSFORMS) if is_rounded else shown
-        facts = dict(write_clip(shown, path, wanted, lambda done: report("export", done)) or {})
-        facts |= {"rounding": shown.rounding} if is_rounded else {}
-        facts |= {"samples": shown.frame_count} if wanted.samples > 1 else {}
+        sampled = motion if wanted.samples == 1 else with_samples(motion, wanted.samples)
+        rounded = in_singles(sampled, kind.name in HAVE_TRANSFORMS) if is_rounded else None
+        facts = dict(write_clip(rounded or sampled, path, wanted, lambda done: report("export", done)) or {})
+        facts |= {"rounding": rounded.rounding} if rounded else {}
+        facts |= {"samples": sampled.frame_count} if wanted.samples > 1 else {}
     if lost := not_written(motion, kind.keeps) | facts.get(NOT_WRITTEN, {}):
         facts[NOT_WRITTEN] = lost
     if wanted.rig is not None:
@@ -222,7 +228,7 @@ def write(
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
 
 
-def _object_to_rig(motion: Any, path: str | PathLike[str], most: int, facts: dict[str, Any]) -> None:
+def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: dict[str, Any]) -> None:
     """Warn the caller of `write` of a skeleton that is far off the motion."""
     diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
     if not error > COARSE_SHARE * diagonal > 0:
@@ -268,7 +274,7 @@ def check_ath_name(path: str | PathLike[str]) -> None:
         )
 
 
-def _check_clips(motion: Any, kind: Format) -> None:
+def _check_clips(motion: Motion, kind: Format) -> None:
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)
@@ -279,7 +285,7 @@ def _check_clips(motion: Any, kind: Format) -> None:
         )
 
 
-def write_hdf5(clip: Any, path: str | PathLike[str], gzip: bool = False) -> None:
+def write_hdf5(clip: Motion | Decoder, path: str | PathLike[str], gzip: bool = False) -> None:
     """Write a motion to an HDF5 file of athcodec's schema, which appears under its name only when it is complete.
 
     Parameters

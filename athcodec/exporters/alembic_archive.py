@@ -37,6 +37,7 @@ from athcodec.exporters.scene_objects import (
     rows_of,
 )
 from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
+from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources.alembic_archive import BASES
 from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
@@ -81,7 +82,7 @@ def _samples(given: BinaryIO) -> Iterator[tuple[Any, ...]]:
             yield pickle.load(given)
 
 
-def _write(motion: Any, samples: Iterator[tuple[Any, ...]], instanced: dict[int, Copies], name: str) -> None:
+def _write(motion: Motion, samples: Iterator[tuple[Any, ...]], instanced: dict[int, Copies], name: str) -> None:
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     index = archive.addTimeSampling(_sampling(numbers, rate))
@@ -162,7 +163,7 @@ def _add_instanced(
     return places
 
 
-def _bind_materials(motion: Any, objects: list[SceneObject]) -> None:
+def _bind_materials(motion: Motion, objects: list[SceneObject]) -> None:
     """Materials by their names alone: a set of the faces that have one."""
     labels, names = face_materials(motion) or (np.empty(0), [])
     sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
@@ -267,7 +268,7 @@ def _widths(held: dict, own: dict, name: str) -> dict:
 
 
 def _divide(
-    motion: Any, objects: list[SceneObject]
+    motion: Motion, objects: list[SceneObject]
 ) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
     """Static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it has those
     that all copies share."""
@@ -294,7 +295,7 @@ def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> Non
     param.set(getattr(AbcGeom, f"O{kind}GeomParamSample")(held, scope))
 
 
-def _keep_own(properties: Any, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
+def _keep_own(properties: Any, motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> None:
     kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
     Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
     for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):

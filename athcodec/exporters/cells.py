@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from athcodec.exporters.mesh import domain_of
+from athcodec.motion.protocol import Motion
 from athcodec.sources.cells import NODES, VTK_NUMBERS
 
 
@@ -27,7 +27,7 @@ class Cells:
     domain: str
 
 
-def cells_of(motion: Any) -> Cells:
+def cells_of(motion: Motion) -> Cells:
     """The cells that a motion's attributes, faces and edges are."""
     kinds, counts, nodes, domains = [], [], [], []
     volumes = {
@@ -61,12 +61,12 @@ def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) 
     nodes.append(values.reshape(-1))
 
 
-def arrays_in(motion: Any, per_point: Collection[str], per_cell: Collection[str]) -> set[str]:
+def arrays_in(motion: Motion, per_point: Collection[str], per_cell: Collection[str]) -> set[str]:
     """Return the names of the attributes that a file of cells holds: its data per point and per cell, and the cells."""
     return {*per_point, *per_cell, *(name for name in motion.attributes if name.startswith("cells_"))}
 
 
-def cell_and_point_data(motion: Any, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def cell_and_point_data(motion: Motion, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """(per point, per cell): the attributes with a row of numbers for each, at most nine."""
     per_point, per_cell = {}, {}
     for name, values in motion.attributes.items():

@@ -15,6 +15,7 @@ import numpy as np
 
 from athcodec.exporters.fitting import Parts, Placed, allowed_error, portions
 from athcodec.exporters.scene_objects import SceneObject, face_materials
+from athcodec.motion.protocol import Motion
 
 
 @dataclass(eq=False)
@@ -32,7 +33,7 @@ class Copies:
     axes: np.ndarray
 
 
-def fit_copies(motion: Any, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
+def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
     """Return the objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
     what the level is off, by their place in the list."""
     allowed = allowed_error(motion) if allowed is None else allowed
@@ -78,7 +79,7 @@ def rows_of_one(rows: np.ndarray, obj: SceneObject) -> np.ndarray | None:
 class _Fit:
     """The copies of one object, fitted as the frames come."""
 
-    def __init__(self, motion: Any, obj: SceneObject):
+    def __init__(self, motion: Motion, obj: SceneObject):
         self._rows, count = obj.vertices, obj.count // obj.copies
         rest = np.asarray(motion.rest, np.float64)[obj.vertices]
         part = Parts.over(np.arange(count), np.zeros(1, np.int64), np.array([count]), rest[:count])

@@ -22,6 +22,7 @@ from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters import Progress
 from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.hierarchy import build_hierarchy, hierarchy_of
+from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import quaternions
 
 ROUNDS = 8
@@ -36,7 +37,7 @@ OF_LEVEL = 1.0  # Error that a transform may add to the level's, over the level'
 OF_CLIP = 1e-4  # Tolerance over the clip's size, for clips without levels.
 
 
-def allowed_error(motion: Any) -> float:
+def allowed_error(motion: Motion) -> float:
     """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
     size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
     return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, ClipView) else OF_CLIP * size
@@ -141,7 +142,7 @@ class Mapped:
 
 
 def fit(
-    motion: Any, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
+    motion: Motion, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Moving | None:
     """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`.
     chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
@@ -170,7 +171,7 @@ def fit(
     return _joined(done, order, rest)
 
 
-def _ranges(motion: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """An order of the vertices, and ranges of it that are the parts to begin with."""
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
@@ -199,7 +200,7 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 
 
 def _fitted(
-    motion: Any, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
+    motion: Motion, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
     that each part leaves (K,)."""
@@ -231,7 +232,7 @@ def _fitted(
     return places, values, error
 
 
-def portions(motion: Any, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]:
+def portions(motion: Motion, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]:
     """The blocks of a motion, in portions for work on that many of its vertices."""
     step = max(1, WORK_BYTES // (vertex_count * 24))
     for start, frames in motion.blocks():

@@ -54,6 +54,7 @@ from athcodec.exporters.scene_objects import NOT_WRITTEN, lost_arrays, objects_o
 from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import new_file
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import GUESSED
 
 MOST_JOINTS = 65536
@@ -62,7 +63,7 @@ MORPH_FRAMES, MORPH_BYTES = 4096, 2 << 30
 BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
@@ -77,7 +78,7 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
     return facts
 
 
-def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     looks = looks_of(motion, objects_of(motion))
     meshes = meshes_of(motion, looks, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
@@ -111,7 +112,7 @@ def _write(motion: Any, path: FilePath, options: WriteOptions, report: Progress)
 
 
 def _writer(
-    motion: Any, options: WriteOptions, surface: Surface, found: list[GltfMesh | GltfCopies], report: Progress
+    motion: Motion, options: WriteOptions, surface: Surface, found: list[GltfMesh | GltfCopies], report: Progress
 ) -> _Joined | _Morphed:
     """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
@@ -138,7 +139,7 @@ def _writer(
     return _Morphed(motion, surface)
 
 
-def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
+def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
     """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
@@ -153,7 +154,7 @@ def write_rest(motion: Any, path: str, name: str, more: Mapping[str, np.ndarray]
         glb.write(out)
 
 
-def write_bound(motion: Any, path: FilePath, bones: Any, facts: Mapping[str, Any]) -> dict[str, Any]:
+def write_bound(motion: Motion, path: FilePath, bones: Any, facts: Mapping[str, Any]) -> dict[str, Any]:
     """Write the rest pose with a skin, whose bones (binding.bones.Bones) stand in it and have no keys; returns what is
     not written, as `write_clip` does.
 
@@ -189,7 +190,7 @@ def _offset_count(shape: GltfMesh) -> int:
     return len(shape.source) * (2 if NORMAL in shape.attributes else 1)
 
 
-def _smaller(motion: Any, offset_count: int, joints: Joints | None) -> str:
+def _smaller(motion: Motion, offset_count: int, joints: Joints | None) -> str:
     morphs = motion.frame_count * (12 * offset_count + 4 * motion.frame_count + BYTES_PER_TARGET)
     fits = joints is not None and joints.max_error <= allowed_error(motion)
     if joints is None or not fits and _morphs_fit(motion, offset_count):
@@ -199,11 +200,11 @@ def _smaller(motion: Any, offset_count: int, joints: Joints | None) -> str:
     return "morphs" if is_short and morphs < size else "joints"
 
 
-def _morphs_fit(motion: Any, offset_count: int) -> bool:
+def _morphs_fit(motion: Motion, offset_count: int) -> bool:
     return motion.frame_count <= MORPH_FRAMES and 12 * motion.frame_count * offset_count <= MORPH_BYTES
 
 
-def check_morphs(motion: Any, offset_count: int) -> None:
+def check_morphs(motion: Motion, offset_count: int) -> None:
     """Raises ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
     if not _morphs_fit(motion, offset_count):
         raise ClipError(
@@ -241,7 +242,7 @@ def _animate(glb: Glb, found: list[Take], movers: Movers | None, more: list[tupl
 class _Joined:
     """Adds joints, and meshes that hang on them; None: there are none. It is all in memory."""
 
-    def __init__(self, motion: Any, joints: Joints | None):
+    def __init__(self, motion: Motion, joints: Joints | None):
         self._motion, self._joints = motion, joints
         self.name = "instances" if joints is None else "joints"
         self.max_error = 0.0 if joints is None else joints.max_error
@@ -341,7 +342,7 @@ class _Morphed:
 
     name, facts = "morphs", {}
 
-    def __init__(self, motion: Any, surface: Surface):
+    def __init__(self, motion: Motion, surface: Surface):
         self._motion, self._surface = motion, surface
         self.max_error = 0.0
 

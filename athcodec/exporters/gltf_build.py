@@ -27,6 +27,7 @@ from athcodec.exporters.scene_objects import face_materials
 from athcodec.exporters.timing import start_frame_of
 from athcodec.motion.clip import ClipRange, median_rate, stated_fps
 from athcodec.motion.joining import metadata_of
+from athcodec.motion.protocol import Motion
 from athcodec.motion.units import metres_of
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN
 from athcodec.sources.timing import whole
@@ -172,7 +173,7 @@ class GltfMeshes:
     has_made_normals: bool
 
 
-def meshes_of(motion: Any, looks: Looks, name: str, more: Mapping[str, np.ndarray] | None = None) -> GltfMeshes:
+def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.ndarray] | None = None) -> GltfMeshes:
     """Return the objects of a clip; `more`: further attributes by semantic, (N, width)."""
     faces = motion.polygons
     triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
@@ -255,7 +256,7 @@ def material_of(look: Look, has_colours: bool) -> dict[str, Any]:
     return material | {"extras": {OWN: {GUESSED: [MEMBERS[field] for field in look.guessed]}}}
 
 
-def root_transform(motion: Any) -> dict[str, Any]:
+def root_transform(motion: Motion) -> dict[str, Any]:
     """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
     metadata = motion.metadata
     metres = metres_of(metadata) or 1.0
@@ -287,7 +288,7 @@ class Take:
         return np.concatenate([own, own[:1]]) if self.is_loop else own
 
 
-def takes(motion: Any) -> list[Take]:
+def takes(motion: Motion) -> list[Take]:
     """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
     apart."""
     clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
@@ -297,7 +298,7 @@ def takes(motion: Any) -> list[Take]:
     ]
 
 
-def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
+def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
     times = np.asarray(motion.time[start:stop], np.float64)
     is_loop = clip_range.loop and len(times) > 1
     extras = {"loop": True} if clip_range.loop else {}
@@ -313,7 +314,7 @@ def _take(motion: Any, clip_range: ClipRange, start: int, stop: int) -> Take:
     return Take(clip_range.name or "motion", start, stop, is_loop, times, extras)
 
 
-def clock(motion: Any) -> dict[str, Any]:
+def clock(motion: Motion) -> dict[str, Any]:
     """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
     said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
     return said if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
@@ -325,7 +326,7 @@ def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[st
     return {"fps": fps, "start_frame": whole(start_frame_of(metadata) + round(float(time[0]) * fps, 6))}
 
 
-def branch_extras(motion: Any) -> dict[str, Any]:
+def branch_extras(motion: Motion) -> dict[str, Any]:
     """Return the extras that describe the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
@@ -340,7 +341,7 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([first, second, second + 1], axis=1)
 
 
-def _sorted_attributes(motion: Any, corner_count: int) -> tuple[dict, dict, list[str]]:
+def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, list[str]]:
     """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
@@ -435,7 +436,7 @@ def _from_corners(values: np.ndarray, corner_place: np.ndarray, count: int) -> n
     return out
 
 
-def _objects(motion: Any, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
+def _objects(motion: Motion, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
     """(name, first vertex, one past the last); one of all where objects do not hold together."""
     counts, names = motion.attributes.get("part_vertex_counts"), motion.metadata.get("part_names")
     whole = [(names[0] if isinstance(names, list) and len(names) == 1 else name, 0, motion.vertex_count)]

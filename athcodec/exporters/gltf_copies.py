@@ -20,6 +20,7 @@ from athcodec.exporters.fitting import allowed_error
 from athcodec.exporters.gltf_build import NORMAL, Glb, GltfMesh, add_mesh
 from athcodec.exporters.gltf_joints import SLACK, hold
 from athcodec.exporters.scene_objects import SceneObject, lost_copies, objects_of
+from athcodec.motion.protocol import Motion
 
 INSTANCING = "EXT_mesh_gpu_instancing"
 PATHS = ("translation", "rotation", "scale")
@@ -85,7 +86,7 @@ class GltfCopies:
             names += [] if INSTANCING in names else [INSTANCING]
 
 
-def with_copies(motion: Any, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
+def with_copies(motion: Motion, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
     """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
     and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all lose."""
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
@@ -175,7 +176,7 @@ def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCop
     return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
 
 
-def _hold(motion: Any, copies: Copies, allowed: float) -> None:
+def _hold(motion: Motion, copies: Copies, allowed: float) -> None:
     """Hold values that hardly move still, so that they need no keys."""
     extent = np.tile(np.abs(copies.shape).max(axis=0), (copies.places.shape[1], 1))
     for start, stop in motion.clip_range_frames:

@@ -580,44 +580,45 @@ def _references(gltf: dict) -> Iterator[Reference]:
         yield from _each("nodes", scene, "nodes")
     for node in gltf.get("nodes", ()):
         yield from _each("nodes", node, "children")
-        yield from _own("skins", node, "skin")
+        yield from _entry("skins", node, "skin")
         if INSTANCES in (node.get("extensions") or {}):
             yield from _all("accessors", node["extensions"][INSTANCES]["attributes"])
     for skin in gltf.get("skins", ()):
         yield from _each("nodes", skin, "joints")
-        yield from _own("nodes", skin, "skeleton")
-        yield from _own("accessors", skin, "inverseBindMatrices")
+        yield from _entry("nodes", skin, "skeleton")
+        yield from _entry("accessors", skin, "inverseBindMatrices")
     for animation in gltf.get("animations", ()):
         for channel in animation["channels"]:
-            yield from _own("nodes", channel["target"], "node")
+            yield from _entry("nodes", channel["target"], "node")
         for sampler in animation["samplers"]:
             yield from _all("accessors", sampler, ("input", "output"))
     for mesh in gltf.get("meshes", ()):
         for primitive in mesh["primitives"]:
             yield from _all("accessors", primitive["attributes"])
-            yield from _own("accessors", primitive, "indices")
+            yield from _entry("accessors", primitive, "indices")
             for target in primitive.get("targets", ()):
                 yield from _all("accessors", target)
             if DRACO in (primitive.get("extensions") or {}):
-                yield from _own("bufferViews", primitive["extensions"][DRACO], "bufferView")
+                yield from _entry("bufferViews", primitive["extensions"][DRACO], "bufferView")
     for accessor in gltf.get("accessors", ()):
-        yield from _own("bufferViews", accessor, "bufferView")
+        yield from _entry("bufferViews", accessor, "bufferView")
         for part in ("indices", "values") if "sparse" in accessor else ():
-            yield from _own("bufferViews", accessor["sparse"][part], "bufferView")
+            yield from _entry("bufferViews", accessor["sparse"][part], "bufferView")
     for image in gltf.get("images", ()):
-        yield from _own("bufferViews", image, "bufferView")
+        yield from _entry("bufferViews", image, "bufferView")
     for motion in (extension_of(gltf) or {}).get("motions", ()):
-        yield from _own("bufferViews", motion, "bufferView")
+        yield from _entry("bufferViews", motion, "bufferView")
 
 
-def _own(kind: str, holder: dict, key: str) -> Iterator[Reference]:
+def _entry(kind: str, holder: dict, key: str) -> Iterator[Reference]:
+    """Yield the reference that an object holds under a key, if it has one."""
     if key in holder:
         yield kind, holder, key
 
 
 def _all(kind: str, holder: dict, keys: Any = None) -> Iterator[Reference]:
     for key in list(holder) if keys is None else keys:
-        yield from _own(kind, holder, key)
+        yield from _entry(kind, holder, key)
 
 
 def _each(kind: str, holder: dict, key: str) -> Iterator[Reference]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from athcodec.exporters import Progress
 from athcodec.exporters.fitting import Placed, fit
+from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import quaternions, rotation_matrices
 
 SLACK = 0.01  # Share of the allowed error below which motion counts as none.
@@ -49,7 +49,7 @@ class Joints:
 
 
 def fit_joints(
-    motion: Any, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
+    motion: Motion, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Joints | None:
     """Joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
     vertices that they are to move, all by default."""
@@ -75,7 +75,7 @@ def fit_joints(
     return joints
 
 
-def _measured(motion: Any, joints: Joints, chosen: np.ndarray | None, report: Progress) -> float:
+def _measured(motion: Motion, joints: Joints, chosen: np.ndarray | None, report: Progress) -> float:
     rows = slice(None) if chosen is None else chosen
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     largest = 0.0

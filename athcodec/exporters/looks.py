@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from athcodec.exporters.scene_objects import SceneObject, domain_of, face_materials, is_double_sided
 from athcodec.exporters.surface import Surface
+from athcodec.motion.protocol import Motion
 
 Colour = tuple[float, float, float]
 LEAVES, STEMS = "leaves", "stems"
@@ -61,7 +61,7 @@ class Looks:
     surface: Surface
 
 
-def looks_of(motion: Any, objects: list[SceneObject]) -> Looks:
+def looks_of(motion: Motion, objects: list[SceneObject]) -> Looks:
     """Return what the faces of a motion look like, which are those of its objects."""
     surface = Surface(*(motion.polygons or ((), ())), motion.rest)
     stated = [(obj.name, obj.face_rows, is_double_sided(obj.details)) for obj in objects]
@@ -112,14 +112,14 @@ def _commonest(kinds: np.ndarray) -> str:
     return KINDS[np.bincount(kinds, minlength=1).argmax()]
 
 
-def _named(motion: Any) -> tuple[np.ndarray, list[str]]:
+def _named(motion: Motion) -> tuple[np.ndarray, list[str]]:
     """(F,) the material of each face among the names of the clip's materials, -1 for none; and these names."""
     count = 0 if motion.polygons is None else len(motion.polygons[0])
     labels, names = face_materials(motion) or _surfaces(motion) or (np.full(count, -1), [])
     return np.where(labels < len(names), np.maximum(labels, -1), -1), names
 
 
-def _surfaces(motion: Any) -> tuple[np.ndarray, list[str]] | None:
+def _surfaces(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
     """Stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above 1."""
     stated, uv = motion.metadata.get("surfaces"), motion.attributes.get("uv")
     names = stated.split(", ") if isinstance(stated, str) else []

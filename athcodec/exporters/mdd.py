@@ -16,10 +16,11 @@ from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.pc2 import check_counts, write_cache
 from athcodec.exporters.timing import frame_rate_of, start_frame_of
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.sources.mdd import HEADER
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
     float32 tells apart, OSError where nothing can be written."""
     check_counts(motion)

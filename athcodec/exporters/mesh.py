@@ -13,7 +13,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from athcodec.exporters.scene_objects import face_materials, said_scene
+from athcodec.exporters.scene_objects import face_materials, names_and_scene
+from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
 
 COORDINATE_FORMATS = {4: "v %.9g %.9g %.9g\n", 8: "v %.16e %.16e %.16e\n"}
@@ -31,7 +32,7 @@ _PLY_NAMES = {
 _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
-def domain_of(motion: Any, name: str) -> str:
+def domain_of(motion: Motion, name: str) -> str:
     """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
     domains = motion.metadata.get("domains")
     said = domains.get(name) if isinstance(domains, dict) else None
@@ -39,12 +40,12 @@ def domain_of(motion: Any, name: str) -> str:
     return said or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
 
 
-def has_mesh(motion: Any) -> bool:
+def has_mesh(motion: Motion) -> bool:
     """Whether there are faces or edges to write."""
     return _count_polygons(motion) > 0 or (motion.edges is not None and len(motion.edges) > 0)
 
 
-def part_spans(motion: Any) -> list[tuple[str, int, int]]:
+def part_spans(motion: Motion) -> list[tuple[str, int, int]]:
     """(name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     whole = isinstance(names, list) and counts is not None and len(counts) == len(names)
@@ -59,11 +60,11 @@ def _one_line(name: object) -> str:
     return " ".join(str(name).split()) or "plant"
 
 
-def _count_polygons(motion: Any) -> int:
+def _count_polygons(motion: Motion) -> int:
     return 0 if motion.polygons is None else len(motion.polygons[0])
 
 
-def _corner_uv(motion: Any) -> tuple[np.ndarray | None, bool]:
+def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
     """Texture coordinates of two numbers, and whether they are per corner; None: there are none."""
     uv = motion.attributes.get("uv")
     if uv is None or uv.ndim != 2 or uv.shape[1] != 2 or uv.dtype.kind != "f":
@@ -74,20 +75,20 @@ def _corner_uv(motion: Any) -> tuple[np.ndarray | None, bool]:
     return (uv, False) if domain == "vertex" and len(uv) == motion.vertex_count else (None, False)
 
 
-def _has_obj_colors(motion: Any) -> bool:
+def _has_obj_colors(motion: Motion) -> bool:
     """Whether a clip has colours as OBJ has them: three floats for each vertex."""
     colors = motion.attributes.get("colors")
     fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f"
     return fits and domain_of(motion, "colors") == "vertex"
 
 
-def obj_arrays(motion: Any) -> set[str]:
+def obj_arrays(motion: Motion) -> set[str]:
     """Return the names of the attributes that OBJ files of a clip hold."""
     kept = {"uv": _corner_uv(motion)[0] is not None, "colors": _has_obj_colors(motion)}
     return {name for name, is_kept in kept.items() if is_kept}
 
 
-def ply_arrays(motion: Any) -> set[str]:
+def ply_arrays(motion: Motion) -> set[str]:
     """Return the names of the attributes that PLY files of a clip hold."""
     columns, renamed = _ply_columns(motion), {"uv": "s", "colors": "red"}
     kept = {name for name in motion.attributes if renamed.get(name, name) in columns}
@@ -99,7 +100,7 @@ class ObjWriter:
 
     suffix, arrays = ".obj", staticmethod(obj_arrays)
 
-    def __init__(self, motion: Any):
+    def __init__(self, motion: Motion):
         self._tail = "".join(_obj_tail(motion)).encode()
         self._colors = motion.attributes["colors"] if _has_obj_colors(motion) else None
 
@@ -115,7 +116,7 @@ class ObjWriter:
         file.write(self._tail)
 
 
-def _obj_tail(motion: Any) -> list[str]:
+def _obj_tail(motion: Motion) -> list[str]:
     """All lines behind those of v."""
     uv, per_corner = _corner_uv(motion)
     lines = [] if uv is None else [f"vt {u:.9g} {v:.9g}\n" for u, v in uv.tolist()]
@@ -138,7 +139,7 @@ def _obj_tail(motion: Any) -> list[str]:
     return lines
 
 
-def _first_corners(motion: Any) -> np.ndarray | None:
+def _first_corners(motion: Motion) -> np.ndarray | None:
     if not _count_polygons(motion):
         return None
     counts, corners = motion.polygons
@@ -152,7 +153,7 @@ def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | No
     return parts if (np.diff(parts) >= 0).all() else None
 
 
-def _obj_faces(motion: Any, has_uv: bool, per_corner: bool) -> list[str]:
+def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
     """A line per face, behind the lines of the group and the material that it is the first of."""
     if not _count_polygons(motion):
         return []
@@ -169,7 +170,7 @@ def _obj_faces(motion: Any, has_uv: bool, per_corner: bool) -> list[str]:
     return lines
 
 
-def _switch_names(motion: Any, lines: list[str], attribute: str, names_key: str, word: str) -> None:
+def _switch_names(motion: Motion, lines: list[str], attribute: str, names_key: str, word: str) -> None:
     labels, names = motion.attributes.get(attribute), motion.metadata.get(names_key)
     if labels is None or not isinstance(names, list) or labels.shape != (len(lines),) or labels.dtype.kind not in "iu":
         return
@@ -183,7 +184,7 @@ class PlyWriter:
 
     suffix, arrays = ".ply", staticmethod(ply_arrays)
 
-    def __init__(self, motion: Any):
+    def __init__(self, motion: Motion):
         columns = _ply_columns(motion)
         coordinate = "<f4" if motion.dtype.itemsize == 4 else "<f8"
         fields = [(axis, coordinate) for axis in "xyz"]
@@ -215,7 +216,7 @@ class PlyWriter:
         file.write(self._tail)
 
 
-def _ply_columns(motion: Any) -> dict[str, np.ndarray]:
+def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
     """The numbers that every vertex has beside its position, one column each."""
     columns: dict[str, np.ndarray] = {}
     for name, values in motion.attributes.items():
@@ -234,9 +235,9 @@ def _ply_columns(motion: Any) -> dict[str, np.ndarray]:
     return columns
 
 
-def _ply_said(motion: Any) -> dict[str, Any]:
+def _ply_said(motion: Motion) -> dict[str, Any]:
     """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
-    said = said_scene(motion)
+    said = names_and_scene(motion)
     if face_materials(motion) is not None:
         labels = motion.attributes[FACE_MATERIAL]
         starts = np.flatnonzero(np.diff(labels, prepend=labels[:1] - 1))
@@ -244,7 +245,7 @@ def _ply_said(motion: Any) -> dict[str, Any]:
     return said
 
 
-def _ply_faces(motion: Any) -> tuple[list[str], bytes]:
+def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
     count = _count_polygons(motion)
     if not count:
         return [], b""

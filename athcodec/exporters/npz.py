@@ -20,10 +20,11 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.clip import RESERVED_NAMES
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import clip_metadata
+from athcodec.motion.protocol import Motion
 from athcodec.sources.npz import METADATA
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> None:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> None:
     """Write the archive. Raises ClipError for an attribute's name that is taken or leads elsewhere, OSError where
     nothing can be written."""
     arrays = _arrays(motion)
@@ -42,7 +43,7 @@ def _member(archive: zipfile.ZipFile, name: str, packing: int) -> Any:
     return archive.open(info, "w", force_zip64=True)
 
 
-def _write_positions(motion: Any, member: Any, report: Progress) -> None:
+def _write_positions(motion: Motion, member: Any, report: Progress) -> None:
     shape, dtype = (motion.frame_count, motion.vertex_count, 3), motion.dtype.newbyteorder("<")
     np.lib.format.write_array_header_1_0(
         member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
@@ -52,7 +53,7 @@ def _write_positions(motion: Any, member: Any, report: Progress) -> None:
         report((start + len(frames)) / motion.frame_count)
 
 
-def _arrays(motion: Any) -> dict[str, np.ndarray]:
+def _arrays(motion: Motion) -> dict[str, np.ndarray]:
     taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
     if taken:
         raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")

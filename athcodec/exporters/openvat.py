@@ -23,12 +23,13 @@ from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json, write_png
 from athcodec.files.atomic import new_folder
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 
 NARROWEST = 64
 HIGHEST = 16384
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says of it. options.half: 16
     bits in place of float.
 
@@ -54,14 +55,14 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
     return facts["athcodec"]
 
 
-def _texels(motion: Any, width: int) -> tuple[np.ndarray, np.ndarray]:
+def _texels(motion: Motion, width: int) -> tuple[np.ndarray, np.ndarray]:
     """Column, and row in the first frame, of each vertex."""
     vertices = np.arange(motion.vertex_count)
     return vertices % width, vertices // width * motion.frame_count
 
 
 def _texture(
-    motion: Any, size: tuple[int, int], half: bool, report: Progress
+    motion: Motion, size: tuple[int, int], half: bool, report: Progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """The pixels, the least and the largest offset, and the largest distance of what they show from the motion."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
@@ -96,7 +97,7 @@ def _size(vertices: int, frames: int) -> tuple[int, int]:
     return min(sizes)[2:]
 
 
-def _offset_bounds(motion: Any, rest: np.ndarray, report: Progress) -> tuple[np.ndarray, np.ndarray]:
+def _offset_bounds(motion: Motion, rest: np.ndarray, report: Progress) -> tuple[np.ndarray, np.ndarray]:
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for start, portion in portions(motion, motion.vertex_count):
         offsets = portion - rest

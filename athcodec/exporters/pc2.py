@@ -24,6 +24,7 @@ from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
+from athcodec.motion.protocol import Motion
 from athcodec.sources.mesh import Mesh, read_mesh
 from athcodec.sources.pc2 import HEADER, MAGIC
 
@@ -31,25 +32,25 @@ STEP_TOLERANCE = 1e-4
 LARGEST_COUNT = 2**31 - 1
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write the cache and its mesh. Raises ClipError where the times are uneven or there is another mesh beside it,
     OSError where nothing can be written."""
     header = HEADER.pack(MAGIC, 1, *_counted(motion, *_start_and_step(motion)))
     return write_cache(motion, path, header, "<f4", report)
 
 
-def _counted(motion: Any, start: float, step: float) -> tuple[int, float, float, int]:
+def _counted(motion: Motion, start: float, step: float) -> tuple[int, float, float, int]:
     check_counts(motion)
     return motion.vertex_count, start, step, motion.frame_count
 
 
-def check_counts(motion: Any) -> None:
+def check_counts(motion: Motion) -> None:
     """ClipError where a motion has more frames or vertices than a cache can count."""
     if max(motion.vertex_count, motion.frame_count) > LARGEST_COUNT:
         raise ClipError(f"got {motion.frame_count} frames of {motion.vertex_count} vertices, expected fewer than 2^31")
 
 
-def _start_and_step(motion: Any) -> tuple[float, float]:
+def _start_and_step(motion: Motion) -> tuple[float, float]:
     numbers = frame_numbers(motion)
     if len(numbers) < 2:
         return float(numbers[0]), 1.0
@@ -63,7 +64,7 @@ def _start_and_step(motion: Any) -> tuple[float, float]:
     return float(numbers[0]), float(round(step, 6))
 
 
-def write_cache(motion: Any, path: FilePath, header: bytes, dtype: str, report: Progress) -> dict[str, Any]:
+def write_cache(motion: Motion, path: FilePath, header: bytes, dtype: str, report: Progress) -> dict[str, Any]:
     """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there; return what
     they have no place for."""
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
@@ -77,13 +78,13 @@ def write_cache(motion: Any, path: FilePath, header: bytes, dtype: str, report: 
     return lost_arrays(motion, obj_arrays(motion) if has_mesh(motion) else ())
 
 
-def _write_frames(motion: Any, file: BinaryIO, dtype: str, report: Progress) -> None:
+def _write_frames(motion: Motion, file: BinaryIO, dtype: str, report: Progress) -> None:
     for start, frames in motion.blocks():
         file.write(np.ascontiguousarray(frames, dtype))
         report((start + len(frames)) / motion.frame_count)
 
 
-def _mesh_to_write(motion: Any, target: Path) -> str:
+def _mesh_to_write(motion: Motion, target: Path) -> str:
     """The name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
     if not has_mesh(motion):
         return ""

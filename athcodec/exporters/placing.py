@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from athcodec.motion.frames import is_far
+from athcodec.motion.protocol import Motion
 
 
-def in_singles(motion: Any, can_move: bool) -> Any:
+def in_singles(motion: Motion, can_move: bool) -> Any:
     """Return a float64 motion about `origin` (3,), which is 0 unless the format can hold it and float32 needs it.
 
     Its `rounding` is the largest distance by which float32 moves a vertex in the blocks that were read so far.
@@ -43,7 +44,7 @@ def in_singles(motion: Any, can_move: bool) -> Any:
     return moved
 
 
-def origin_of(motion: Any) -> list[float] | None:
+def origin_of(motion: Motion) -> list[float] | None:
     """Return the place that a motion is about, for a transform; None for the origin itself."""
     origin = getattr(motion, "origin", None)
     return origin.tolist() if origin is not None and origin.any() else None

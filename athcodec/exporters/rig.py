@@ -15,7 +15,6 @@ A joint lies where its share of the stem begins and has the world's axes in the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.branches.finding import find_branches
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
+from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import quaternions, rotation_matrices
 from athcodec.options import RIG_JOINTS
 
@@ -94,7 +94,7 @@ def _cut(
     return [(branch, middle, 0), (middle, stop, 0)]
 
 
-def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Progress = lambda done: None) -> Joints:
+def fit_rig(motion: Motion, most: int = RIG_JOINTS, report: Progress = lambda done: None) -> Joints:
     """The joints of a motion, `most` at most beside the root. A clip without branches gets those that are found."""
     hierarchy = hierarchy_to_rig(motion)
     order = hierarchy.vertex_source
@@ -113,7 +113,7 @@ def fit_rig(motion: Any, most: int = RIG_JOINTS, report: Progress = lambda done:
     return _posed(motion, _Bones(hierarchy, parts, rest), order, lambda done: report(0.4 + 0.6 * done))
 
 
-def hierarchy_to_rig(motion: Any) -> Hierarchy:
+def hierarchy_to_rig(motion: Motion) -> Hierarchy:
     """The branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
         return motion.decoder.file.hierarchy
@@ -235,7 +235,7 @@ class _Bones:
         shift[:, bones] = aim - np.einsum("tkij,kj->tki", found, middle)
 
 
-def _posed(motion: Any, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
+def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
     """The joints in all frames, each in the space of the one above, and how far off they are as they are written."""
     places, parents = bones.joints, np.append(-1, bones.parents() + 1)
     rest = np.concatenate([np.zeros((1, 3)), places])

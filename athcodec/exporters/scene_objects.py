@@ -14,6 +14,7 @@ import numpy as np
 
 from athcodec.motion.joining import OWN as CLIPS
 from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
+from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, SCHEME, ArrayDescriptor
 
 # kept by the formats themselves, or by their objects
@@ -48,7 +49,7 @@ class SceneObject:
         return slice(self.first, self.first + self.count)
 
 
-def objects_of(motion: Any) -> list[SceneObject]:
+def objects_of(motion: Motion) -> list[SceneObject]:
     """The objects of a motion, in the order of their vertices; one of all where it does not say."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
@@ -88,14 +89,14 @@ def lost_copies(objects: list[SceneObject]) -> dict[str, list[str]]:
     return {"copies as instances (mirrored, sheared, bent or of different materials)": names} if names else {}
 
 
-def lost_arrays(motion: Any, kept: Collection[str]) -> dict[str, dict[str, list[str]]]:
+def lost_arrays(motion: Motion, kept: Collection[str]) -> dict[str, dict[str, list[str]]]:
     """Return the names of attributes that a format has no place for; those that describe other arrays are left out."""
     described = {"part_vertex_counts", "part_copies", "face_vertex_counts", "face_vertex_indices", "normals"}
     names = [name for name in motion.attributes if name not in described | {FACE_MATERIAL, *kept}]
     return {NOT_WRITTEN: {"arrays": names}} if names else {}
 
 
-def not_written(motion: Any, kept: Sequence[str]) -> dict[str, list[str]]:
+def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
     """The names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
@@ -114,7 +115,7 @@ def is_double_sided(details: Any) -> bool:
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
-def said_names(motion: Any) -> dict[str, Any]:
+def stated_names(motion: Motion) -> dict[str, Any]:
     """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
     and copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
     found: dict[str, Any] = {}
@@ -129,13 +130,13 @@ def said_names(motion: Any) -> dict[str, Any]:
     return found
 
 
-def said_scene(motion: Any) -> dict[str, Any]:
-    """said_names, with unit, up axis and frame rate."""
+def names_and_scene(motion: Motion) -> dict[str, Any]:
+    """Return `stated_names`, and with them unit, up axis and frame rate."""
     given = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
-    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | said_names(motion)
+    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | stated_names(motion)
 
 
-def _copies(motion: Any, object_count: int) -> list[int]:
+def _copies(motion: Motion, object_count: int) -> list[int]:
     found = motion.attributes.get("part_copies")
     usable = found is not None and found.shape == (object_count,) and found.dtype.kind in "iu"
     return found.tolist() if usable else [1] * object_count
@@ -165,7 +166,7 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
     return owner
 
 
-def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
+def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
     """Names, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
@@ -188,7 +189,7 @@ def _division(motion: Any) -> tuple[list[str], np.ndarray, list[str], list[dict[
     return ["plant"], np.array([count]), [_kind(motion, np.array([count]), 0)], [{}]
 
 
-def _fits(motion: Any, counts: np.ndarray) -> bool:
+def _fits(motion: Motion, counts: np.ndarray) -> bool:
     """Whether every face is of one object, and the faces are in the order of the objects."""
     if motion.polygons is None:
         return True
@@ -198,7 +199,7 @@ def _fits(motion: Any, counts: np.ndarray) -> bool:
     return bool((owner == owner[first]).all() and (np.diff(owner) >= 0).all()) if len(owner) else True
 
 
-def _kind(motion: Any, counts: np.ndarray, index: int) -> str:
+def _kind(motion: Motion, counts: np.ndarray, index: int) -> str:
     stop = int(counts[: index + 1].sum())
     start = stop - int(counts[index])
     polygons = motion.polygons
@@ -224,7 +225,7 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
     return counts if (counts > 1).all() else None
 
 
-def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
+def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
     """For each object its vertices per curve, empty where it is none."""
     said = motion.attributes.get("curve_vertex_counts")
     totals = [
@@ -244,7 +245,7 @@ def _curve_counts(motion: Any, ends: np.ndarray, kinds: list[str]) -> Iterator[n
             yield np.array([total]) if chains is None else chains
 
 
-def face_materials(motion: Any) -> tuple[np.ndarray, list[str]] | None:
+def face_materials(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
     """(F,) the material of each face, among the names; outside them where it has none. None where the clip says it of
     no face."""
     labels, names = motion.attributes.get(FACE_MATERIAL), motion.metadata.get(MATERIAL_NAMES)
@@ -259,7 +260,7 @@ def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.nd
     return [(int(label), np.flatnonzero(labels == label)) for label in np.unique(labels) if 0 <= label < len(names)]
 
 
-def domain_of(motion: Any, name: str, values: np.ndarray, domains: dict[str, str]) -> str:
+def domain_of(motion: Motion, name: str, values: np.ndarray, domains: dict[str, str]) -> str:
     """Return what the clip says if the rows fit it, else what they fit."""
     polygons = motion.polygons or ((), ())
     rows = {
@@ -282,7 +283,7 @@ def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
     return values[rows[domain]]
 
 
-def own_arrays(motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[ArrayDescriptor, np.ndarray]]:
+def own_arrays(motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[ArrayDescriptor, np.ndarray]]:
     """Return what scene formats cannot hold: rest, branches, edges and the arrays in `left`, each as (bytes,) uint8."""
     arrays = {"rest": (getattr(motion, "source_rest", motion.rest), "vertex")}
     for name, domain in (("vertex_branch", "vertex"), ("branch_parent", ""), ("stem_index", "vertex"), ("edges", "")):

@@ -24,12 +24,13 @@ from athcodec.exporters.scene_objects import lost_arrays
 from athcodec.exporters.timing import frame_numbers
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.sources.numbering import LARGEST_NUMBER, Numbering, numbering_of
 
 DIGITS = 4
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write all files; returns their names. Raises ClipError where there are others of the same numbering, OSError
     where nothing can be written."""
     suffix = Path(path).suffix.lower()
@@ -42,7 +43,7 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
     return {FILES: names} | lost_arrays(motion, writer.arrays(motion))
 
 
-def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Progress) -> None:
+def write_frames(motion: Motion, writer: Any, paths: Sequence[str], report: Progress) -> None:
     """A file for each frame, by writer.write(file, points)."""
     for start, frames in motion.blocks():
         for frame, points in enumerate(frames, start):
@@ -51,7 +52,7 @@ def write_frames(motion: Any, writer: Any, paths: Sequence[str], report: Progres
             report((frame + 1) / motion.frame_count)
 
 
-def file_names(motion: Any, path: FilePath) -> list[str]:
+def file_names(motion: Motion, path: FilePath) -> list[str]:
     """The name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
     path = Path(check_target(path))
     numbering = _numbering(path)
@@ -69,7 +70,7 @@ def file_names(motion: Any, path: FilePath) -> list[str]:
     return [numbering.path(number).name for number in numbers]
 
 
-def file_numbers(motion: Any) -> list[int]:
+def file_numbers(motion: Motion) -> list[int]:
     """Numbers of the frames, or 1, 2 ... where they are not whole, twice the same or below 0."""
     numbers = np.round(frame_numbers(motion), 3)
     usable = (numbers == np.floor(numbers)).all() and numbers.min() >= 0 and numbers.max() <= LARGEST_NUMBER

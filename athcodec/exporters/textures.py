@@ -12,12 +12,13 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters.gltf_build import clock
+from athcodec.motion.protocol import Motion
 
 WIDEST = 4096  # pixels of a side that all devices support
 LAYOUT = "athcodec/exporters/vat.md"
 
 
-def facts_of(motion: Any) -> dict[str, Any]:
+def facts_of(motion: Motion) -> dict[str, Any]:
     """Rate, level and size of a MotionClip or ClipView."""
     level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}

@@ -9,9 +9,10 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.clip import stated_fps
+from athcodec.motion.protocol import Motion
 
 
-def frame_rate_of(motion: Any) -> float:
+def frame_rate_of(motion: Motion) -> float:
     """Frames per second: what the clip's metadata state, else the median rate of its times."""
     return stated_fps(motion.metadata) or float(motion.fps)
 
@@ -23,12 +24,12 @@ def start_frame_of(metadata: Mapping[str, Any]) -> float:
     return float(stated) if is_number else 0.0
 
 
-def frame_numbers(motion: Any) -> np.ndarray:
+def frame_numbers(motion: Motion) -> np.ndarray:
     """(T,) float64; whole where times fall on frames but for rounding. Those of a view are those of the clip."""
     return start_frame_of(motion.metadata) + np.round(np.asarray(motion.time) * frame_rate_of(motion), 6)
 
 
-def distinct_frame_numbers(motion: Any) -> np.ndarray:
+def distinct_frame_numbers(motion: Motion) -> np.ndarray:
     """Return the times for formats that find a frame by its number. Raises ClipError where two have the same."""
     numbers = frame_numbers(motion)
     same = np.flatnonzero(np.diff(numbers) <= 0)

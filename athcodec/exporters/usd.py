@@ -48,6 +48,7 @@ from athcodec.exporters.timing import distinct_frame_numbers, frame_rate_of
 from athcodec.exporters.usd_rig import write_rig
 from athcodec.files.atomic import new_files
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.motion.units import METRES, metres_of, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN, SCHEME
 
@@ -86,7 +87,7 @@ WIND = "wind"  # in what is known of an assembly: the text of its JSON
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd; returns what instances cost. Raises
     ClipError, OSError."""
     path = os.fspath(path)
@@ -135,7 +136,7 @@ def _must(done: object, name: str) -> None:
         raise OSError(f"{name}: cannot be written")
 
 
-def _write(motion: Any, name: str, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -> dict[str, Any]:
     codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
@@ -171,7 +172,7 @@ def _write(motion: Any, name: str, options: WriteOptions, report: Progress) -> d
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
-def _time_codes(motion: Any) -> np.ndarray:
+def _time_codes(motion: Motion) -> np.ndarray:
     """(T,) of all frames; of several clips each from 0 on."""
     if len(motion.clip_ranges) < 2:
         return distinct_frame_numbers(motion)
@@ -181,7 +182,7 @@ def _time_codes(motion: Any) -> np.ndarray:
 
 def _write_rigged(
     stage: Usd.Stage,
-    motion: Any,
+    motion: Motion,
     joints: Joints,
     objects: list[SceneObject],
     looks: Looks,
@@ -195,7 +196,7 @@ def _write_rigged(
     return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
 
 
-def _set_rest(motion: Any, objects: list[SceneObject], looks: Looks) -> None:
+def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
     rest = np.asarray(motion.rest, np.float32)
     normals = looks.surface.unit_normals(motion.rest)
     for obj in objects:
@@ -208,7 +209,7 @@ def _set_rest(motion: Any, objects: list[SceneObject], looks: Looks) -> None:
 
 def _write_assembly(
     stage: Usd.Stage,
-    motion: Any,
+    motion: Motion,
     joints: Joints,
     objects: list[SceneObject],
     looks: Looks,
@@ -245,7 +246,7 @@ def _write_assembly(
     return facts | {WIND: nanite.wind_of(motion, joints)} | hidden_copies(objects)
 
 
-def _describe_stage(stage: Usd.Stage, motion: Any, codes: np.ndarray, rate: float) -> None:
+def _describe_stage(stage: Usd.Stage, motion: Motion, codes: np.ndarray, rate: float) -> None:
     metadata = motion.metadata
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
@@ -298,7 +299,7 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
     return schema
 
 
-def _show(obj: SceneObject, motion: Any, looks: Looks) -> None:
+def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
     """Sets the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
     that have colours keep these, which are written with the clip's other arrays."""
     colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
@@ -318,7 +319,7 @@ def _show(obj: SceneObject, motion: Any, looks: Looks) -> None:
     _mark_guess(primvar.GetAttr())
 
 
-def _set_normals(obj: SceneObject, motion: Any, normals: np.ndarray) -> None:
+def _set_normals(obj: SceneObject, motion: Motion, normals: np.ndarray) -> None:
     """Sets the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
     if obj.kind == "mesh" and "normals" not in motion.attributes:
         attribute = obj.target.CreateNormalsAttr(_vec3(normals))
@@ -326,7 +327,7 @@ def _set_normals(obj: SceneObject, motion: Any, normals: np.ndarray) -> None:
         _mark_guess(attribute)
 
 
-def _normals_of_one(motion: Any, obj: SceneObject, copies: Copies, looks: Looks) -> np.ndarray:
+def _normals_of_one(motion: Motion, obj: SceneObject, copies: Copies, looks: Looks) -> np.ndarray:
     """The normals of the shape of which an object's vertices are copies."""
     return looks.surface.unit_normals(motion.rest)[obj.vertices][: len(copies.shape)] @ copies.axes
 
@@ -335,7 +336,7 @@ def _mark_guess(attribute: Usd.Attribute) -> None:
     attribute.SetCustomDataByKey(f"{OWN}:{GUESSED}", True)
 
 
-def _bind_materials(stage: Usd.Stage, motion: Any, objects: list[SceneObject], taken: Iterable[str]) -> None:
+def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], taken: Iterable[str]) -> None:
     """The materials by their names, without contents, and the faces that have them."""
     found = face_materials(motion)
     if found is None or not found[1]:
@@ -421,7 +422,7 @@ def _int_array(values: np.ndarray) -> Vt.IntArray:
 # ---- static arrays ----
 
 
-def _static_arrays(stage: Usd.Stage, motion: Any, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
+def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
     """Writes those that belong to vertices, corners and faces; returns the others, with their domains."""
     left = {}
     domains = motion.metadata.get("domains", {})
@@ -509,7 +510,7 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
     return array.FromNumpy(values) if len(values) else array()
 
 
-def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, str]]) -> None:
+def _own_arrays(root: Usd.Prim, motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> None:
     """Return the data that has no place in the prims, byte for byte."""
     for descriptor, raw in own_arrays(motion, left):
         attribute = root.CreateAttribute(
@@ -524,7 +525,12 @@ def _own_arrays(root: Usd.Prim, motion: Any, left: dict[str, tuple[np.ndarray, s
 
 
 def _write_frames(
-    stage: Usd.Stage, motion: Any, objects: list[SceneObject], codes: np.ndarray, report: Progress, has_velocities: bool
+    stage: Usd.Stage,
+    motion: Motion,
+    objects: list[SceneObject],
+    codes: np.ndarray,
+    report: Progress,
+    has_velocities: bool,
 ) -> None:
     layer, unsaved = stage.GetRootLayer(), 0
     extents = [(obj, _whole(obj).CreateExtentAttr().GetPath()) for obj in objects]

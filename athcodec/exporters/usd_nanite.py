@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, Vt
@@ -26,6 +25,7 @@ from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.rig import hierarchy_to_rig
 from athcodec.exporters.scene_objects import SceneObject
 from athcodec.motion.clip import MotionClip
+from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import rotation_matrices
 
 ROOT_PRIM, BASE = "/clip", "/clip/base"
@@ -41,7 +41,7 @@ class Part:
     joint: np.ndarray
 
 
-def parts_of(motion: Any, objects: list[SceneObject], joints: Joints) -> dict[int, Part]:
+def parts_of(motion: Motion, objects: list[SceneObject], joints: Joints) -> dict[int, Part]:
     """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
@@ -127,7 +127,7 @@ def _bind_instances(prim: Usd.Prim, names: list[str]) -> None:
         primvar.SetElementSize(1)
 
 
-def largest_error(motion: Any, objects: list[SceneObject], joints: Joints, parts: dict[int, Part]) -> float:
+def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, parts: dict[int, Part]) -> float:
     """How far instances that move as their joints do are off, at most; or the rest of the rig, if that is more."""
     largest = joints.max_error
     for number, part in parts.items():
@@ -154,7 +154,7 @@ def _world(joints: Joints, frame: int) -> np.ndarray:
     return matrices @ joints.bind.astype(np.float64)
 
 
-def wind_of(motion: Any, joints: Joints) -> str:
+def wind_of(motion: Motion, joints: Joints) -> str:
     """The JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
     hierarchy = hierarchy_to_rig(motion)
     order = np.empty(len(joints.vertex_joint), np.int64)

@@ -6,19 +6,18 @@ the rest pose.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pxr import Gf, Tf, Usd, UsdSkel, Vt
 
 from athcodec.exporters.gltf_joints import Joints
 from athcodec.exporters.scene_objects import SceneObject, distinct
+from athcodec.motion.protocol import Motion
 
 SKELETON = "skeleton"
 
 
 def write_rig(
-    stage: Usd.Stage, place: str, motion: Any, joints: Joints, objects: list[SceneObject], codes: np.ndarray
+    stage: Usd.Stage, place: str, motion: Motion, joints: Joints, objects: list[SceneObject], codes: np.ndarray
 ) -> None:
     """Adds below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
     all frames, (T,), which begin again with each clip."""

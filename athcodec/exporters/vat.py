@@ -24,13 +24,14 @@ from athcodec.exporters.gltf_build import branch_extras
 from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
 from athcodec.files.atomic import new_folder
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
 FLOAT16_MAX = 65504.0
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
@@ -48,7 +49,9 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
     return facts
 
 
-def _write(motion: Any, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress) -> dict[str, Any]:
+def _write(
+    motion: Motion, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress
+) -> dict[str, Any]:
     pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
     grid = _Grid(len(pivots), motion.frame_count)
     textures = []
@@ -127,7 +130,7 @@ class _Grid:
 
 
 def _measured(
-    motion: Any, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Progress
+    motion: Motion, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Progress
 ) -> tuple[float, list[float], list[float]]:
     """The largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)

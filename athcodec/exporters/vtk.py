@@ -20,10 +20,11 @@ import numpy as np
 
 from athcodec.exporters import FILES, Progress, WriteOptions
 from athcodec.exporters.cells import arrays_in, cell_and_point_data, cells_of
-from athcodec.exporters.scene_objects import lost_arrays, said_scene
+from athcodec.exporters.scene_objects import lost_arrays, names_and_scene
 from athcodec.exporters.sequence import file_names, write_frames
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import OWN
 
 _HEAD = (
@@ -33,7 +34,7 @@ _HEAD = (
 _PIECE = '<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write all files; returns the name of the index, or of the only one. Raises ClipError where there are others of
     the same numbering, OSError where nothing can be written."""
     target = Path(check_target(path))
@@ -57,7 +58,7 @@ def _stem(target: Path) -> str:
     return bare or target.stem
 
 
-def _index(motion: Any, names: list[str]) -> str:
+def _index(motion: Motion, names: list[str]) -> str:
     lines = [
         f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>\n'
         for time, name in zip(np.asarray(motion.time).tolist(), names, strict=True)
@@ -72,11 +73,11 @@ def _index(motion: Any, names: list[str]) -> str:
 class _VtuWriter:
     """VTU files of one clip; write(file, points) for each. What does not move is put together once."""
 
-    def __init__(self, motion: Any, packed: bool):
+    def __init__(self, motion: Motion, packed: bool):
         cells = cells_of(motion)
         self._packed = packed
         compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
-        said = json.dumps(said_scene(motion)).encode()
+        said = json.dumps(names_and_scene(motion)).encode()
         parts = [
             _HEAD.format(compressor).encode(),
             *self._section("FieldData", {OWN: np.frombuffer(said, np.uint8)}),

@@ -21,9 +21,10 @@ import numpy as np
 from athcodec.exporters import Progress, WriteOptions
 from athcodec.exporters.cells import Cells, arrays_in, cell_and_point_data, cells_of
 from athcodec.exporters.hdf5 import Sink
-from athcodec.exporters.scene_objects import lost_arrays, said_names
+from athcodec.exporters.scene_objects import lost_arrays, stated_names
 from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
+from athcodec.motion.protocol import Motion
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf import MIXED
 
@@ -48,7 +49,7 @@ _FORMS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 SERIES = "motion"
 
 
-def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
@@ -63,7 +64,7 @@ def write_clip(motion: Any, path: FilePath, options: WriteOptions, report: Progr
 
 
 class _Writer:
-    def __init__(self, motion: Any, data: h5py.File, data_name: str, gzip: bool, sink: Sink):
+    def __init__(self, motion: Motion, data: h5py.File, data_name: str, gzip: bool, sink: Sink):
         self._motion, self._data, self._name, self._sink = motion, data, data_name, sink
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
@@ -74,7 +75,7 @@ class _Writer:
         for key in ("fps", "start_frame", "unit", "up_axis"):
             if motion.metadata.get(key) is not None:
                 ElementTree.SubElement(domain, "Information", Name=key, Value=str(motion.metadata[key]))
-        for key, names in said_names(motion).items():
+        for key, names in stated_names(motion).items():
             ElementTree.SubElement(domain, "Information", Name=key, Value=json.dumps(names, ensure_ascii=False))
         series = ElementTree.SubElement(domain, "Grid", Name=SERIES, GridType="Collection", CollectionType="Temporal")
         static, rest = self._static_elements(), np.asarray(motion.rest, np.float64)

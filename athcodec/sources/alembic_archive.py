@@ -205,7 +205,7 @@ class _Object(SceneObject):
 def _clip(archive: Any, options: ReadOptions) -> MotionClip:
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
-    own, kept = _own(archive)
+    own, kept = _kept(archive)
     not_read: dict[str, list[str]] = {}
     objects = _together(_find(archive, options.only, not_read))
     times, rate = _times(archive, objects, options.fps)
@@ -547,8 +547,8 @@ def _is_own(schema: Any) -> bool:
     return _own_properties(schema) is not None
 
 
-def _own(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
-    """The metadata, JSON, and further arrays, that our writer has kept."""
+def _kept(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
+    """Return the metadata as JSON, and further arrays, that athcodec's writer has kept."""
     top = archive.getTop()
     if top.getNumChildren() != 1:
         return None, []

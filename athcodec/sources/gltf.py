@@ -658,7 +658,7 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     scene, keys = motion.scene, motion.scene.keys
     if not len(keys):
         return Sampling(DEFAULT_FPS, np.zeros(1), {})
-    said = _said(scene)
+    said = _stated_extras(scene)
     fps = wanted or _said_rate(said, keys) or key_rate(keys)
     if fps is None:
         fps = DEFAULT_FPS
@@ -680,7 +680,7 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     return Sampling(float(fps), _on_keys(times, keys, fps), clock, is_loop)
 
 
-def _said(scene: Scene) -> dict[str, Any]:
+def _stated_extras(scene: Scene) -> dict[str, Any]:
     """Return the extras: those of the file, overridden by those of the animation."""
     items = [scene.file.json["asset"]]
     if len(scene.played) == 1:

@@ -810,7 +810,7 @@ def _statics(obj: _Prim, codes: np.ndarray, matrix: np.ndarray) -> None:
             obj.left_out.append(primvar.GetPrimvarName())
         elif primvar.HasValue():
             values = _value(primvar, codes[0])
-            name = _said(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
+            name = _custom_text(primvar.GetAttr(), "name") or primvar.GetPrimvarName()
             _keep(obj, NAMES.get(name, name), values, primvar.GetInterpolation(), primvar)
     _rename_first_uv(obj)
     schema = UsdGeom.PointBased(obj.prim)
@@ -883,7 +883,7 @@ def _keep(obj: _Prim, name: str, values: Any, interpolation: str, primvar: UsdGe
     if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
-    said = None if primvar is None else _said(primvar.GetAttr(), "dtype")
+    said = None if primvar is None else _custom_text(primvar.GetAttr(), "dtype")
     if values is not None and said in WRITTEN_DTYPES:  # exporters/usd.py chose one that USD has
         values = values.astype(said)
     obj.keep(name, DOMAINS.get(interpolation), values)
@@ -906,7 +906,8 @@ def _is_guessed(attribute: Usd.Attribute) -> bool:
     return attribute.GetCustomDataByKey(f"{OWN}:{GUESSED}") is True
 
 
-def _said(attribute: Usd.Attribute, key: str) -> str | None:
+def _custom_text(attribute: Usd.Attribute, key: str) -> str | None:
+    """Return the text that athcodec's writer has kept with an attribute under a key, or None."""
     found = attribute.GetCustomDataByKey(f"{OWN}:{key}")
     return found if isinstance(found, str) else None
 
@@ -922,8 +923,8 @@ def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
     for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
         values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
         if isinstance(values, Vt.UCharArray):
-            name = _said(attribute, "name") or str(attribute.GetName())[len(OWN) + 1 :]
-            texts = (_said(attribute, key) or "" for key in ("dtype", "shape", "domain"))
+            name = _custom_text(attribute, "name") or str(attribute.GetName())[len(OWN) + 1 :]
+            texts = (_custom_text(attribute, key) or "" for key in ("dtype", "shape", "domain"))
             yield ArrayDescriptor(name, *texts), np.array(values).tobytes()
 
 
