@@ -207,6 +207,7 @@ def test_a_double_tap_fits_by_touch(opened_file, sample_ath):
 
 
 def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
+    page.locator("#level-choice button").last.click()
     page.click("#compare [data-value=levels]")
     assert page.evaluate("athcodecViewer.plants.length") == 2 and page.is_visible("#split")
     chips = [", ".join(text.split("\n")) for text in page.locator("#level-choice button").all_inner_texts()]
