@@ -207,6 +207,7 @@ def test_a_double_tap_fits_by_touch(opened_file, sample_ath):
 
 
 def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
+    page.locator("#level-choice button").last.click()
     page.click("#compare [data-value=levels]")
     assert page.evaluate("athcodecViewer.plants.length") == 2 and page.is_visible("#split")
     chips = [", ".join(text.split("\n")) for text in page.locator("#level-choice button").all_inner_texts()]
@@ -508,7 +509,8 @@ def test_a_dropped_file_of_another_program_is_named_with_the_command_that_encode
 @pytest.mark.parametrize("size", [(1000, 700), (390, 844)])
 def test_a_page_without_a_file_has_samples_that_move_and_a_field_for_an_address(opened, sample_ath, size):
     names = ("leafed_tree", "fern", "grass")
-    files = {f"sample/{name}.ath": athcodec.sample_path(name.partition("_")[0]).read_bytes() for name in names}
+    paths = [athcodec.sample_path(name.partition("_")[0]) for name in names]
+    files = {f"sample/{each.name}": each.read_bytes() for path in paths for each in (path, path.with_suffix(".webp"))}
     with ThrottledServer(files | {"tree.ath": sample_ath.read_bytes()}) as line:
         moves = "[...document.querySelectorAll('#samples ath-viewer')].every(({ currentTime }) => currentTime > 0.1)"
         page = opened(line.page(), moves, viewport=dict(zip(("width", "height"), size)))

@@ -37,7 +37,7 @@ SIZE = (640, 480)
 FRAMES_PER_SECOND = 15
 FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
 
-_STILL_QUALITY = 78
+_STILL_QUALITY, _MOVING_QUALITY = 78, 45  # of WebP
 _STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
 _TIMEOUT = 300_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
@@ -109,6 +109,7 @@ def save_picture(
     ]
     data = io.BytesIO()
     moving = {"save_all": True, "append_images": pictures[1:], "duration": round(1000 / fps), "loop": 0}
+    moving["quality"] = _MOVING_QUALITY
     pictures[0].save(data, FORMATS[kind], **({} if kind == "png" else moving))
     with new_file(out) as file:
         file.write(data.getvalue())
