@@ -11,12 +11,11 @@ import ast
 import io
 import re
 import struct
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -29,8 +28,7 @@ from athcodec import errors
 from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding.streams import streams, writing
-from spec import document
-from spec.document import TEXT, rules, section, table
+from spec.document import TAKEN_FOR_GRANTED, TEXT, code_of, rules, run, section, table
 from spec.dump import lines as dump_lines
 from spec.scripted import Script, write
 
@@ -137,6 +135,7 @@ def test_the_dump_is_that_of_a_vector_as_the_command_prints_it(spec):
         assert decoder.positions()[0, 2].tolist() == [float(x) for x in rows["as put out"].split(", ")]
 
 
+EXAMPLE = bytes.fromhex("ffd134")  # the stream of "Worked example"
 # What the table "A way for a first decoder" says works after a step, of a file that it names, by a decoder.
 WORKS: dict[int, Callable[[ModuleType, bytes], object]] = {
     2: lambda spec, data: spec.decode_temporal(data, 1, 3),
@@ -150,65 +149,88 @@ WORKS: dict[int, Callable[[ModuleType, bytes], object]] = {
 
 def test_no_step_of_the_way_for_a_first_decoder_needs_a_function_or_a_constant_of_a_later_one():
     """The code is run anew, so that no answer is kept and each function that is needed is called."""
-    spec, places = document.run(), places_of_names()
+    spec, definitions = run(), definitions_of_the_code()
     rows = {int(row["Step"]): row for row in table("A way for a first decoder", "Step")}
+    assert rows.keys() >= WORKS.keys()
     known: list[tuple[str, str, str]] = []
-    needed: dict[str, CodeType] = {}
-
-    def note(frame, event, _):
-        if event == "call" and frame.f_code.co_filename == str(FORMAT):
-            needed[name_at(places, frame.f_code.co_firstlineno)] = frame.f_code
-            needed.update((name, frame.f_code) for name in places.keys() & set(frame.f_code.co_names) - functions)
-
-    functions = {name for name in places if callable(getattr(spec, name))}
     for step, row in sorted(rows.items()):
         known += re.findall(r"\[([^\]]+)\]\(#[^)]*\)(?: (up to|without) `(\w+)`)?", row["Sections"])
         vectors = re.findall(r"`(\S+)\.ath`", row["What works then"])
         assert bool(vectors) == (step in {3, 5, 6, 8})
-        needed.clear()
-        sys.setprofile(note)
-        try:
-            for data in [(VALID / f"{name}.ath").read_bytes() for name in vectors] or [b"\xff\xd1\x34"]:
+        with calls_noted(spec, definitions) as called:
+            for data in [(VALID / f"{name}.ath").read_bytes() for name in vectors] or [EXAMPLE]:
                 WORKS.get(step, lambda *_: None)(spec, data)
-        finally:
-            sys.setprofile(None)
-        assert (step in WORKS) == bool(needed)
-        assert {name for name in needed if not stands_in(places, known, name)} == set(), f"step {step}"
+        needed = called.union(*(definitions[name].constants for name in called))
+        assert bool(needed) == (step in WORKS)
+        assert {name for name in needed if not is_in(definitions, known, name)} == set(), f"step {step}"
 
 
-def places_of_names() -> dict[str, tuple[int, int, str]]:
-    """First and last line, and section, of each function, class and constant of the code."""
+@dataclass(frozen=True)
+class Definition:
+    """A function, class or constant of the code: where it stands, and which constants it names."""
+
+    section: str
+    last_line: int
+    constants: frozenset[str]
+
+
+def definitions_of_the_code() -> dict[str, Definition]:
     headings = [(i, line.lstrip("# ")) for i, line in enumerate(text_without_code().splitlines(), 1) if line[:1] == "#"]
-    places = {}
-    for node in document.code_of(TEXT).body:
-        title = [title for at, title in headings if at <= node.lineno][-1]
-        targets = [node.name] if hasattr(node, "name") else [name.id for name in ast.walk(node) if is_target(name)]
-        places.update((name, (node.lineno, node.end_lineno, title)) for name in targets)
-    return places
+    nodes = {}
+    for node in code_of(TEXT).body:
+        names = [node.name] if hasattr(node, "name") else [name.id for name in ast.walk(node) if is_target(name)]
+        nodes |= dict.fromkeys(names, node)
+    constants = {name for name, node in nodes.items() if not hasattr(node, "name")}
+    return {
+        name: Definition(
+            [title for at, title in headings if at <= node.lineno][-1],
+            node.end_lineno,
+            frozenset(constants & {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} - {name}),
+        )
+        for name, node in nodes.items()
+    }
 
 
 def is_target(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
 
 
-def name_at(places: dict, line: int) -> str:
-    return next(name for name, (first, last, _) in places.items() if first <= line <= last)
+@contextmanager
+def calls_noted(spec: ModuleType, names: Iterable[str]) -> Iterator[set[str]]:
+    """Put the names of functions and classes that are called into the set, each at its first call."""
+    called: set[str] = set()
+    originals = {name: getattr(spec, name) for name in names if callable(getattr(spec, name))}
+
+    def noting(name: str) -> Callable:
+        def first_call(*arguments, **fields):
+            called.add(name)
+            setattr(spec, name, originals[name])
+            return originals[name](*arguments, **fields)
+
+        return first_call
+
+    vars(spec).update({name: noting(name) for name in originals})
+    try:
+        yield called
+    finally:
+        vars(spec).update(originals)
 
 
-def stands_in(places: dict, sections: list[tuple[str, str, str]], name: str) -> bool:
-    """Whether a function or constant stands in one of these sections, or parts of them."""
-    _, last, title = places[name]
-    of_section = [(word, function) for section, word, function in sections if section == title]
+def is_in(definitions: dict[str, Definition], sections: list[tuple[str, str, str]], name: str) -> bool:
+    """Whether it stands in one of these sections: in all, up to a function, or without a function."""
+    parts = [(word, function) for section, word, function in sections if section == definitions[name].section]
     return any(
-        not word or (word == "up to" and last <= places[function][1]) or (word == "without" and name != function)
-        for word, function in of_section
+        not word
+        or (word == "up to" and definitions[name].last_line <= definitions[function].last_line)
+        or (word == "without" and name != function)
+        for word, function in parts
     )
 
 
 def test_no_variable_of_the_code_has_the_name_of_a_function():
-    tree = document.code_of(TEXT)
+    tree = code_of(TEXT)
     functions = {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
-    functions |= document.TAKEN_FOR_GRANTED.keys()
+    functions |= TAKEN_FOR_GRANTED.keys()
     variables = {node.id for node in ast.walk(tree) if is_target(node)}
     variables |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
     assert len(functions) > 200 and len(variables) > 200 and functions & variables == set()
