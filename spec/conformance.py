@@ -64,7 +64,8 @@ APPROXIMATE = "valid/real-size-*"  # Vectors whose positions an approximate deco
 LISTING = """\
 Vectors of the .ath format. A line is: the file, the CRC-32C of its bytes, ITEM=RESULT for each item, then # and the
 reason. RESULT is ok, the name of an error, or the CRC-32C (FORMAT.md, "Checksums") of these bytes, little-endian,
-one after the other and nothing between them:
+one after the other and nothing between them. The limits are those of the full profile (FORMAT.md, "Limits"). The host's
+mesh of NAME.ath is NAME.mesh beside it, N times x, y, z in binary32; without that file no mesh is given. The items:
 0, 1, ...  the positions of that level: for each frame of all clips, in their order, repeats included, for each vertex
            in source order x, y, z: binary64 where Is_Float64 is set, else binary32; every NaN is the quiet one
            (0x7fc00000 or 0x7ff8000000000000)

@@ -144,13 +144,18 @@ class Divisions(ast.NodeTransformer):
         return node
 
 
-def run(text: str = TEXT) -> types.ModuleType:
-    """Return a module in which all blocks have been executed; line numbers are those of the text."""
+def code_of(text: str) -> ast.Module:
+    """Parse all blocks; line numbers are those of the text."""
     lines, is_code = [], False
     for line in text.splitlines():
         is_code = line == "```python" or (is_code and line != "```")
         lines.append(line if is_code and line != "```python" else "")
-    tree = ast.fix_missing_locations(Divisions().visit(ast.parse("\n".join(lines), str(FORMAT))))
+    return ast.parse("\n".join(lines), str(FORMAT))
+
+
+def run(text: str = TEXT) -> types.ModuleType:
+    """Return a module in which all blocks have been executed; line numbers are those of the text."""
+    tree = ast.fix_missing_locations(Divisions().visit(code_of(text)))
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -188,10 +193,10 @@ class File:
     """An opened file. What is wrong with it is `Invalid` of the rules, when it is opened or asked."""
 
     def __init__(self, data: bytes, strict: bool = False, mesh: bytes | None = None, rules: types.ModuleType = rules):
-        self.rules, self.mesh, self.file = rules, mesh, rules.open_file(bytes(data), strict)
+        self.rules, self.file = rules, rules.open_file(bytes(data), strict)
         self.header, self.chunks = self.file.header, self.file.chunks
         if mesh is not None and self.file.is_host:
-            self.file.rest.rest = rules.host_rest(self.file, mesh)
+            rules.take_host_mesh(self.file, mesh)
 
     def content(self, kind: int, level: int | None = None, segment: int = 0) -> bytes:
         return self.rules.content(self.chunks, kind, level, segment)
@@ -214,44 +219,11 @@ class File:
 
     def rest(self, level: int = 0) -> np.ndarray:
         """(vertices, 3) of Rest_Type in source order: the rest pose, as a level's reference pose gives it."""
-        file, rules = self.file, self.rules
-        number, origin = np.dtype("<f8" if file.rest_is_float64 else "<f4"), np.array(file.origin)
-        rules.require(file.rest.rest is not None, "NEEDS_HOST_MESH")
-        if file.is_host:
-            points = np.frombuffer(self.mesh, number).reshape(-1, 3) + np.float32(0)  # 0.0 for -0.0
-            return points[file.vertex_source][file.vertex_of]
-        level = self.header.stages[level]
-        plans = rules.plans_of(file, min(level, file.lossy_stages - 1))
-        method = self.content(rules.REST)[0]
-        if (rules.SOURCE_REST, None, 0) in self.chunks:
-            points, is_exact = rules.source_rest(file, plans), self.content(rules.SOURCE_REST)[0] == 1
-        elif is_exact := method & 1:
-            points = file.rest.positions
-        else:
-            points = file.rest.rest if level == 0 else plans[-1].rest
-        with np.errstate(all="ignore"):
-            shown = np.array(points, float) if is_exact else np.array(points, float) + origin
-            out = np.empty(shown.shape, number)
-            out[:] = shown.astype(number)
-        return out[file.vertex_of]
+        return np.array(self.rules.rest_pose(self.file, level), "<f8" if self.file.rest_is_float64 else "<f4")
 
     def arrays(self) -> list[bytes]:
         """Elements of FACES, of EDGES and of all attributes."""
-        arrays, of_faces, rules = [], {}, self.rules
-        for kind in (rules.FACES, rules.EDGES):
-            if (kind, None, 0) not in self.chunks:
-                continue
-            shape, stream = rules.parse_polygons(self.content(kind), kind)
-            if shape.is_derived:
-                arrays.append(elements(rules.derived_edges(self.file, shape.index_type), shape.index_type))
-                continue
-            counts, corners = rules.decode_polygons(stream, shape, self.file.places)
-            if shape.count_type is None:
-                arrays.append(elements(corners, shape.index_type))
-            else:
-                of_faces["face_vertex_counts"] = elements(counts, shape.count_type)
-                of_faces["face_vertex_indices"] = elements(corners, shape.index_type)
-        return arrays + list(rules.read_attributes(self.file, of_faces).values())
+        return self.rules.read_static(self.file)[1]
 
     def answer(self, item: str) -> bytes:
         """The answer to an item of conformance.py."""
@@ -263,14 +235,8 @@ class File:
             return b"".join(clip_entry(clip) for clip in self.file.clips)
         if item != "static":
             return (self.rest() if item == "rest" else self.positions(int(item))).tobytes()
-        arrays, metadata = self.arrays(), (self.rules.METADATA, None, 0)
-        text = self.rules.parse_metadata(self.content(*metadata)) if metadata in self.chunks else b""
-        return b"".join([text, *arrays])
-
-
-def elements(numbers: list, code: int) -> bytes:
-    """Integers of Index_Type or Count_Type."""
-    return np.array(numbers, f"<{'i' if code & 4 else 'u'}{1 << (code & 3)}").tobytes()
+        text, arrays = self.rules.read_static(self.file)
+        return b"".join([text or b"", *arrays])
 
 
 def clip_entry(clip) -> bytes:

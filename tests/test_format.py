@@ -7,13 +7,13 @@ around it. Claims about limits, names and offsets are read from the document's t
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import struct
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -28,7 +28,7 @@ from athcodec import errors
 from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding.streams import streams, writing
-from spec.document import TEXT, File, rules, section, table
+from spec.document import TAKEN_FOR_GRANTED, TEXT, code_of, rules, run, section, table
 from spec.dump import lines as dump_lines
 from spec.scripted import Script, write
 
@@ -87,8 +87,11 @@ def test_field_tables_have_the_offsets_and_types_of_the_code(title, form):
     assert [(int(row["Offset"]), int(row["Size"]), row["Type"]) for row in rows] == expected
 
 
-def test_magic_is_that_of_the_code():
-    assert bytes.fromhex(table("Header", "Offset")[0]["Range"]) == container.MAGIC
+def test_magic_and_version_are_those_of_the_code(spec):
+    rows = {row["Field"]: row["Range"] for row in table("Header", "Offset")}
+    version = rows["Major_Version"], rows["Minor_Version"].partition(",")[0]
+    assert bytes.fromhex(rows["Magic"]) == spec.MAGIC == container.MAGIC
+    assert tuple(map(int, version)) == spec.VERSION
 
 
 def test_chunk_kinds_are_those_of_the_code():
@@ -132,31 +135,105 @@ def test_the_dump_is_that_of_a_vector_as_the_command_prints_it(spec):
         assert decoder.positions()[0, 2].tolist() == [float(x) for x in rows["as put out"].split(", ")]
 
 
-def sections_of_the_first_decoder() -> set[str]:
-    rows = table("A way for a first decoder", "Step")
-    return {name for row in rows for name in re.findall(r"\[(.+?)\]\(#", row["Sections"])}
+EXAMPLE = bytes.fromhex("ffd134")  # the stream of "Worked example"
+# What the table "A way for a first decoder" says works after a step, of a file that it names, by a decoder.
+WORKS: dict[int, Callable[[ModuleType, bytes], object]] = {
+    2: lambda spec, data: spec.decode_temporal(data, 1, 3),
+    3: lambda spec, data: spec.read_front(data),
+    5: lambda spec, data: spec.open_file(data, True),
+    6: lambda spec, data: spec.rest_pose(spec.open_file(data), 0),
+    7: lambda spec, data: (straight_plan(spec), spec.waves_over_time(4, False), spec.node_waves_over_time(4, False)),
+    8: lambda spec, data: (traced(spec), spec.decode(data, spec.read_front(data)[0].level_count - 1)),
+}
 
 
-def test_the_way_for_a_first_decoder_has_all_that_its_vectors_need():
-    """No function outside of the sections that it names is called for a vector that it names."""
+def test_no_step_of_the_way_for_a_first_decoder_needs_a_function_or_a_constant_of_a_later_one():
+    """The code is run anew, so that no answer is kept and each function that is needed is called."""
+    spec, definitions = run(), definitions_of_the_code()
+    rows = {int(row["Step"]): row for row in table("A way for a first decoder", "Step")}
+    assert rows.keys() >= WORKS.keys()
+    known: list[tuple[str, str, str]] = []
+    for step, row in sorted(rows.items()):
+        known += re.findall(r"\[([^\]]+)\]\(#[^)]*\)(?: (up to|without) `(\w+)`)?", row["Sections"])
+        vectors = re.findall(r"`(\S+)\.ath`", row["What works then"])
+        assert bool(vectors) == (step in {3, 5, 6, 8})
+        with calls_noted(spec, definitions) as called:
+            for data in [(VALID / f"{name}.ath").read_bytes() for name in vectors] or [EXAMPLE]:
+                WORKS.get(step, lambda *_: None)(spec, data)
+        needed = called.union(*(definitions[name].constants for name in called))
+        assert bool(needed) == (step in WORKS)
+        assert {name for name in needed if not is_in(definitions, known, name)} == set(), f"step {step}"
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A function, class or constant of the code: where it stands, and which constants it names."""
+
+    section: str
+    last_line: int
+    constants: frozenset[str]
+
+
+def definitions_of_the_code() -> dict[str, Definition]:
     headings = [(i, line.lstrip("# ")) for i, line in enumerate(text_without_code().splitlines(), 1) if line[:1] == "#"]
-    names = {name for row in table("A way for a first decoder", "Step") for name in re.findall(r"(\S+)\.ath", str(row))}
-    called: set[int] = set()
+    nodes = {}
+    for node in code_of(TEXT).body:
+        names = [node.name] if hasattr(node, "name") else [name.id for name in ast.walk(node) if is_target(name)]
+        nodes |= dict.fromkeys(names, node)
+    constants = {name for name, node in nodes.items() if not hasattr(node, "name")}
+    return {
+        name: Definition(
+            [title for at, title in headings if at <= node.lineno][-1],
+            node.end_lineno,
+            frozenset(constants & {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} - {name}),
+        )
+        for name, node in nodes.items()
+    }
 
-    def note(frame, event, _):
-        if event == "call" and frame.f_code.co_filename == str(FORMAT):
-            called.add(frame.f_code.co_firstlineno)
 
-    for name in sorted(name.strip("`") for name in names):
-        data = (VALID / f"{name}.ath").read_bytes()
-        sys.setprofile(note)
-        try:
-            file = File(data)
-            file.positions(file.header.level_count - 1)
-        finally:
-            sys.setprofile(None)
-    used = {[title for at, title in headings if at <= line][-1] for line in called}
-    assert len(names) > 6 and len(called) > 100 and used - sections_of_the_first_decoder() == set()
+def is_target(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+
+
+@contextmanager
+def calls_noted(spec: ModuleType, names: Iterable[str]) -> Iterator[set[str]]:
+    """Put the names of functions and classes that are called into the set, each at its first call."""
+    called: set[str] = set()
+    originals = {name: getattr(spec, name) for name in names if callable(getattr(spec, name))}
+
+    def noting(name: str) -> Callable:
+        def first_call(*arguments, **fields):
+            called.add(name)
+            setattr(spec, name, originals[name])
+            return originals[name](*arguments, **fields)
+
+        return first_call
+
+    vars(spec).update({name: noting(name) for name in originals})
+    try:
+        yield called
+    finally:
+        vars(spec).update(originals)
+
+
+def is_in(definitions: dict[str, Definition], sections: list[tuple[str, str, str]], name: str) -> bool:
+    """Whether it stands in one of these sections: in all, up to a function, or without a function."""
+    parts = [(word, function) for section, word, function in sections if section == definitions[name].section]
+    return any(
+        not word
+        or (word == "up to" and definitions[name].last_line <= definitions[function].last_line)
+        or (word == "without" and name != function)
+        for word, function in parts
+    )
+
+
+def test_no_variable_of_the_code_has_the_name_of_a_function():
+    tree = code_of(TEXT)
+    functions = {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    functions |= TAKEN_FOR_GRANTED.keys()
+    variables = {node.id for node in ast.walk(tree) if is_target(node)}
+    variables |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    assert len(functions) > 200 and len(variables) > 200 and functions & variables == set()
 
 
 def test_every_section_stands_on_the_way_for_a_first_decoder_or_beside_the_feature_that_needs_it():
@@ -203,10 +280,15 @@ def test_worked_example_decodes_step_by_step(spec):
     assert streams.encode_temporal(np.array([values], np.int32)) == stream
 
 
+def straight_plan(spec) -> object:
+    """The plan of the stem of "A level traced"."""
+    branch = spec.Record(first=0, count=3, parent=-1, attach=-1, depth=0, subtree=1, flags=0, rigid=0, ring=0)
+    return spec.make_plan([branch], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
+
+
 def traced(spec) -> dict[str, list]:
     """What "A level traced" tells: each quantity by the document's own functions."""
-    branch = spec.Record(first=0, count=3, parent=-1, attach=-1, depth=0, subtree=1, flags=0, rigid=0, ring=0)
-    plan = spec.make_plan([branch], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])
+    plan = straight_plan(spec)
     (piece,) = plan.pieces
     motion = spec.no_motion(plan, 4, False)
     stream = spec.Record(step=0.25, rotation_step_factor=0.0, waves=motion.waves, root=-1)

@@ -38,6 +38,12 @@ def test_every_file_is_listed_once_and_has_not_changed():
         assert f"{container.crc32c(vector.path.read_bytes()):08x}" == vector.checksum, vector.name
 
 
+def test_the_listing_begins_with_what_its_lines_mean():
+    lines = (conformance.FOLDER / "expected.txt").read_text("utf-8").splitlines()
+    head = [line.removeprefix("# ") for line in lines if line.startswith("#")]
+    assert head == conformance.LISTING.splitlines()
+
+
 def test_there_are_over_eighty_vectors_in_less_than_a_megabyte():
     sizes = [vector.path.stat().st_size for vector in VECTORS]
     assert sum(vector.valid for vector in VECTORS) >= 40 and sum(not vector.valid for vector in VECTORS) >= 40
