@@ -120,14 +120,9 @@ class FileDecisions:
                 return self.decide(bound).shared_bytes, False
             ath = self.seen.ath(self.thresholds(bound))
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
-            unsearched = search.first_cost()
-            prediction = self._best_prediction(bound, unsearched, work)
-            if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.expected(frames_ratio), False
-            predicted = frames_ratio * prediction.bytes, True
-            if prediction.bytes < SEARCH_SAVES * unsearched:
-                return predicted
-            return min((search.tried(frames_ratio), False), predicted)
+            expected = search.expected(frames_ratio), False
+            prediction = self._best_prediction(bound, search.first_cost(), work)
+            return expected if prediction is None else min(expected, (frames_ratio * prediction.bytes, True))
         except BoundError:
             return math.inf, False
 
@@ -200,6 +195,7 @@ class FileDecisions:
     def _searched(self, search: Search, share: float, work: Work) -> Decided:
         """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
         bound, unsearched = search.trials.start.bound, share * search.first_cost()
+        in_waves = share * search.cost_in_waves()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
             search.keep_work_of_maps()
@@ -208,7 +204,7 @@ class FileDecisions:
         prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < unsearched:
             with work.trying("transformed motion"):
-                if prediction.bytes < SEARCH_SAVES * unsearched or not work.fits(search.trials.work_of_trial):
+                if prediction.bytes < SEARCH_SAVES * in_waves or not work.fits(search.trials.work_of_trial):
                     return self._predicted(prediction.choice)
         try:
             choices, prelude = search.decide()

@@ -19,6 +19,7 @@ from athcodec.motion.algebra import decompose, determinant
 
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
+FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
 
 FRAMES = 12  # Frames of a segment by which it is known that plants turn.
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
@@ -65,16 +66,21 @@ def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) 
 
 def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
-    few tracks only in frames that do not turn."""
+    few tracks only in frames that do not turn. Where time bases make a file far smaller than waves do, they stay, so
+    that the choices that follow are made in them, and take less work."""
     if trials.without(Feature.STILL):
         return settings
     in_waves, *in_bases = turned_over(settings, trials)
     if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
         return settings
-    tried = [settings, in_waves]
-    if trials.work.fits(2 * trials.work_of_trial):  # One time basis alone would win against waves.
-        tried += [*learned_bases.candidates(settings, trials)[:1], *in_bases[:1]]
-    return replace(settings, still=trials.cheapest(tried).still)
+    in_waves, tried = trials.cheapest([settings, in_waves]), [settings, in_waves]
+    turns = any(settings.rotation_step_factors)  # Such tracks are no sums of a few shapes.
+    if not turns and trials.work.fits(2 * trials.work_of_trial):
+        tried += in_bases
+        if not in_waves.still:  # One time basis alone would win against waves.
+            tried += learned_bases.candidates(settings, trials)[:1]
+    best = trials.cheapest(tried)
+    return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(settings, still=best.still)
 
 
 def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
