@@ -195,7 +195,6 @@ class FileDecisions:
     def _searched(self, search: Search, share: float, work: Work) -> Decided:
         """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
         bound, unsearched = search.trials.start.bound, share * search.first_cost()
-        in_waves = share * search.cost_in_waves()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
             search.keep_work_of_maps()
@@ -204,7 +203,7 @@ class FileDecisions:
         prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < unsearched:
             with work.trying("transformed motion"):
-                if prediction.bytes < SEARCH_SAVES * in_waves or not work.fits(search.trials.work_of_trial):
+                if prediction.bytes < SEARCH_SAVES * unsearched or not work.fits(search.trials.work_of_trial):
                     return self._predicted(prediction.choice)
         try:
             choices, prelude = search.decide()

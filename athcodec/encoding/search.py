@@ -186,11 +186,6 @@ class Search:
         search = self.of_sample or self
         return search.trials.cost(search.at_first_move)
 
-    def cost_in_waves(self) -> float:
-        """Return the bytes of a whole file at the settings that the search starts with."""
-        trials = (self.of_sample or self).trials
-        return trials.cost(trials.start)
-
     @property
     def cost_of_best(self) -> float:
         """Bytes of a file of one layer."""
@@ -201,8 +196,8 @@ class Search:
         """Return about the bytes of a file of so many times the frames, by the choice that saves most: whatever is
         compared takes the same few trials, so that the order in which that is done does not matter."""
         search = self.of_sample or self
-        share = 1.0 if any(search.at_first_move.learned_bases) else SEARCHED_SHARE
-        return search._cost_of_frames(search.at_first_move, share * frames_ratio)
+        first = rotations.first_move(search.trials.start, search.trials)
+        return search._cost_of_frames(first, SEARCHED_SHARE * frames_ratio)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()

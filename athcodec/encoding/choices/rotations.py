@@ -68,19 +68,29 @@ def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
     few tracks only in frames that do not turn. Where time bases make a file far smaller than waves do, they stay, so
     that the choices that follow are made in them, and take less work."""
-    if trials.without(Feature.STILL):
-        return settings
-    in_waves, *in_bases = turned_over(settings, trials)
-    if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
-        return settings
-    in_waves, tried = trials.cheapest([settings, in_waves]), [settings, in_waves]
+    best, in_waves = first_move(settings, trials), trials.cheapest(_in_waves(settings, trials))
+    return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(in_waves, still=best.still)
+
+
+def first_move(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the cheapest of both kinds of branches and of waves and time bases: on short work the
+    rest of a search does less than this."""
+    in_waves = trials.cheapest(tried := _in_waves(settings, trials))
     turns = any(settings.rotation_step_factors)  # Such tracks are no sums of a few shapes.
     if not turns and trials.work.fits(2 * trials.work_of_trial):
-        tried += in_bases
+        tried += learned_bases.candidates(replace(settings, still=True), trials) if tried[1:] else []
         if not in_waves.still:  # One time basis alone would win against waves.
             tried += learned_bases.candidates(settings, trials)[:1]
-    best = trials.cheapest(tried)
-    return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(settings, still=best.still)
+    return trials.cheapest(tried)
+
+
+def _in_waves(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings and, unless they are hopeless, those with the other kind of branches, in waves."""
+    if trials.without(Feature.STILL):
+        return [settings]
+    other = replace(settings, still=not settings.still, learned_pieces=None).in_waves()
+    hopeless = trials.costs([other])[0] > HOPELESS_STILL * trials.cost(settings)
+    return [settings] if hopeless else [settings, other]
 
 
 def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
