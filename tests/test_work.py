@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plants import plant
+from plants import plant, turns
 
 import athcodec
 from athcodec import MotionClip
 from athcodec.encoding import progress
+from athcodec.encoding.choices import learned_bases
 from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.search import Search
 from bench import odd
 
 
@@ -70,16 +72,48 @@ def test_branches_that_are_not_tried_are_named(tmp_path, monkeypatch):
     allow(0.05, monkeypatch)
     assert "branches" in athcodec.encode(sheet(), tmp_path / "a.ath").untried
 
-
-def test_time_bases_of_motion_that_sums_a_few_shapes_are_learned_where_work_is_short():
+def summed_shapes(turns_by: float = 0.0) -> MotionClip:
+    """Cards that move by a few shapes, and may turn as a whole besides."""
     rng, cards = np.random.default_rng(1), 60
     rest = np.repeat(rng.normal(size=(cards, 3)), 6, axis=0) + 0.05 * rng.normal(size=(6 * cards, 3))
     weights = 0.06 * np.cumsum(rng.normal(size=(120, 3)), axis=0)
     moved = rest + np.tensordot(weights, rng.normal(size=(3, 6 * cards, 3)), 1)
+    angles = np.linspace(0.0, turns_by, 120)[:, None] * np.array([0.0, 1.0, 0.0])
+    moved = np.einsum("tij,tvj->tvi", turns(angles), moved)
     branches = np.repeat(np.arange(cards), 6), np.minimum(np.arange(cards), 1) - 1
-    clip = MotionClip(moved, np.arange(120) / 30, *branches)
+    return MotionClip(moved, np.arange(120) / 30, *branches, rest=rest)
+
+
+def test_time_bases_of_motion_that_sums_a_few_shapes_are_learned_where_work_is_short():
+    clip = summed_shapes()
     in_waves, learned = (athcodec.encode(clip, effort=effort, ladder="none") for effort in ("fast", "default"))
     assert len(learned) < 0.75 * len(in_waves)
+
+
+def test_what_turns_as_a_whole_and_sums_a_few_shapes_has_time_bases_where_work_is_short(monkeypatch):
+    clip = summed_shapes(turns_by=1.5)
+    whole = athcodec.encode(clip, ladder="none", rel_error=1e-4)
+    allow(0.15, monkeypatch)
+    short = athcodec.encode(clip, ladder="none", rel_error=1e-4)
+    assert len(short) < 1.1 * len(whole)
+
+
+def test_time_bases_that_pay_stay_where_work_ends(monkeypatch):
+    """Each level's basis, and waves where these are shorter, is one more trial, which may no longer fit."""
+    ends = []
+
+    def ended(search: Search) -> None:
+        trials, known = search.trials, search.trials.start.in_learned_bases()
+        least = min(trials.costs([trials.start, known, *learned_bases.candidates(trials.start, trials)]))
+        trials.work.allowed = trials.work.done
+        ends.append(trials.cost(learned_bases.best_bases(known, trials)) / least)
+        raise RuntimeError
+
+    monkeypatch.setattr(Search, "decide", ended)
+    for seed in range(3):
+        with pytest.raises(RuntimeError):
+            athcodec.encode(plant(seed, branches=20, frames=40, rough=1e-4), ladder="none", rel_error=1e-4)
+    assert max(ends) <= 1.0
 
 
 @pytest.mark.parametrize("share", [0.001, 0.1])
