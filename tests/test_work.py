@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plants import plant
+from plants import plant, turns
 
 import athcodec
 from athcodec import MotionClip
 from athcodec.encoding.decisions import FileDecisions
+from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import progress
+from athcodec.encoding.search.choices import learned_bases
+from athcodec.encoding.search.search import Search
+from athcodec.encoding.search.trials import Trials
 from bench import odd
 
 
@@ -71,15 +75,48 @@ def test_branches_that_are_not_tried_are_named(tmp_path, monkeypatch):
     assert "branches" in athcodec.encode(sheet(), tmp_path / "a.ath").untried
 
 
-def test_time_bases_of_motion_that_sums_a_few_shapes_are_learned_where_work_is_short():
+def summed_shapes(turns_by: float = 0.0) -> MotionClip:
+    """Cards that move by a few shapes, and may turn as a whole besides."""
     rng, cards = np.random.default_rng(1), 60
     rest = np.repeat(rng.normal(size=(cards, 3)), 6, axis=0) + 0.05 * rng.normal(size=(6 * cards, 3))
     weights = 0.06 * np.cumsum(rng.normal(size=(120, 3)), axis=0)
     moved = rest + np.tensordot(weights, rng.normal(size=(3, 6 * cards, 3)), 1)
+    angles = np.linspace(0.0, turns_by, 120)[:, None] * np.array([0.0, 1.0, 0.0])
+    moved = np.einsum("tij,tvj->tvi", turns(angles), moved)
     branches = np.repeat(np.arange(cards), 6), np.minimum(np.arange(cards), 1) - 1
-    clip = MotionClip(moved, np.arange(120) / 30, *branches)
+    return MotionClip(moved, np.arange(120) / 30, *branches, rest=rest)
+
+
+def test_time_bases_of_motion_that_sums_a_few_shapes_are_learned_where_work_is_short():
+    clip = summed_shapes()
     in_waves, learned = (athcodec.encode(clip, effort=effort, ladder="none") for effort in ("fast", "default"))
     assert len(learned) < 0.75 * len(in_waves)
+
+
+def test_what_turns_as_a_whole_and_sums_a_few_shapes_has_time_bases_where_work_is_short(monkeypatch):
+    """Each shape, seen from where it does not turn, is at most three."""
+    allow(0.1, monkeypatch)
+    standing, turning = (len(athcodec.encode(summed_shapes(by), ladder="none", rel_error=1e-4)) for by in (0.0, 1.5))
+    assert turning < 3 * standing
+
+
+def test_time_bases_that_pay_stay_where_work_ends(monkeypatch):
+    """Waves at the levels where these are shorter are one more trial, which may no longer fit."""
+    costs = []
+
+    def ended(search: Search) -> None:
+        trials, start = search.trials, search.trials.start
+        costs.extend(trials.costs([start, start.in_learned_bases()]))
+        trials.work.allowed = trials.work.done
+        costs.append(trials.cost(learned_bases.best_bases(start.in_learned_bases(), trials)))
+        raise InterruptedError
+
+    monkeypatch.setattr(Trials, "without", lambda _, feature: feature is Feature.COMMON_BASIS)
+    monkeypatch.setattr(Search, "decide", ended)
+    with pytest.raises(InterruptedError):
+        athcodec.encode(summed_shapes(), ladder="none", rel_error=1e-4)
+    waves, learned, chosen = costs
+    assert chosen <= learned < waves
 
 
 @pytest.mark.parametrize("share", [0.001, 0.1])

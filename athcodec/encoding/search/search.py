@@ -136,7 +136,7 @@ class Search:
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
             other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
-            search = other if other.first_cost() <= search.first_cost() else search
+            search = other if other.first_cost() <= search.first_cost() else search  # What turns slowly is a sum, too.
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -182,9 +182,9 @@ class Search:
         self.trials.work.allowed -= work_of_steps((self.of_sample or self).trials)
 
     def first_cost(self) -> float:
-        """Return the bytes of a whole file at the settings that the search starts with."""
-        trials = (self.of_sample or self).trials
-        return trials.cost(trials.start)
+        """Return the bytes of a whole file at the settings that the search starts with, or with time bases."""
+        search = self.of_sample or self
+        return search.trials.cost(search.at_first_move)
 
     @property
     def cost_of_best(self) -> float:
@@ -192,17 +192,12 @@ class Search:
         search = self.of_sample or self
         return search.trials.cost(search.best)
 
-    def tried(self, frames_ratio: float) -> float:
-        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
-        search = self.of_sample or self
-        return search._cost_of_frames(search.at_best_step, frames_ratio)
-
     def expected(self, frames_ratio: float) -> float:
-        """Return about the same from the settings that the search starts with, without searching."""
+        """Return about the bytes of a file of so many times the frames, by the choice that saves most: whatever is
+        compared takes the same few trials, so that the order in which that is done does not matter."""
         search = self.of_sample or self
-        trials = search.trials
-        start = trials.cheapest([trials.start, *rotations.turned_over(trials.start, trials)[:1]])
-        return search._cost_of_frames(start, SEARCHED_SHARE * frames_ratio)
+        first = rotations.first_move(search.trials.start, search.trials)
+        return search._cost_of_frames(first, SEARCHED_SHARE * frames_ratio)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
@@ -232,6 +227,13 @@ class Search:
             first = self.first_layer()
         self.trials.work.finish()
         return first, candidates
+
+    @cached_property
+    def at_first_move(self) -> Settings:
+        """The settings that the search starts with, or with time bases where these are far smaller."""
+        if self.effort == "fast":
+            return self.trials.start
+        return rotations.still_if_smaller(self.trials.start, self.trials)
 
     @cached_property
     def at_first_step(self) -> Settings:

@@ -33,7 +33,8 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
         return trials.cheapest([settings, waves, each, *common])
     shorter = trials.level_costs(each) < trials.level_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
-    best = trials.cheapest([waves, each if each.common_basis else mixed, *common])
+    mixes = [each] if each.common_basis else [each, mixed]
+    best = trials.cheapest([settings, waves, *mixes, *common])
     if best is not waves or not shorter.any() or not trials.work.fits(2 * trials.work_of_trial):
         return best
     return trials.cheapest([best, replace(each, step=single(FINER * each.step))])  # They may lose by their step alone.

@@ -131,7 +131,9 @@ def best_prediction(
                 return None
     except BoundError:
         return None
-    found = best(1.0, math.inf)
+    found = best(1.0, most_bytes)
+    if found.bytes > HOPELESS * most_bytes:
+        return None
     if found.twitches and smoothness != "bytes":
         relative = source.smallest_bound(bound) / source.seen.diagonal
         most = min(most_bytes, SMOOTHNESS[smoothness] * found.bytes)

@@ -19,6 +19,7 @@ from athcodec.motion.algebra import decompose, determinant
 
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
+FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
 
 FRAMES = 12  # Frames of a segment by which it is known that plants turn.
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
@@ -65,16 +66,31 @@ def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) 
 
 def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
-    few tracks only in frames that do not turn."""
+    few tracks only in frames that do not turn. Where time bases make a file far smaller than waves do, they stay, so
+    that the choices that follow are made in them, and take less work."""
+    best, in_waves = first_move(settings, trials), trials.cheapest(_in_waves(settings, trials))
+    return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(in_waves, still=best.still)
+
+
+def first_move(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with the cheapest of both kinds of branches and of waves and time bases: on short work the
+    rest of a search does less than this."""
+    in_waves = trials.cheapest(tried := _in_waves(settings, trials))
+    turns = any(settings.rotation_step_factors)  # Such tracks are no sums of a few shapes.
+    if not turns and trials.work.fits(2 * trials.work_of_trial):
+        tried += learned_bases.candidates(replace(settings, still=True), trials) if tried[1:] else []
+        if not in_waves.still:  # One time basis alone would win against waves.
+            tried += learned_bases.candidates(settings, trials)[:1]
+    return trials.cheapest(tried)
+
+
+def _in_waves(settings: Settings, trials: Trials) -> list[Settings]:
+    """Return the settings and, unless they are hopeless, those with the other kind of branches, in waves."""
     if trials.without(Feature.STILL):
-        return settings
-    in_waves, *in_bases = turned_over(settings, trials)
-    if trials.costs([in_waves])[0] > HOPELESS_STILL * trials.cost(settings):
-        return settings
-    tried = [settings, in_waves]
-    if trials.work.fits(2 * trials.work_of_trial):  # One time basis alone would win against waves.
-        tried += [*learned_bases.candidates(settings, trials)[:1], *in_bases[:1]]
-    return replace(settings, still=trials.cheapest(tried).still)
+        return [settings]
+    other = replace(settings, still=not settings.still, learned_pieces=None).in_waves()
+    hopeless = trials.costs([other])[0] > HOPELESS_STILL * trials.cost(settings)
+    return [settings] if hopeless else [settings, other]
 
 
 def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
