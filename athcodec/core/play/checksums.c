@@ -1,5 +1,5 @@
 /* The first phase: checksums of the chunks that a preparation needs, in slices. */
-#include "play/work.h"
+#include "play/checksums.h"
 
 enum { CHECKSUM_STEP = 1 << 16 };
 

@@ -1,5 +1,5 @@
 /* Corrections of a piece that is placed, and the exact numbers of its vertices. */
-#include "play/work.h"
+#include "play/correct.h"
 
 static void correct(ath_segment *segment, size_t at, double parts, double step)
 {

@@ -1,5 +1,5 @@
 /* The second phase: heads of chunks and learned time bases, stage by stage. Streams are ready to be read then. */
-#include "play/work.h"
+#include "play/heads.h"
 
 static ath_bytes bytes_of(const ath_chunk *chunk)
 {

@@ -1,8 +1,9 @@
 /* The last phase: pieces and nodes, one after the other. A piece is placed as soon as its integers are decoded, so that
  * only attach caches are kept. */
-#include "play/work.h"
+#include "play/pieces.h"
 #include "model/foresee.h"
 #include "model/maps.h"
+#include "play/correct.h"
 #include "play/store.h"
 
 static void clear_row(int32_t *row, int32_t frames, int32_t *count)

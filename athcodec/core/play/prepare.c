@@ -2,9 +2,16 @@
  * (heads.c), predicted frames or pieces (pieces.c, correct.c). If the segment is joined to the one before it, the end of
  * that one is prepared first, in the same memory. */
 #include "play/prepare.h"
-#include "play/work.h"
+#include "play/checksums.h"
+#include "play/correct.h"
+#include "play/heads.h"
+#include "play/pieces.h"
 
 /* ---- start ---- */
+
+void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
+const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
+int32_t ath_watched_level(const ath_work *work) { return ath_level_of(&work->file->header, work->asked.stage); }
 
 static int32_t steps_of(const ath_file *file, int32_t segment, int32_t stage)
 {

@@ -1,6 +1,5 @@
 /* The memory of a preparation and of its segment, and what all phases ask of it. */
 #include "play/work.h"
-#include "play/prepare.h"
 
 static void carve_stems(ath_work *work, const ath_file *file, int32_t d, int32_t frames, ath_arena *arena)
 {
@@ -138,10 +137,6 @@ int ath_keep(ath_work *work, void *memory, size_t memory_bytes)
     work->asked.keeping = work->keeping;
     return ATH_OK;
 }
-
-void ath_watch(ath_work *work, ath_watcher *watcher) { work->asked.watcher = watcher; }
-const ath_file *ath_watched_file(const ath_work *work) { return work->file; }
-int32_t ath_watched_level(const ath_work *work) { return ath_level_of(&work->file->header, work->asked.stage); }
 
 /* The observer follows the segment asked for, not the one before it. */
 ath_watcher *ath_watcher_of(const ath_work *work) { return work->only_end ? 0 : work->asked.watcher; }

@@ -153,30 +153,4 @@ int ath_blame(ath_work *work, const ath_chunk *chunk, int result);
 
 void ath_next_phase(ath_work *work, prepare_phase phase);
 
-/* ---- checksums.c ---- */
-
-int32_t ath_checksum_steps(const ath_chunk *chunk);
-/* Returns the kind of chunk whose checksum comes next at a stage. */
-int32_t ath_kind_after(int32_t kind);
-/* Return the chunk that the next step looks at, or null, and how many of its bytes. */
-const ath_chunk *ath_chunk_to_check(const ath_work *work);
-uint32_t ath_size_to_check(const ath_work *work, const ath_chunk *chunk);
-int ath_check_some(ath_work *work);
-
-/* ---- heads.c ---- */
-
-/* Opens the streams of the next stage and, behind the last one, those that have no stage. */
-int ath_open_stage(ath_work *work);
-
-/* ---- correct.c ---- */
-
-/* Correct a piece at its exact vertices, and replace the positions of the last lossy stage by the source's own. */
-void ath_correct_piece(ath_work *work, const ath_piece *piece);
-int ath_make_exact(ath_work *work, const ath_piece *piece);
-
-/* ---- pieces.c ---- */
-
-/* Prepares the next piece, and the node that begins with it. */
-int ath_do_piece(ath_work *work);
-
 #endif

@@ -136,7 +136,7 @@ class Search:
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
             other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
-            search = other if other.first_cost() <= search.first_cost() else search  # What turns slowly is a sum, too.
+            search = other if other.first_cost() <= search.first_cost() else search  # Shapes that turn sum a few, too.
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)

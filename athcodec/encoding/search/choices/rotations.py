@@ -73,8 +73,8 @@ def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
 
 
 def first_move(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with the cheapest of both kinds of branches and of waves and time bases: on short work the
-    rest of a search does less than this."""
+    """Return the cheapest of settings in waves and in time bases, on both kinds of branches: where work is short, no
+    other choice saves as much."""
     in_waves = trials.cheapest(tried := _in_waves(settings, trials))
     turns = any(settings.rotation_step_factors)  # Such tracks are no sums of a few shapes.
     if not turns and trials.work.fits(2 * trials.work_of_trial):
