@@ -300,8 +300,8 @@ def stages_without_end() -> bytes:
 
 
 invalid(
-    "cut-behind-damaged-stems TRUNCATED 1: STEMS of level 1 is damaged and AFFINES, which is decoded later, is missing: "
-    "what is missing comes first",
+    "cut-behind-damaged-stems TRUNCATED 1: STEMS of level 1 is damaged and AFFINES, which is decoded later, is "
+    "missing: what is missing comes first",
     damaged_before_cut,
 )
 invalid(
