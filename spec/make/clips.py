@@ -279,3 +279,7 @@ valid(
     "clips-long-segments: 512 frames in two segments, of which all but two are repeats",
     lambda: lone(clips=(Clip(512, 2, "long"),), repeats=(0, *(1,) * 255) * 2),
 )
+invalid(
+    "clips-flags-5-of-loop: bit 2 of Clip_Flags is set, of a loop of one segment, as a periodic clip is",
+    lambda: lone_clips(3, 1, clip_entry(3, 1, "loop", (0.0, 0.0), flags=5)),
+)

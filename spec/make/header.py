@@ -280,3 +280,31 @@ invalid(
     "front-range BAD_CHECKSUM: amid Max_Error the range is just 2^32, twice, which is not less: what is wrong is CLIPS",
     lambda: of_range(7 << 57),
 )
+
+
+def damaged_before_cut() -> bytes:
+    """STEMS of level 1 is damaged, and AFFINES behind it is missing."""
+    draft = moving([Stem(-1, 3), Stem(0, 3, 2), Stem(1, 2, 1)], 302).draft()
+    return cut(lambda d: end_of(d, AFFINES, 1) - 1, draft.change(STEMS, 1, checksum=0))
+
+
+def stages_without_end() -> bytes:
+    """A front stream that ends where stages are left out: all decisions behind it are 1."""
+
+    def stages(data: bytes) -> None:
+        coder = rules.RangeDecoder(data)
+        rules.decode_stages(coder, rules.decode_counts(coder).full_level_count)
+
+    max_error = map(int, f"{rules.to_bits(1.0, 64):063b}")
+    return write(stages, [0, 0, 0, 0, 1, *[0] * 6, *max_error, *[1] * 32], lowest=True)
+
+
+invalid(
+    "cut-behind-damaged-stems TRUNCATED 1: STEMS of level 1 is damaged and AFFINES, which is decoded later, is "
+    "missing: what is missing comes first",
+    damaged_before_cut,
+)
+invalid(
+    "header-stages-without-end BAD_HEADER: stages are left out up to the end of the front stream and beyond",
+    lambda: front_stream(lambda _: stages_without_end()),
+)

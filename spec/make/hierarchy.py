@@ -133,3 +133,14 @@ invalid(
         [replace(s, flags=WHOLE if b == 0 else 0) for b, s in enumerate(chain(4097))], points=[[0.0] * 3] * 4097
     ).upto(0),
 )
+for name_, reason_, stems_ in (  # Streams that go on behind what is refused, as if nothing were wrong.
+    ("lag-65536", "Lag 65536", "-1 3, 0 2 1 lag=65536"),
+    ("ring-1", "Ring 1", "-1 3, 0 2 1 SHEET ring=1"),
+    ("ring-of-beam", "a branch that is no SHEET has a Ring", "-1 3, 0 2 1 ring=2"),
+    ("root-loose", "a root is LOOSE", "-1 3 LOOSE, 0 2 1"),
+    ("attach-before", "an attach vertex before the parent's stem", "-1 2, -1 2, 1 2 -1"),
+):
+    invalid(
+        f"hierarchy-{name_}-in-whole-stream: {reason_}, in a stream that is whole",
+        lambda stems_=stems_: not_refused(lambda: still(stems_of(stems_)).draft()),
+    )

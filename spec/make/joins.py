@@ -1,5 +1,7 @@
 """Joins of segments."""
 
+from itertools import product
+
 from spec.make.base import *
 from spec.make.clips import loop
 from spec.make.predicted import ROOTED, predicted, swayed
@@ -96,3 +98,26 @@ for title, make in {
     ),
 }.items():
     invalid(title, make)
+
+
+def apart(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
+    """The same, of segments that move in different ways."""
+    plant = joined(stems, seed, *widths, **fields)
+    plant.scripts = {}
+    for level, s in product(range(8), range(len(widths))):
+        plant.scripts[STEMS, level, s] = chance = seed + 100 * s + level
+        plant.scripts[AFFINES, level, s] = lambda chance=chance: Chance(chance + 50, large=4)
+    return plant
+
+
+valid(
+    "joins-clips-apart: the first segment of a loop of two goes on from the loop's last one, not from the clip before, "
+    "and each moves in its own way",
+    lambda: apart(
+        FORK,
+        3000,
+        *(0, 2, 3.5, 3.5) * 3,
+        clips=(Clip(12, 2, "once"), loop(Clip(11, 2, "loop"), 0.0, 0.0, 0.0)),
+        is_float64=True,
+    ),
+)

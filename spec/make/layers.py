@@ -462,3 +462,46 @@ for title, make in {
 
 
 refinement(STEMS, "ratio-cut: STEMS of a refinement of 1 byte", b"\4")
+
+
+class Lasting(Chance):
+    """Rows of the first frequency alone."""
+
+    def answer(self, asked: str, most: int):
+        return min(1, most) if asked == "count" else super().answer(asked, most)
+
+
+valid(
+    "layers-shapes-of-first-piece: one of two pieces has shapes, in the first layer alone: predictions in the next are "
+    "of all its modes, and of the frequencies of the first",
+    lambda: Plant(
+        FORK,
+        frames=7,
+        layers=2,
+        heads={level: stems_head(0.5 / 4 ** max(level - 2, 0), 1) for level in range(5)},
+        scripts={
+            (SHAPES, 1, 0): [1, *row((1, 0, 2), (0, 5, 0), (3, 0, 4)), 0],
+            **{(STEMS, level): lambda level=level: Lasting(530 + level, large=7, empty=0.0) for level in range(3)},
+            (STEMS, 3): lambda: Chance(534, large=9, empty=0.0),
+        },
+    ),
+)
+valid(
+    "layers-rigid-turned-340: a branch that moves as it is, turned by up to 335 degrees one after the other, and "
+    "rotations that the next layer predicts from there: beyond 308 degrees they turn the other way",
+    lambda: Plant(
+        [Stem(-1, 4, rigid=1)],
+        frames=7,
+        layers=2,
+        is_float64=True,
+        rest=exact_rest([Stem(-1, 4)], [0.0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 5], True),
+        heads={
+            0: stems_head(8.0, 4 << 4, 2, 7, basis_stream([[8192 * (k == t) for t in range(7)] for k in range(7)])),
+            2: stems_head(0.25, 1),
+        },
+        scripts={
+            (STEMS, 0): [*row(), *row(*((0, 0, n) for n in (0, 7, 16, 31, 60, 88, 140)))],
+            (STEMS, 2): [0, 0, *refined_row((3, -5, 2))],
+        },
+    ),
+)

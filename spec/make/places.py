@@ -194,3 +194,7 @@ invalid(
         Entry(FACES, polygons(np.array([[127, 126, 125], [128, 1, 2]], "<i2"), [0] * 130).replace(b"\x05", b"\x04", 1))
     ),
 )
+valid(
+    "places-no-bytes: PLACES without a stream: its decisions are ones, and both vertices are at the one place",
+    lambda: split([Stem(-1, 1)], [0, 0], 710, columns=1),
+)

@@ -281,3 +281,36 @@ valid(
     predicted=predicted_head(1e-31),
     is_float64=True,
 )
+GROWING = [  # of both stems: how far the tip is off what is expected of it, which vertices follow, and how many do not
+    *(((-72, 1, 0), (4, 2, 0)), ((14, 3, 0), (2, 3, 0)), ((4, 3, 1), (4, 2, 0)), ((-6, 2, 0), (0, 3, 1))),
+    *(((12, 3, 2), (0, 3, 1)), ((20, 2, 0), (0, 3, 2)), ((0, 1, 0), (-10, 0, 3)), ((0, 3, 3), (12, 3, 3))),
+]
+
+
+def growing() -> Plant:
+    """Two stems whose tips go along them, from near their base to their end: the first one gets there earlier."""
+    stems, frames = [Stem(-1, 5)] * 2, []
+    for frame in GROWING:
+        values = [0, 1]
+        for move, mode, others in frame:
+            values += [0, *([1, move, 0, 0] if move else [0]), *([1] * mode + [0])[:3], *[0] * others]
+        frames.append(values)
+    points = [[10.0 * i, 40.0 * j, 0.0] for j in range(2) for i in range(5)]
+    return predicted(stems, frames, points=points, predicted=predicted_head(0.5))
+
+
+valid(
+    "predicted-growing: two tips that go along their stems at the same pace, until one is at its end: vertices follow "
+    "their tip in all ways, one after the other",
+    growing,
+)
+valid(
+    "predicted-tiny-plant: a plant of 2^-70, whose guesses are wrong by far less than 1",
+    lambda: predicted(
+        ROOTED,
+        swayed(6, 511, large=5, still=0.1),
+        rest=exact_rest(ROOTED, (2.0**-70 * np.array(grown(ROOTED, 511))).ravel().tolist(), True),
+        predicted=predicted_head(2.0**-74),
+        is_float64=True,
+    ),
+)

@@ -83,3 +83,20 @@ valid(
         },
     ),
 )
+valid(
+    "shapes-in-both-parts: a stream with the first shapes of two pieces and the further ones of a third, whose numbers "
+    "are expected about others",
+    lambda: Plant(
+        [Stem(-1, 6), Stem(0, 4, 5), Stem(1, 3, 3), Stem(0, 4, 3)],
+        2,
+        scripts={
+            (SHAPES, 1, 0): [1, *row((1, 2, 3)), 6, *(n for i in range(6) for n in row((i, 1, 0), (2, 0, -i)))],
+            (SHAPES, 2, 0): [
+                *(3, *row((1, 0, 0)), *row((0, 1, 2)), *row((0, 0, 3), (1, 1, 1))),
+                *(2, *row((4, 0, 1)), *row((0, -1, 0))),
+                *(4, *row((1, 0, 5)), *row((0, 2, 0)), *row((3, 3, 0)), *row((0, 0, 1), (0, 1, 0))),
+            ],
+            **{(STEMS, level): 48 + level for level in (1, 2, 3)},
+        },
+    ),
+)

@@ -89,3 +89,8 @@ valid(
     "there is",
     lambda: lone(time=b"\2"),
 )
+for what, value in (("zero", 0.0), ("negative", -1.0)):
+    invalid(
+        f"time-of-one-step-{what}: Step of a single frame, which needs none, is {value}",
+        lambda value=value: lone().change(TIME, content=steady_time(0.0, value)),
+    )

@@ -66,3 +66,18 @@ valid(
     "rigid-huge: rigid branches of 1e77 to 1e150: squares of their moments are infinite, and nothing is reduced",
     lambda: of_any_size(250, 257, 258, 259, 260, 300, 400, 500),
 )
+valid(
+    "tubes-of-three-in-binary64: a tube of rings of three vertices, whose centres are rounded",
+    placed,
+    [Stem(-1, 9, flags=SHEET, ring=3)],
+    [[1000.1 * i + j, 1.3 * j - 70.7 * i * i, 0.4 * (j == 1) + 300.3 * i] for i in range(3) for j in range(3)],
+    134,
+    is_float64=True,
+)
+valid(
+    "rigid-in-a-plane: rigid branches whose inertia has one product, of the first axis and the last",
+    placed,
+    [Stem(-1, 2), Stem(0, 3, 1, rigid=1)],
+    [[0, 0, 0], [1, 0, 0], [3, 0, 1], [5, 0, 4], [6, 0, 9]],
+    135,
+)
