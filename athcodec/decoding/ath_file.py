@@ -114,7 +114,7 @@ class AthFile:
         gltf_motion: str | None = None,
     ):
         self._bytes = FileBytes(path, strict, limits, gltf_motion)
-        self.limits, self.core = self._bytes.limits, self._bytes.core
+        self.core = self._bytes.core
         self._place = _place_of(path)
         self._options = {"strict": strict, "allow_partial": allow_partial, "limits": limits, "gltf_motion": gltf_motion}
         info = self.core.info
@@ -144,6 +144,15 @@ class AthFile:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def limits(self) -> Limits:
+        """What decoding may take. Other limits hold from then on."""
+        return self._bytes.limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._bytes.limits = limits
 
     def __repr__(self) -> str:
         return (

@@ -22,7 +22,7 @@ class SegmentDecoder:
     """The segments of a file, which are decoded within the memory that its limits allow."""
 
     def __init__(self, file_bytes: FileBytes) -> None:
-        self._bytes, self._core, self._limits = file_bytes, file_bytes.core, file_bytes.limits
+        self._bytes, self._core = file_bytes, file_bytes.core
 
     @cached_property
     def _work(self) -> core_file.Work:
@@ -69,7 +69,7 @@ class SegmentDecoder:
         size = self._core.segment_size(level) if to is None else self._core.segment_size_to(segment, level)
         needed = self._checked_need(level, what)
         before = joined_to = None
-        if spare and needed + len(spare.memory) <= self._limits.memory_bytes:
+        if spare and needed + len(spare.memory) <= self._bytes.limits.memory_bytes:
             if self._core.goes_on(spare, segment, level):
                 before = spare
             elif self._core.is_ready(spare, self._core.joined_to(segment, level), level):
@@ -99,7 +99,7 @@ class SegmentDecoder:
 
     def _checked_need(self, level: int, what: str) -> int:
         """Return the bytes that preparing a segment takes. Raises LimitExceeded if they are not allowed."""
-        needed, limit = self._core.segment_size(level) + self._core.work_size(), self._limits.memory_bytes
+        needed, limit = self._core.segment_size(level) + self._core.work_size(), self._bytes.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"{what}: got a need of {needed} bytes; the limit is {limit}")
         return needed
@@ -110,7 +110,7 @@ class SegmentDecoder:
         The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
         """
         joined = any(self._core.joined_to(segment, level) >= 0 for segment in segments)
-        size, limit, needed = self._core.segment_size(level), self._limits.memory_bytes, self._checked_need(level, what)
+        size, limit, needed = self._core.segment_size(level), self._bytes.limits.memory_bytes, self._checked_need(level, what)
         follows = joined and needed + size <= limit
         room = limit // (needed + size if follows else needed)
         count = max(1, min(default_jobs(), len(segments) // (2 if joined else 1), room))
@@ -137,7 +137,7 @@ class SegmentDecoder:
 
     def _refine(self, level: int) -> None:
         """Build what the segments share at a level, whose bytes are there."""
-        needed, limit = self._core.refinement_size(level), self._limits.memory_bytes
+        needed, limit = self._core.refinement_size(level), self._bytes.limits.memory_bytes
         if needed > limit:
             raise LimitExceeded(f"level {level}: got layers of {needed} bytes; the limit is {limit}")
         self._core.refine(level)

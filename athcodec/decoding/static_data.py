@@ -31,7 +31,7 @@ class StaticData:
 
     def __init__(self, file_bytes: FileBytes, chunks: Chunks, tables: FileTables) -> None:
         self._bytes, self._chunks, self._tables = file_bytes, chunks, tables
-        self._core, self._limits = file_bytes.core, file_bytes.limits
+        self._core = file_bytes.core
         self._rest_read = -1, np.empty(0)  # The level that `rest_at` was last asked for, and its pose.
         self.host_mesh: np.ndarray | None = None  # Positions of the host's mesh that was set, (N, 3) float32.
         self.host_files: frozenset[tuple[int, int]] = frozenset()  # The files that the host's mesh was read from.
@@ -40,7 +40,7 @@ class StaticData:
     def metadata(self) -> dict[str, Any]:
         """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
         chunk = self._chunks.find(ct.METADATA)
-        return ct.parse_metadata(self._chunks.payload(chunk), self._limits) if chunk else {}
+        return ct.parse_metadata(self._chunks.payload(chunk), self._bytes.limits) if chunk else {}
 
     def private_chunks(self, name: str) -> list[bytes]:
         """Return the contents of private chunks of a name, in file order. Raises Truncated, BadChecksum."""
@@ -143,7 +143,7 @@ class StaticData:
         if chunk is None:
             return None
         with self._bytes.lock, self._bytes.fed([(chunk.offset, chunk.length)], str(chunk)):
-            return self._core.polygons(kind, self._limits.corners)
+            return self._core.polygons(kind, self._bytes.limits.corners)
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
@@ -153,16 +153,16 @@ class StaticData:
         for chunk in self._chunks.of_kind(ct.ATTRIBUTE):
             if not self._chunks.is_available(chunk):
                 continue
-            if len(result) >= self._limits.attributes:
-                raise LimitExceeded(f"{chunk}: got more than {self._limits.attributes} attributes")
-            name, array = ct.parse_array(self._chunks.payload(chunk), str(chunk), self._limits)
+            if len(result) >= self._bytes.limits.attributes:
+                raise LimitExceeded(f"{chunk}: got more than {self._bytes.limits.attributes} attributes")
+            name, array = ct.parse_array(self._chunks.payload(chunk), str(chunk), self._bytes.limits)
             if name in result:
                 raise BadChunk(f"{chunk}: got attribute {ct.brief(name)} twice")
             result[name] = array
             total = sum(array.nbytes for array in result.values())
-            if total > self._limits.memory_bytes:
+            if total > self._bytes.limits.memory_bytes:
                 raise LimitExceeded(
-                    f"{chunk}: got {total} bytes of attributes; the limit is {self._limits.memory_bytes}"
+                    f"{chunk}: got {total} bytes of attributes; the limit is {self._bytes.limits.memory_bytes}"
                 )
         return result
 

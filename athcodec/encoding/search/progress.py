@@ -99,7 +99,7 @@ class Work:
     def report(self) -> None:
         """Report what is tried, and how far the search has come."""
         words = f"{self._stage}: {self._choice}" if self._choice not in ("", self._stage) else self._stage
-        self._report(words, min(self.done / max(self.expected, 1.0), 0.99))
+        self._report(words, min(self.done / self.expected, 0.99) if self.expected else 0.0)
 
     def finish(self) -> None:
         """Report the end of the search."""
