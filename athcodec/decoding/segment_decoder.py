@@ -110,7 +110,11 @@ class SegmentDecoder:
         The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
         """
         joined = any(self._core.joined_to(segment, level) >= 0 for segment in segments)
-        size, limit, needed = self._core.segment_size(level), self._bytes.limits.memory_bytes, self._checked_need(level, what)
+        size, limit, needed = (
+            self._core.segment_size(level),
+            self._bytes.limits.memory_bytes,
+            self._checked_need(level, what),
+        )
         follows = joined and needed + size <= limit
         room = limit // (needed + size if follows else needed)
         count = max(1, min(default_jobs(), len(segments) // (2 if joined else 1), room))

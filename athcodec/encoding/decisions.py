@@ -128,9 +128,14 @@ class FileDecisions:
                 return self.decide(bound).shared_bytes, False
             ath = self.seen.ath(self.thresholds(bound))
             search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
-            expected = search.expected(frames_ratio), False
-            prediction = self._best_prediction(bound, search.first_cost(), work)
-            return expected if prediction is None else min(expected, (frames_ratio * prediction.bytes, True))
+            unsearched = search.first_cost()
+            prediction = self._best_prediction(bound, unsearched, work)
+            if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
+                return search.expected(frames_ratio), False
+            predicted = frames_ratio * prediction.bytes, True
+            if prediction.bytes < SEARCH_SAVES * unsearched:
+                return predicted
+            return min((search.tried(frames_ratio), False), predicted)
         except BoundError:
             return math.inf, False
 

@@ -19,12 +19,12 @@ static void copy_frames(const ath_segment *segment, uint8_t *to, const uint8_t *
 
 void ath_copy_vertices(const ath_file *file, ath_segment *segment, const ath_segment *from, size_t vertex, size_t count)
 {
-    copy_frames(from, ath_vertex_at(segment, segment->positions, 0, ath_position_of(file, segment, vertex)),
-                ath_vertex_at(from, from->positions, 0, ath_position_of(file, from, vertex)), (size_t)from->frames,
-                count);
+    void *to = ath_vertex_at(segment, segment->positions, 0, ath_position_of(file, segment, vertex));
+    const void *of = ath_vertex_at(from, from->positions, 0, ath_position_of(file, from, vertex));
+    copy_frames(from, (uint8_t *)to, (const uint8_t *)of, (size_t)from->frames, count);
     if (from->end)
-        copy_frames(from, ath_vertex_at(segment, segment->end, 0, vertex), ath_vertex_at(from, from->end, 0, vertex),
-                    ATH_END_FRAMES, count);
+        copy_frames(from, (uint8_t *)ath_vertex_at(segment, segment->end, 0, vertex),
+                    (const uint8_t *)ath_vertex_at(from, from->end, 0, vertex), ATH_END_FRAMES, count);
 }
 
 void ath_keep_end(ath_segment *segment, size_t position, size_t vertex, size_t count)

@@ -205,7 +205,9 @@ class Plan:
         if part in self._samples:
             return self._samples[part]
         pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
-        pieces = pieces[:: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))]  # Long ones begin in step.
+        pieces = pieces[
+            :: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))
+        ]  # Long ones begin in step.
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first

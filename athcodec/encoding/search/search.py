@@ -192,12 +192,18 @@ class Search:
         search = self.of_sample or self
         return search.trials.cost(search.best)
 
+    def tried(self, frames_ratio: float) -> float:
+        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
+        search = self.of_sample or self
+        return search._cost_of_frames(search.at_best_step, frames_ratio)
+
     def expected(self, frames_ratio: float) -> float:
         """Return about the bytes of a file of so many times the frames, by the choice that saves most: whatever is
         compared takes the same few trials, so that the order in which that is done does not matter."""
         search = self.of_sample or self
         first = rotations.first_move(search.trials.start, search.trials)
-        return search._cost_of_frames(first, SEARCHED_SHARE * frames_ratio)
+        share = 1.0 if any(first.learned_bases) else SEARCHED_SHARE  # A search saves less of what is in time bases.
+        return search._cost_of_frames(first, share * frames_ratio)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
