@@ -11,20 +11,21 @@ void ath_store_doubles(ath_segment *segment, const double origin[3], size_t posi
 }
 
 /* Copies `count` vertices in frames of as many vertices as the segment has. */
-static void copy_frames(const ath_segment *segment, uint8_t *to, const uint8_t *from, size_t frames, size_t count)
+static void copy_frames(const ath_segment *segment, void *to, const void *from, size_t frames, size_t count)
 {
     size_t number = ath_number_size(segment->is_float64), frame = 3 * (size_t)segment->exact_vertices * number;
-    for (size_t t = 0; t < frames; t++) memcpy(to + t * frame, from + t * frame, 3 * count * number);
+    for (size_t t = 0; t < frames; t++)
+        memcpy((uint8_t *)to + t * frame, (const uint8_t *)from + t * frame, 3 * count * number);
 }
 
 void ath_copy_vertices(const ath_file *file, ath_segment *segment, const ath_segment *from, size_t vertex, size_t count)
 {
     void *to = ath_vertex_at(segment, segment->positions, 0, ath_position_of(file, segment, vertex));
     const void *of = ath_vertex_at(from, from->positions, 0, ath_position_of(file, from, vertex));
-    copy_frames(from, (uint8_t *)to, (const uint8_t *)of, (size_t)from->frames, count);
+    copy_frames(from, to, of, (size_t)from->frames, count);
     if (from->end)
-        copy_frames(from, (uint8_t *)ath_vertex_at(segment, segment->end, 0, vertex),
-                    (const uint8_t *)ath_vertex_at(from, from->end, 0, vertex), ATH_END_FRAMES, count);
+        copy_frames(from, ath_vertex_at(segment, segment->end, 0, vertex), ath_vertex_at(from, from->end, 0, vertex),
+                    ATH_END_FRAMES, count);
 }
 
 void ath_keep_end(ath_segment *segment, size_t position, size_t vertex, size_t count)
