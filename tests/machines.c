@@ -121,7 +121,8 @@ static int read_rest(ath_file *file, const ath_info *info, uint32_t *crc)
 {
     size_t count = 3 * (size_t)info->vertex_count, size = info->rest_is_float64 ? 8 : 4;
     void *xyz = allocate(count * size);
-    int result = ath_read_rest(file, NULL);
+    int result = refine(file, 0); /* The rest pose is coded about the reference pose of the level. */
+    if (result == ATH_OK) result = ath_read_rest(file, NULL);
     if (result == ATH_OK && size == 8) result = ath_rest_float64(file, ATH_SOURCE_ORDER, xyz, 3 * size);
     if (result == ATH_OK && size == 4) result = ath_rest(file, ATH_SOURCE_ORDER, xyz, 3 * size);
     if (result == ATH_OK) *crc = checksum_of(0, xyz, count, size);
