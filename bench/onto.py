@@ -35,7 +35,8 @@ CANOPIES = ("canopy_15k_200f", "canopy_67k_200f")
 ARMATURE = "blender_armature_tree"
 SCAN, SCANNED = "scan", data.Canopy(40, 1, 40, 2.0, 8.0, 0, "broadleaf", seed=5)
 THICKER = 4.0  # Girth of the stems of the scanned tree, over those of the simulation, so that a grid resolves twigs.
-CELL, NOISE = 0.016, 0.0003  # Metres.
+CELL = 0.016  # Metres: the width of a cell of the scan's skin.
+NOISE = 0.0003  # Metres: the standard deviation of the scan's points.
 ON_MESH, SURFACE, COARSE_SIDES = "canopy_4k_on_its_mesh", "canopy_4k_60f", 4
 OTHERS = f"{ARMATURE}, {SCAN}, {ON_MESH}"
 TAIL = 0.999  # Quantile of edges whose stretch is stated.

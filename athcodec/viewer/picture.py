@@ -37,7 +37,8 @@ SIZE = (640, 480)
 FRAMES_PER_SECOND = 15
 FORMATS = {"png": "PNG", "gif": "GIF", "webp": "WEBP"}
 
-_STILL_QUALITY, _MOVING_QUALITY = 78, 45  # of WebP
+_STILL_QUALITY = 78  # Quality of WebP, from 0 to 100, of a still.
+_MOVING_QUALITY = 45  # The same of a moving picture, for fewer bytes.
 _STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
 _TIMEOUT = 300_000  # ms
 _WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"

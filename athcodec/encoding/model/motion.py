@@ -205,9 +205,8 @@ class Plan:
         if part in self._samples:
             return self._samples[part]
         pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
-        pieces = pieces[
-            :: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))
-        ]  # Long ones begin in step.
+        # Long pieces that all begin at the start of a period would all be in the sample.
+        pieces = pieces[:: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))]
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first

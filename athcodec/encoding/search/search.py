@@ -198,8 +198,8 @@ class Search:
         return search._cost_of_frames(search.at_best_step, frames_ratio)
 
     def expected(self, frames_ratio: float) -> float:
-        """Return about the bytes of a file of so many times the frames, by the choice that saves most: whatever is
-        compared takes the same few trials, so that the order in which that is done does not matter."""
+        """Return about the bytes of a file of so many times the frames, by the choice that saves most. All
+        that is compared so takes the same few trials, whatever work is left."""
         search = self.of_sample or self
         first = rotations.first_move(search.trials.start, search.trials)
         share = 1.0 if any(first.learned_bases) else SEARCHED_SHARE  # A search saves less of what is in time bases.

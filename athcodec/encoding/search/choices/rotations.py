@@ -88,16 +88,21 @@ def _in_waves(settings: Settings, trials: Trials) -> list[Settings]:
     """Return the settings and, unless they are hopeless, those with the other kind of branches, in waves."""
     if trials.without(Feature.STILL):
         return [settings]
-    other = replace(settings, still=not settings.still, learned_pieces=None).in_waves()
+    other = _other_kind(settings).in_waves()
     hopeless = trials.costs([other])[0] > HOPELESS_STILL * trials.cost(settings)
     return [settings] if hopeless else [settings, other]
+
+
+def _other_kind(settings: Settings) -> Settings:
+    """Return the settings with the other kind of branches, whose modes would have to be learned anew."""
+    return replace(settings, still=not settings.still, learned_pieces=None)
 
 
 def turned_over(settings: Settings, trials: Trials) -> list[Settings]:
     """Return the settings with the other kind of branches, in each time basis."""
     if trials.without(Feature.STILL):
         return []
-    other = replace(settings, still=not settings.still, learned_pieces=None)
+    other = _other_kind(settings)
     return [other.in_waves(), *learned_bases.candidates(other, trials)]
 
 
