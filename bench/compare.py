@@ -5,6 +5,7 @@ A codec's size at a bound is that of the smallest file that it makes within the 
 
 from __future__ import annotations
 
+import statistics
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
@@ -41,19 +42,25 @@ for that was not counted; none was given faces.
 OVERVIEW = {
     "sample": "finite-element tree in wind, the sample",
     "blender_armature_tree": "Blender: tree on keyed bones",
-    "blender_bent_grass": "Blender: grass displaced by clouds",
-    "shader_card_tree": "leaf cards that a vertex shader moves",
     "mujoco_cable_vine": "MuJoCo: vine of cables",
     "helios_bean_8d": "Helios: bean that grows",
-    "lsystem_tree": "L-system: tree that grows",
+    "helios_tomato_8d": "Helios: tomato that grows, held out",
+    "shader_card_sapling": "leaf cards that a vertex shader moves, held out",
 }
+SUITES_IN_WORDS = "files of other programs and clips that were held out"
+OVERVIEW_TOTALS = """
+In all, {compared} sizes were compared, of {clips} clips ({suites}), within 1e-3, 1e-4 and 1e-5 of the diagonal.
+athcodec is the smallest in {won}, and the smallest file of the others takes {ratio:.1f} times as many bytes in the
+median. Another codec is smaller in {lost}, by {less:.0f} % in the median and by {most:.0f} % at most.
+[Benchmarks](docs/benchmarks.md) has all of them, levels, speed and memory; below are some, chosen by hand, at 1e-4.
+"""
 OVERVIEW_CAPTION = """
-Bytes of files within 1e-4 of the diagonal of the bounding box of all frames. *With all arrays* is
-`athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a rest pose in which faces keep
-their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which is all that the other codecs
-keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of PCA, skeletal tracks, and
-differences with zstd, each tuned for the clip, and how many times as large as *positions* it is. Commits that measured
-athcodec / the best others: {} / {}{}.
+Bytes of files within 1e-4 of the diagonal of the bounding box of all frames. *Its file* is the source as its program
+wrote it. *With all arrays* is `athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a
+rest pose in which faces keep their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which
+is all that the other codecs keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of
+PCA, skeletal tracks, and differences with zstd, each tuned for the clip, and how many times as large as *positions* it
+is. Commits that measured athcodec / the best others: {} / {}{}.
 """
 
 
@@ -208,8 +215,34 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
     return "\n\n".join(parts) + "\n"
 
 
-def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
-    """A table of a few clips at 1e-4, below its options, for readers who want one table."""
+def totals_text(suites: Iterable[Mapping[str, Any]]) -> str:
+    """A sentence on all sizes of the suites: how many athcodec wins and loses, and by how much."""
+    clips, ratios = set(), []
+    for contents in suites:
+        for clip in contents["clips"]:
+            sizes = sizes_of(contents["points"], clip["clip"])
+            for bound in BOUNDS:
+                ours, best = sizes.get((Athcodec.name, bound)), best_other(sizes, bound)
+                if ours and best:
+                    clips.add(clip["clip"])
+                    ratios.append(best["bytes"] / ours["bytes"])
+    lost = [ratio for ratio in ratios if ratio < 1]
+    text = OVERVIEW_TOTALS.format(
+        compared=len(ratios),
+        clips=len(clips),
+        suites=SUITES_IN_WORDS,
+        won=len(ratios) - len(lost),
+        ratio=statistics.median(ratios),
+        lost=len(lost),
+        less=100 * (1 - statistics.median(lost)),
+        most=100 * (1 - min(lost)),
+    )
+    return " ".join(text.split())
+
+
+def overview_text(suites: Sequence[Mapping[str, Any]]) -> str:
+    """The totals of all suites but the first, which has the sample alone, and a table of a few clips at 1e-4, below its
+    options, for readers who want one table."""
     shown, points = [], ([], [])
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]
@@ -217,9 +250,11 @@ def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
             for own, more in zip(points, _shown(sizes_of(contents["points"], clip["clip"]), [WHOLE_BOUND])):
                 own += more
         for clip, row in zip(clips, rows(clips, contents["points"], [WHOLE_BOUND])):
-            sizes = {"float32": 12 * clip["frames"] * clip["vertices"], "with all arrays": row["all arrays"]}
+            sizes = {"float32": 12 * clip["frames"] * clip["vertices"], "its file": row["source"]}
+            sizes |= {"with all arrays": row["all arrays"]}
             sizes |= {"positions": row["ours 1e-4"], "best other": row["best other 1e-4"]}
             shown.append({"clip": OVERVIEW[clip["clip"]], "frames x vertices": row["frames x vertices"]} | sizes)
     made_by = [commits(some) for some in points]
     note = f", {IN_BRACKETS}" if "(" in "".join(made_by) else ""
-    return f"{' '.join(OVERVIEW_CAPTION.format(*made_by, note).split())}\n\n{markdown(shown)}"
+    caption = " ".join(OVERVIEW_CAPTION.format(*made_by, note).split())
+    return "\n\n".join([totals_text(suites[1:]), markdown(shown), caption])

@@ -38,7 +38,11 @@ def sections() -> Iterator[tuple[Path, str, str]]:
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
     if branches.RESULTS.exists():
         yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
-    yield README, "overview", compare.overview_text(read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign"))
+    yield (
+        README,
+        "overview",
+        compare.overview_text([read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign", "held-out")]),
+    )
     yield README, "picture", picture_text()
     yield from shown.sections()
 

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
-from bench import features, report
+from bench import compare, features, report
 from bench.store import read
 
 ROOT = Path(__file__).resolve().parent.parent
-
-pytestmark = pytest.mark.tools
 
 
 def test_the_tables_of_documents_are_those_of_the_stored_results():
@@ -40,3 +36,16 @@ def test_the_table_of_features_counts_the_makers_whose_clips_a_feature_serves():
     ]
     (row,) = features.summary(sizes)
     assert row["makers"] == 2 and row["most of"] == "`skfem_blade` at 0.001"
+
+
+def test_totals_count_sizes_won_and_lost_over_all_clips_and_bounds():
+    def point(clip, codec, kind, bound, size):
+        return {"clip": clip, "codec": codec, "kind": kind, "bound": bound, "bytes": size, "status": compare.OK}
+
+    ours, others = compare.Athcodec.name, [(1e-3, 300, 400), (1e-4, 250, 200), (1e-5, 80, 90)]
+    points = [point("fern", ours, compare.OURS, bound, 100) for bound in compare.BOUNDS]
+    points += [point("fern", f"other {i}", "plain", bound, row[i]) for bound, *row in others for i in range(2)]
+    suite = {"clips": [{"clip": "fern"}, {"clip": "not measured"}], "points": points}
+    text = compare.totals_text([suite])
+    assert "3 sizes were compared, of 1 clips" in text and "smallest in 2, " in text
+    assert "takes 2.0 times" in text and "smaller in 1, by 20 % in the median and by 20 % at most" in text
