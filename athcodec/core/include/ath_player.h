@@ -150,7 +150,7 @@ void ath_player_normals(const uint32_t *triangles, size_t count, const float *xy
                         float *normals);
 /* Computes the box of positions, least x, y, z and then largest x, y, z. It holds for what is shown now: compute it for
  * each frame, or join the boxes of levels and times. vertex_count: 1 or more. */
-void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float box[6]);
+void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float *box);
 /* Computes the tangents, along which u grows, at right angles to the normals. Each has four floats as in glTF: the
  * fourth, 1 or -1, times the cross product of normal and tangent is the bitangent. Vertices without triangles get
  * zeros. uv: two floats per vertex, `uv_stride` bytes apart. */
@@ -947,7 +947,7 @@ static const float *ath_player_at(const float *first, size_t stride, uint32_t in
     return (const float *)((const char *)first + stride * index);
 }
 
-void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float box[6])
+void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float *box)
 {
     for (int32_t i = 0; i < vertex_count; i++) {
         const float *at = ath_player_at(xyz, stride, (uint32_t)i);
