@@ -156,6 +156,7 @@ def page_blocks() -> list[str]:
     return re.findall(r"```js\n(.*?)```\n", (ROOT / "docs" / "engines.md").read_text("utf-8"), re.DOTALL)
 
 
+WARNS = 'process.on("warning", (warning) => { throw warning; });'
 LISTS = """
 import { readFileSync } from "node:fs";
 import { openPlant } from "./plant.js";
@@ -165,7 +166,7 @@ const plant = await openPlant(readFileSync(process.argv[2]));
 
 @pytest.mark.web
 def test_the_lines_of_the_page_list_the_levels_of_a_file_in_node(tmp_path):
-    lines = run(tmp_path, LISTS + page_blocks()[1], TREE).splitlines()
+    lines = run(tmp_path, WARNS + LISTS + page_blocks()[1], TREE).splitlines()
     with athcodec.open(TREE) as decoder:
         levels = decoder.file.levels
     assert len(lines) == len(levels)
