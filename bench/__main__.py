@@ -16,7 +16,7 @@ from bench import tables
 
 _NAMES = (
     "data rd report sample sizes features effort constants levels structure split branches",
-    "progressive speed memory decode picture viewer gallery wrappings onto",
+    "progressive speed memory decode picture viewer gallery wrappings onto engines",
 )
 VERBS = {name: import_module(f"bench.{name}") for name in " ".join(_NAMES).split()}
 

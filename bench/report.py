@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import branches, compare, features, rd, shown
+from bench import branches, compare, engines, features, rd, shown
 from bench.store import read
 from bench.tables import table
 
 README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
-FORMATS = rd.ROOT / "docs" / "formats.md"
+FORMATS, ENGINES = rd.ROOT / "docs" / "formats.md", rd.ROOT / "docs" / "engines.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,6 +43,8 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         "overview",
         compare.overview_text([read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign", "held-out")]),
     )
+    if engines.RESULTS.exists():
+        yield ENGINES, "engines", engines.table_text(read(engines.RESULTS))
     yield README, "picture", picture_text()
     yield from shown.sections()
 

@@ -42,6 +42,12 @@ def raylib_library() -> Path:
     return library
 
 
+def raylib_version() -> str:
+    """The version of the package that raylib_library is of."""
+    python = os.environ.get("ATHCODEC_RAYLIB") or _environment("raylib", "raylib-software")
+    return run_script(python, "from importlib.metadata import version; print(version('raylib-software'))").split()[-1]
+
+
 @cache
 def usd_plugin_python() -> str:
     """A Python that has USD and this repository's plugin for it, and never athcodec."""

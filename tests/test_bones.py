@@ -48,6 +48,7 @@ def test_one_file_moves_three_meshes_in_three_js_as_onto_does(bound, node):  # n
         expected = np.load(bound / f"lod{number}.npz")
         moved = expected["moved"]
         off = np.linalg.norm(np.fromfile(out, "<f4").reshape(moved.shape) - moved, axis=2)
+        assert facts["allocated"] < 2000, "bytes a pose: numbers alone"
         assert facts["bones"] == 30 and off.max() <= expected["max_error"] + 1e-5
         assert np.median(off) < 1e-3 * np.abs(moved[-1] - moved[0]).max()
 
@@ -60,7 +61,8 @@ def test_slices_of_surfaces_move_a_mesh_in_three_js_as_its_bones_say(tmp_path, n
         facts = moving.write_bound(tmp_path / "bound.glb")
         moved = np.asarray(moving)
     out = tmp_path / "out.bin"
-    node("bones.mjs", VIEWER, tmp_path / "tree.ath", tmp_path / "bound.glb", out)
+    printed = node("bones.mjs", VIEWER, tmp_path / "tree.ath", tmp_path / "bound.glb", out)
+    assert json.loads(printed.splitlines()[-1])["allocated"] < 2000, "bytes a pose: numbers alone"
     off = np.linalg.norm(np.fromfile(out, "<f4").reshape(moved.shape) - moved, axis=2)
     assert off.max() <= facts["max_error"] + 1e-5 < 1e-3 * np.abs(moved[-1] - moved[0]).max() + 1e-5
 

@@ -7,21 +7,25 @@ import re
 import subprocess
 import sysconfig
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 import pytest
 from files import Parts
 from fuzz.targets import CORE
 from PIL import Image
-from programs import printed, raylib_library
+from programs import printed, raylib_library, raylib_version
 
 import athcodec
 from athcodec.decoding import container as ct
+from bench import engines as measured
 
 pytestmark = pytest.mark.programs
 
 TREE = Path(athcodec.__file__).parent / "sample" / "leafed_tree.ath"
 HEADLESS = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
+# Checked, and quick to build, unless times are measured.
+BUILD, FLAGS = ("Release", "") if measured.is_recording() else ("Debug", "-fsanitize=undefined -O1")
 
 # raylib's wheel is a module of Python with all of raylib in it, so what it needs of Python is linked, too.
 RAYLIB = """
@@ -35,9 +39,9 @@ set_target_properties(raylib PROPERTIES
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory) -> Path:
-    """The decoder, installed; unoptimised, which is quick to build and has the same bits."""
+    """The decoder, installed; unoptimised, which has the same bits."""
     folder = tmp_path_factory.mktemp("install")
-    printed("cmake", "-S", CORE, "-B", folder / "build", "-DCMAKE_BUILD_TYPE=Debug", "-DATH_BUILD_EXAMPLES=OFF")
+    printed("cmake", "-S", CORE, "-B", folder / "build", f"-DCMAKE_BUILD_TYPE={BUILD}", "-DATH_BUILD_EXAMPLES=OFF")
     printed("cmake", "--build", folder / "build")
     printed("cmake", "--install", folder / "build", "--prefix", folder / "prefix")
     return folder / "prefix"
@@ -63,7 +67,7 @@ def player(installed, raylib, tmp_path_factory) -> Path:
     """The example, built by its CMakeLists.txt as a copy of it would be."""
     build = tmp_path_factory.mktemp("player")
     found = f"-DCMAKE_PREFIX_PATH={installed};{raylib}", f"-Draylib_DIR={raylib}"
-    printed("cmake", "-S", CORE / "examples", "-B", build, *found, "-DCMAKE_C_FLAGS=-fsanitize=undefined -O1")
+    printed("cmake", "-S", CORE / "examples", "-B", build, *found, f"-DCMAKE_BUILD_TYPE={BUILD}", f"-DCMAKE_C_FLAGS={FLAGS}")
     printed("cmake", "--build", build)
     return build / "raylib_player"
 
@@ -87,6 +91,15 @@ def test_raylib_draws_the_tree_at_the_level_of_its_distance_from_the_ranges_that
     assert len(trunk) < 60 and abs(trunk.mean() - 480) < 60, "the trunk stands in the middle"
     assert 0 < small.sum() < green.sum() / 100, "a distant tree is small"
     assert len(np.unique(pixels(near)[green], axis=0)) >= 2, "texture coordinates show both colours of the texture"
+    if measured.is_recording():
+        times = [(seconds(player, away, 70, far) - seconds(player, away, 10, far)) / 60 for away in (1.6, 60)]
+        measured.record("raylib", raylib_version(), *(1000 * time for time in times))
+
+
+def seconds(player: Path, distance: float, frames: int, picture: Path) -> float:
+    start = perf_counter()
+    played(player, TREE, distance, frames, picture)
+    return perf_counter() - start
 
 
 def pixels(picture: Path) -> np.ndarray:

@@ -18,6 +18,8 @@ import pytest
 from programs import CACHE, install_once, printed
 
 import athcodec
+from bench import engines as measured
+from bench.store import read
 from bench.throttled_server import ThrottledServer
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,10 +30,10 @@ NODE = Path(__file__).resolve().parent / "node"
 NEAR, FAR = 12.0, 90.0  # Metres at which the tree is shown at two levels.
 FRAMES = range(0, 40, 4)
 ESBUILD = "esbuild@0.28.2"
-NO_CODE = r"\s*(//|/\*|\*|import|using |#include|#define)"
 # Engines that a user of Babylon.js or PlayCanvas has, and those of a user of three.js.
 APPS = {"engines_page.mjs": "playcanvas@2.23.3 @babylonjs/core@9.35.0", "engines_three_page.mjs": "three@0.187.0"}
 ENGINES = {"playcanvas": "engines_page.mjs", "babylon": "engines_page.mjs", "three": "engines_three_page.mjs"}
+NAMES = {"playcanvas": "PlayCanvas", "babylon": "Babylon.js", "three": "three.js"}
 
 PLAY = """
 import { openPlant } from "./plant.js";
@@ -46,7 +48,7 @@ for (const at of seconds.map(Number)) {
     now = plant.update(at, view);
   }
   const positions = [...now?.positions ?? []], normals = [...(now?.normals ?? []).slice(0, 300)];
-  shown.push({ level: now?.level ?? -1, wanted, positions, normals });
+  shown.push({ level: now?.level ?? -1, wanted, positions, normals, bounds: now?.bounds });
 }
 const { failure, mesh, origin } = plant;
 console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [...mesh.source], origin,
@@ -118,6 +120,7 @@ def test_the_example_shows_what_python_decodes_and_fetches_what_its_level_takes(
         assert shown["level"] == shown["wanted"]
         wanted = decoded(shown["level"], frame)[result["source"]] - result["origin"]
         assert np.abs(np.reshape(shown["positions"], (-1, 3)) - wanted).max() < 1e-6 * np.abs(wanted).max()
+        assert np.allclose(np.reshape(shown["bounds"], (2, 3)), [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-5)
         assert np.allclose(np.linalg.norm(np.reshape(shown["normals"], (-1, 3)), axis=1), 1, atol=1e-5)
     with athcodec.open(TREE) as decoder:
         level = decoder.levels[result["shown"][0]["level"]]
@@ -153,6 +156,7 @@ def page_blocks() -> list[str]:
     return re.findall(r"```js\n(.*?)```\n", (ROOT / "docs" / "engines.md").read_text("utf-8"), re.DOTALL)
 
 
+WARNS = 'process.on("warning", (warning) => { throw warning; });'
 LISTS = """
 import { readFileSync } from "node:fs";
 import { openPlant } from "./plant.js";
@@ -162,7 +166,7 @@ const plant = await openPlant(readFileSync(process.argv[2]));
 
 @pytest.mark.web
 def test_the_lines_of_the_page_list_the_levels_of_a_file_in_node(tmp_path):
-    lines = run(tmp_path, LISTS + page_blocks()[1], TREE).splitlines()
+    lines = run(tmp_path, WARNS + LISTS + page_blocks()[1], TREE).splitlines()
     with athcodec.open(TREE) as decoder:
         levels = decoder.file.levels
     assert len(lines) == len(levels)
@@ -199,21 +203,22 @@ def test_the_lines_of_the_page_fade_from_level_to_level_over_boundaries_of_segme
     assert np.allclose(*ends, atol=1e-5 * np.abs(ends[0]).max())
 
 
+def version_of(engine: str) -> str:
+    """The version that npm installs for the tests of an engine."""
+    return re.search(rf"{engine}\S*?@(\S+)", APPS[ENGINES[engine]])[1]
+
+
 def test_the_page_shows_the_example_and_its_table_the_versions_and_lines():
     page = (ROOT / "docs" / "engines.md").read_text("utf-8")
-    section = page[page.index("## JavaScript") :]
     assert page_blocks()[0] == (EXAMPLES / "plant.js").read_text("utf-8")
     for path in ("viewer/examples/plant.js", "core/examples/Plant.cs", "core/examples/raylib_player.c"):
-        code = (VIEWER.parent / path).read_text("utf-8").splitlines()
-        lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
-        assert re.search(rf"\({re.escape(f'../athcodec/{path}')}\) \| {len(lines)} \|", page), path
-    for packages in APPS.values():
-        for package in packages.split():
-            name, version = package.rsplit("@", 1)
-            example = next(each for each in ENGINES if each in name)
-            code = (EXAMPLES / f"{example}.js").read_text("utf-8").splitlines()
-            lines = [line for line in code if line.strip() and not re.match(NO_CODE, line)]
-            assert re.search(rf"\| {version} \| \[{example}.js\][^|]*(\|[^|]*)?\| {len(lines)} \|", section), name
+        assert re.search(rf"\({re.escape(f'../athcodec/{path}')}\) \| {measured.lines_of(path)} \|", page), path
+    rows = {row["engine"]: row for row in read(measured.RESULTS)["engines"]}
+    assert rows.keys() == measured.EXAMPLES.keys()
+    for engine, row in rows.items():
+        assert row["lines"] == measured.lines_of(measured.EXAMPLES[engine][0]), engine
+    for engine, name in NAMES.items():
+        assert rows[name]["version"] == version_of(engine), name
 
 
 @pytest.mark.web
@@ -330,4 +335,4 @@ def test_an_engine_shows_the_shipped_tree_at_two_levels_as_python_decodes_it(eng
     shares = [(np.abs(picture - picture[0, 0]).max(axis=2) > 20).mean() for picture in pictures]
     assert 0.0005 < shares[0] < shares[1] / 4 and shares[1] > 0.05, "the tree is drawn, and larger from near"
     far, near = np.median(spent[:10]), np.median(spent[10:])
-    print(f"{engine}: {near:.1f} ms a frame at level {levels[1]}, {far:.1f} at level {levels[0]}")
+    measured.record(NAMES[engine], version_of(engine), near, far)

@@ -198,6 +198,38 @@ def test_every_instance_in_view_is_drawn_once_and_wind_of_no_strength_is_still(o
     assert np.array_equal(*still) and np.abs(blown[0] - blown[1]).max() > 0.01
 
 
+def test_a_plant_that_has_moved_far_from_its_place_is_drawn_where_it_is(opened, tmp_path):
+    """Whether clips are blended or not; and what is out of view is not drawn."""
+    clips = {}
+    for name, away in (("calm", 0.0), ("gale", 60.0)):
+        clip = bending_tube()
+        ramp = np.arange(len(clip.time), dtype=np.float32) / np.float32(len(clip.time) - 1)
+        moved = clip.positions + (ramp * np.float32(away))[:, None, None] * np.float32([1, 0, 0])
+        clips[name] = in_wind(clip.replace(positions=moved), 2.0 + away, 0.0)
+    path = tmp_path / "far.ath"
+    athcodec.encode(athcodec.join(clips), path, rel_error=1e-4)
+    page = opened(path, 1, "athcodecForest.forest.levels.length > 0")
+
+    def drawn(clip: str, x: float, strength: float | None = None) -> int:
+        return page.evaluate(
+            "async ([clip, x, strength]) => { const { forest, camera } = athcodecForest; forest.ease = 0;"
+            " forest.setInstances([{ x: 0, y: 0, z: 0, clip }]);"
+            " if (strength === null) forest.blend(null); else await forest.wind(strength);"
+            " camera.position.set(x, 0, 12); camera.lookAt(x, 0, 0); camera.updateMatrixWorld();"
+            " forest.sway(1);"
+            " const isWhole = () => forest.levels.length === athcodecForest.ath.motion.levelCount"
+            " && forest.levels.every(({ clips }) => clips.size === forest.clips.length);"
+            " for (let i = 0, whole = 0; i < 900 && whole < 3; i++, whole += isWhole()) {"
+            " forest.update(camera, 1e6, 0.9); await new Promise(requestAnimationFrame); }"
+            " return forest.drawn().then((counts) => counts.reduce((a, b) => a + b)); }",
+            [clip, x, strength],
+        )
+
+    last = 27 / 29  # of the way at 0.9 seconds
+    assert drawn("gale", 60 * last) == 1 and drawn("calm", 0) == 1 and drawn("gale", 30 * last, 32.0) == 1
+    assert drawn("calm", 60) == 0 and drawn("gale", -80) == 0
+
+
 def test_an_instance_of_no_amplitude_stands_still(opened, grove):
     from PIL import Image
 

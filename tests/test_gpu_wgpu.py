@@ -141,3 +141,62 @@ def test_the_shaders_show_what_the_decoder_does_through_another_compiler(files, 
             asked = [(file.segment_of(frame), file.gpu.coded_frame(frame)) for frame in frames]
             got = card.shown(file.gpu.level(level), segments, asked, weight)
             assert distance(got, blended(file, level, show)) <= tolerance, (level, show)
+
+
+VIEW = np.dtype(
+    [("planes", "f4", (6, 4)), ("eye", "f4", 3), ("pixel", "f4"), ("count", "u4"), ("shapes", "u4"), ("near", "f4")]
+    + [("room", "u4"), ("offset", "f4", 3), ("beyond", "f4"), ("rest", "f4"), ("headed", "u4"), ("none", "u4", 2)]
+)
+
+
+def chosen(card, vertices: np.ndarray, instances: np.ndarray, tolerances: list[float], **view: object) -> list[set[int]]:
+    """The instances that choose.wgsl appends to the list of each shape."""
+    module = card.device.create_shader_module(code=(SHADERS / "choose.wgsl").read_text("utf-8"))
+    count, shapes = len(instances), len(tolerances)
+    words = np.zeros(1, VIEW)
+    for name, value in {"count": count, "shapes": shapes, "room": count, **view}.items():
+        words[0][name] = value
+    shape = np.zeros(shapes, np.dtype([("tolerance", "f4"), ("list", "u4")]))
+    shape["tolerance"], shape["list"] = tolerances, np.arange(shapes)
+    buffers = [instances, None, shape, 5 * shapes, shapes * count, 1, vertices]
+    made = [card.buffer(each if isinstance(each, int) else each.view(np.uint32)) for each in buffers if each is not None]
+    made.insert(1, card.buffer(words.view(np.uint32), "UNIFORM"))
+    encoder = card.device.create_command_encoder()
+    work = encoder.begin_compute_pass()
+    for entry, bindings, groups in (("measure", [1, 5, 6], 3), ("main", [0, 1, 2, 3, 4, 5], -(-count // 64))):
+        compute = {"module": module, "entry_point": entry}
+        pipeline = card.device.create_compute_pipeline(layout="auto", compute=compute)
+        entries = [{"binding": each, "resource": {"buffer": made[each]}} for each in bindings]
+        layout = pipeline.get_bind_group_layout(0)
+        work.set_pipeline(pipeline)
+        work.set_bind_group(0, card.device.create_bind_group(layout=layout, entries=entries))
+        work.dispatch_workgroups(groups, 1, 1)
+    work.end()
+    card.device.queue.submit([encoder.finish()])
+    draws, lists = (np.frombuffer(card.device.queue.read_buffer(made[k]), np.uint32) for k in (3, 4))
+    return [set(lists[count * k :][: draws[5 * k + 1]].tolist()) for k in range(shapes)]
+
+
+@pytest.mark.parametrize("headed", [0, 1])
+def test_no_instance_that_is_in_view_is_left_out(card, headed):
+    """Each moves along the lines from its rest pose, which is about its place, far beyond it; in view is x > 10."""
+    rng = np.random.default_rng(3)
+    rest, away = rng.normal(size=(700, 3)), rng.normal(size=(700, 3)) * [4, 1, 1]
+    rest /= np.maximum(np.linalg.norm(rest, axis=1, keepdims=True), 1)
+    vertices = np.zeros((700, 9), np.float32)
+    vertices[:, :3] = rest + away - [5, 0, 0]  # as they are relative to an origin
+    instances = np.zeros((500, 12), np.float32)
+    instances[:, :3] = rng.uniform(-60, 20, (500, 3)) * [1, 0, 0]
+    instances[:, 3], instances[:, 8] = rng.uniform(0.5, 2, 500), rng.uniform(-2, 3, 500)  # size, amplitude
+    angle = rng.uniform(0, 2 * np.pi, 500) if headed else np.zeros(500)
+    turned = np.stack([away[None, :, 0] * np.cos(angle)[:, None] - away[None, :, 2] * np.sin(angle)[:, None]])[0]
+    x = instances[:, :1] + instances[:, 3:4] * (rest[None, :, 0] + instances[:, 8:9] * turned)
+    planes = np.zeros((6, 4))
+    planes[:, 0], planes[:, 3] = 1, -10
+    view = {"planes": planes, "eye": [10, 0, 0], "pixel": 0.1, "rest": 1.0, "offset": [5, 0, 0], "headed": headed}
+    lists = chosen(card, vertices, instances, [0.5, 2.0], **view)
+    drawn = lists[0] | lists[1]
+    assert not lists[0] & lists[1] and set(np.flatnonzero((x > 10).any(axis=1)).tolist()) <= drawn
+    assert len(drawn) < 500 and lists[0] and lists[1]
+    far = np.flatnonzero((np.abs(10 - instances[:, 0]) > 20 * instances[:, 3] + 1e-3)).tolist()
+    assert lists[1] == drawn & set(far), "the coarsest whose error is at most a tenth of the distance"

@@ -91,6 +91,20 @@ def test_a_seek_between_two_segments_of_which_one_is_not_here_does_not_stop_the_
     assert run_node("between", layered_ath) == []
 
 
+@pytest.mark.parametrize("cost", [0.7, 1.5, 4])
+def test_no_boundary_of_segments_shows_level_0_however_long_decoding_takes(cost, tmp_path):
+    """The deepest level of a segment takes `cost` times as long as the segment lasts."""
+    clip = plant(branches=60, longest=20, frames=240)
+    athcodec.encode(clip, tmp_path / "swaying.ath", rel_error=1e-3, effort="fast", segment_frames=40)
+    result = run_node("boundaries", tmp_path / "swaying.ath", cost, 1.5)
+    segments, levels = np.transpose(result["shown"])
+    first = np.argmax(levels > 0)
+    assert first < 30 and (levels[first:] > 0).all(), "half a second of level 0 at most, and never again"
+    assert set(segments[first:]) == set(range(6))
+    if cost < 0.8:  # The deepest level of each segment is decoded in time.
+        assert (levels[segments >= 3] == result["deepest"]).all()
+
+
 def test_what_was_asked_for_last_is_what_is_shown(layered_ath):
     assert run_node("overtaken", layered_ath) is True
 

@@ -263,11 +263,12 @@ def test_wind_is_one_weight_from_calm_to_gale_and_the_gale_comes_first(opened_fi
 def test_a_file_opens_with_the_story_of_how_it_comes(opened_file, windy, opened):
     """What has come beside all of it, unless somebody does anything; not where an address says what is seen."""
     with ThrottledServer({"tree.ath": windy}) as line:
-        page = opened(line.page("tree.ath", intro="on"), "globalThis.athcodecViewer?.state.intro")
-        words = "document.getElementById('split-left').textContent.startsWith('What has come')"
-        page.wait_for_function(f"() => {words}")
+        intro = "globalThis.athcodecViewer?.state.intro"
+        words = f"{intro} && document.getElementById('split-left').textContent.startsWith('What has come')"
+        small = {"viewport": {"width": 500, "height": 350}}  # The story takes six seconds, in software, too.
+        page = opened(line.page("tree.ath", intro="on"), words, **small)
         page.wait_for_function("() => athcodecViewer.plants.length === 1 && !athcodecViewer.state.intro")
-        page = opened(line.page("tree.ath", intro="on"), "globalThis.athcodecViewer?.state.intro")
+        page = opened(line.page("tree.ath", intro="on"), intro, **small)
         page.keyboard.press("c")
         assert page.evaluate("athcodecViewer.plants.length") == 1
         page = opened(line.page("tree.ath", intro="on") + "#colour=order")

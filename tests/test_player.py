@@ -696,6 +696,16 @@ def test_normals_of_decoded_positions_are_those_of_the_source_within_a_degree(li
     assert np.sqrt((angle**2).mean()) <= 1.0
 
 
+def test_bounds_are_the_box_of_what_is_shown(lib, sample_ath):
+    with athcodec.open(sample_ath) as file:
+        points, box = np.ascontiguousarray(file.positions(20)), np.zeros(6, np.float32)
+    for count in (len(points), 1):
+        spaced = np.full((count, 5), np.nan, np.float32)
+        spaced[:, :3] = points[:count]
+        lib.ath_player_bounds(spaced.ctypes, c_size_t(20), count, box.ctypes)
+        assert box.tolist() == [*points[:count].min(axis=0), *points[:count].max(axis=0)]
+
+
 def test_tangents_follow_u_at_right_angles_to_normals(lib):
     """A bent strip whose u runs along x, and one that is mirrored."""
     x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 4))

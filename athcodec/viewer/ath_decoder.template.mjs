@@ -163,9 +163,10 @@ class Core {
   }
 
   // A copy of a typed array, in memory.
+  // The Buffer of Node.js is a Uint8Array, but warns when it is made from memory.
   put(array) {
     const at = this.take(array.byteLength);
-    this.view(array.constructor, at, array.length).set(array);
+    this.view(array instanceof Uint8Array ? Uint8Array : array.constructor, at, array.length).set(array);
     return at;
   }
 

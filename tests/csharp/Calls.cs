@@ -46,10 +46,14 @@ static class Calls
             () => player.Positions(0, 0, AthWrap.Loop, 0, few), () => player.Positions(player.Clips.Length, 0, AthWrap.Loop, 0, xyz),
             () => player.Normals(few, xyz), () => player.Normals(xyz, few), () => player.LevelName(99), () => player.LevelError(-1),
             () => player.Ranges(0, 0, 99, new AthRange[1]), () => player.ReadyLevel(-1), () => player.LevelFor(1, 1, 1, 1, 9),
-            () => player.Tangents(xyz, few, xyz, xyz), () => player.WindPositions(new AthWind[0], 0, 0, 0, AthWrap.Loop, 0, xyz),
+            () => player.Tangents(xyz, few, xyz, xyz), () => player.Bounds(xyz, few), () => player.WindPositions(new AthWind[0], 0, 0, 0, AthWrap.Loop, 0, xyz),
             () => player.BlendedPositions(new AthShare[0], xyz), () => player.Feed(bytes, bytes.Length + 1, 0) };
         foreach (var call in calls) Console.WriteLine(Thrown(call));
         player.Positions(0, 0, AthWrap.Loop, -1, xyz);
+        var box = new float[6];
+        player.Bounds(xyz, box);
+        var corner = Enumerable.Range(0, 6).Select(k => xyz.Where((_, i) => i % 3 == k % 3)).Select((each, k) => k < 3 ? each.Min() : each.Max());
+        Console.WriteLine(box.SequenceEqual(corner) ? "bounds hold" : "bounds do not hold");
         var fade = new AthFade();
         for (int round = 0; round < 2; round++) // all that is allocated once is allocated in the first
         {
@@ -60,6 +64,7 @@ static class Calls
                 int shown = player.Positions(0, seconds, AthWrap.Loop, player.LevelFor(1e-3, 0.8, 1080), xyz);
                 player.Ahead();
                 player.Normals(xyz, xyz);
+                player.Bounds(xyz, box);
                 fade.To(shown, 0.1);
                 player.FadedPositions(0, seconds, AthWrap.Loop, ref fade, xyz);
             }

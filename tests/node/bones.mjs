@@ -1,5 +1,6 @@
 // Where ATHBones puts a mesh: node bones.mjs VIEWER PLANT.ath BOUND.glb OUT.bin
-// OUT is float32, frames by vertices by 3, in the world, of all frames of the plant. It prints how many bones there are.
+// OUT is float32, frames by vertices by 3, in the world, of all frames of the plant. It prints how many bones there are, and what a pose
+// allocates.
 import { readFileSync, writeFileSync } from "node:fs";
 import { register } from "node:module";
 import { join } from "node:path";
@@ -35,4 +36,12 @@ for (let frame = 0; frame < file.info.frameCount; frame++) {
   });
 }
 writeFileSync(out, new Uint8Array(Float32Array.from(points).buffer));
-console.log(JSON.stringify({ bones: bones.vertices.length }));
+// Bytes that a pose allocates once the engine has compiled it: the median, as rounds in which garbage is collected have fewer.
+const last = file.positions(segments, file.info.frameCount - 1), rounds = [];
+for (let round = 0; round < 40; round++) {
+  const before = process.memoryUsage().heapUsed;
+  for (let i = 0; i < 50; i++) bones.pose(last);
+  rounds.push((process.memoryUsage().heapUsed - before) / 50);
+}
+const [allocated] = rounds.slice(20).sort((a, b) => a - b).slice(10);
+console.log(JSON.stringify({ bones: bones.vertices.length, allocated }));

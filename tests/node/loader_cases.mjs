@@ -40,6 +40,44 @@ cases.between = async () => {
   return (stuck);
 };
 
+// Plays 60 pictures a second by a clock of its own, on which decoding the deepest level of a segment takes `cost` times as long as the
+// segment, and other levels a tenth of that: the segment and the level of each picture.
+cases.boundaries = async () => {
+  const [cost, rounds] = words.map(Number), { info, clips: [clip] } = AthFile.open(data), { Instance } = WebAssembly;
+  const alone = AthFile.open(data).preparation(0, info.levelCount - 1), deepest = info.levelCount - 1, levels = new Map();
+  let clock = 0, most = 1, done = 0;
+  while (!alone.step(1)) most++;
+  WebAssembly.Instance = new Proxy(Instance, { construct(target, given) {
+    const { exports } = new target(...given), { ath_prepare_step, ath_prepare_start, ath_prepare_onward } = exports;
+    return { exports: { ...exports,
+      ath_prepare_start: (...at) => (levels.set(at[0], at[4]), ath_prepare_start(...at)),
+      ath_prepare_onward: (...at) => (levels.set(at[0], at[5]), ath_prepare_onward(...at)),
+      ath_prepare_step(work, count) {
+        if (count < most) clock += (levels.get(work) === deepest ? 1 : 0.1) * count * 1000 * cost * clip.lastTime / info.segmentCount / most;
+        done++; // What is decoded at once, for a picture, takes no time.
+        return ath_prepare_step(work, count);
+      } } };
+  } });
+  performance.now = () => clock;
+  globalThis.MessageChannel = class { // The page gets a turn at each pause.
+    port1 = {};
+    port2 = { postMessage: () => setImmediate(() => this.port1.onmessage()) };
+  };
+  const { ath, motion } = await load(), shown = [], file = AthFile.open(data), turn = () => new Promise((over) => { setImmediate(over); });
+  await ath.loaded;
+  motion.fade = 0;
+  for (let picture = 0, start = clock; picture / 60 < rounds * clip.lastTime; picture++) {
+    motion.setTime(picture / 60);
+    for (let idle = 0, before = -1; clock < start + 1000 * picture / 60 && idle < 9; before = done) {
+      await turn();
+      idle = done === before ? idle + 1 : 0;
+    }
+    clock = Math.max(clock, start + 1000 * picture / 60);
+    shown.push([file.segmentOf(Math.floor(Math.max(motion.frame, 0))), motion.level]);
+  }
+  return { shown, deepest };
+};
+
 // Where a plant is, and what each level shows of it: what the shader makes of the texture, and positions alone.
 cases.far = async () => {
   const { ath, motion } = await load(), shown = [], some = (numbers) => Array.from(numbers).filter((_, i) => i % 27 < 3);

@@ -321,6 +321,14 @@ namespace Athcodec
             Native.ath_player_normals(Triangles, Size(Triangles.Length / 3), xyz, Size(12), info.VertexCount, normals);
         }
 
+        /// <summary>Writes the box of these positions, for culling: least x, y, z, then largest x, y, z.</summary>
+        public void Bounds(float[] xyz, float[] box)
+        {
+            Vertices(xyz, 3, "xyz");
+            if (box.Length != 6) throw new ArgumentException("box: got " + box.Length + " numbers, expected 6");
+            Native.ath_player_bounds(xyz, Size(12), info.VertexCount, box);
+        }
+
         /// <summary>Writes the tangents as glTF has them, 4 numbers each. uv: 2 numbers a vertex.</summary>
         public void Tangents(float[] xyz, float[] uv, float[] normals, float[] tangents)
         {
@@ -591,6 +599,7 @@ namespace Athcodec
         [DllImport(Library)] internal static extern int ath_player_triangles(PlayerHandle player, int order, [Out] uint[] triangles, out UIntPtr count);
         [DllImport(Library)] internal static extern int ath_player_lines(PlayerHandle player, int order, [Out] uint[] lines, out UIntPtr count);
         [DllImport(Library)] internal static extern void ath_player_normals(uint[] triangles, UIntPtr count, float[] xyz, UIntPtr stride, int vertex_count, [Out] float[] normals);
+        [DllImport(Library)] internal static extern void ath_player_bounds(float[] xyz, UIntPtr stride, int vertex_count, [Out] float[] box);
         [DllImport(Library)] internal static extern void ath_player_tangents(uint[] triangles, UIntPtr count, float[] xyz, UIntPtr stride, float[] uv, UIntPtr uv_stride, float[] normals, int vertex_count, [Out] float[] tangents);
     }
 }

@@ -16,6 +16,7 @@ public sealed class Plant : IDisposable
     public string Failure { get; private set; } // what ended the download or the decoding; null: nothing
     public float[] Positions { get; private set; } // 3 numbers a vertex, scene units
     public float[] Normals { get; private set; }
+    public float[] Bounds { get; } = new float[6]; // of Positions: least x, y, z, then largest x, y, z
     public float[] Uv { get; private set; } // 2 numbers a vertex; null: the file has none, or they are still to come
     public uint[] Triangles { get { return Player.Triangles; } } // empty: The file has no faces.
 
@@ -52,7 +53,7 @@ public sealed class Plant : IDisposable
         if (uv != null && uv.Shape.Length == 2 && uv.Shape[0] == Player.Info.VertexCount && uv.Shape[1] == 2) Uv = uv.Floats();
     }
 
-    // Writes Positions and Normals, at the level that `distance` asks for or the best that is decoded, and prepares what comes next.
+    // Writes Positions, Normals and Bounds, at the level that `distance` asks for or the best that is decoded, and prepares what comes next.
     // Returns the level; -1: nothing is there. fov: the vertical field of view in radians; height: in pixels. It allocates nothing
     // once all bytes are there.
     public int Update(double seconds, double distance, double fov, double height)
@@ -65,6 +66,7 @@ public sealed class Plant : IDisposable
             int shown = Player.Positions(0, seconds, AthWrap.Loop, level, Positions);
             Player.Ahead();
             Player.Normals(Positions, Normals);
+            Player.Bounds(Positions, Bounds);
             return shown;
         }
         catch (AthException error) when (error.Result == AthResult.Missing)

@@ -16,6 +16,7 @@
  *     ath_player_begin, _run, _end           prepare segments as jobs of your own job system, on any thread
  *     ath_player_triangles, _lines           get the topology
  *     ath_player_normals, _tangents          compute what shading needs
+ *     ath_player_bounds                      compute what culling needs
  *
  * Memory comes from malloc or from your functions. Leave the bytes of the file in place until you close the player. To
  * decide yourself what is in memory, use ath.h.
@@ -147,6 +148,9 @@ int ath_player_lines(ath_player *player, ath_order order, uint32_t *lines, size_
  * triangles. xyz: positions of three floats, `stride` bytes apart; normals: three floats each, without gaps. */
 void ath_player_normals(const uint32_t *triangles, size_t count, const float *xyz, size_t stride, int32_t vertex_count,
                         float *normals);
+/* Computes the box of positions, least x, y, z and then largest x, y, z. It holds for what is shown now: compute it for
+ * each frame, or join the boxes of levels and times. vertex_count: 1 or more. */
+void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float *box);
 /* Computes the tangents, along which u grows, at right angles to the normals. Each has four floats as in glTF: the
  * fourth, 1 or -1, times the cross product of normal and tangent is the bitangent. Vertices without triangles get
  * zeros. uv: two floats per vertex, `uv_stride` bytes apart. */
@@ -936,11 +940,22 @@ int ath_player_lines(ath_player *player, ath_order order, uint32_t *lines, size_
     return ATH_OK;
 }
 
-/* ---- normals and tangents ---- */
+/* ---- bounds, normals and tangents ---- */
 
 static const float *ath_player_at(const float *first, size_t stride, uint32_t index)
 {
     return (const float *)((const char *)first + stride * index);
+}
+
+void ath_player_bounds(const float *xyz, size_t stride, int32_t vertex_count, float *box)
+{
+    for (int32_t i = 0; i < vertex_count; i++) {
+        const float *at = ath_player_at(xyz, stride, (uint32_t)i);
+        for (int k = 0; k < 3; k++) {
+            if (i == 0 || at[k] < box[k]) box[k] = at[k];
+            if (i == 0 || at[k] > box[3 + k]) box[3 + k] = at[k];
+        }
+    }
 }
 
 static void ath_player_edge(const float *from, const float *to, float *edge)

@@ -63,8 +63,8 @@ export async function openPlant(url) {
     return Boolean(work?.segment);
   }
 
-  // Returns the mesh's positions, relative to `origin`, and its normals, at the level that `distance` asks for or the best that is
-  // decoded; null: nothing is. Decoding takes `budget` milliseconds or, where the next segment would come too late, up to half of
+  // Returns the mesh's positions, relative to `origin`, its normals and its box, at the level that `distance` asks for or the best that
+  // is decoded; null: nothing is. Decoding takes `budget` milliseconds or, where the next segment would come too late, up to half of
   // the time between two frames. fov: the vertical field of view in radians; height: in pixels.
   function update(seconds, { distance, fov, height, budget = 2 }) {
     const level = file.levelFor(distance, fov, height, 1, clip.firstSegment, last, "p99"), frame = file.frameAt(seconds, "loop");
@@ -90,7 +90,13 @@ export async function openPlant(url) {
     works = works.filter(({ segment }) => !segment?.freed);
     file.positions(segmentsAt(shown.level), frame, { out: xyz, relative: true });
     file.normals(xyz, { out: normals });
-    return { level: shown.level, positions: mesh.gather(xyz, plant.positions), normals: mesh.gather(normals, plant.normals) };
+    const bounds = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity]; // least x, y, z, then largest x, y, z
+    for (let k = 0; k < 3; k++)
+      for (let i = k; i < xyz.length; i += 3) {
+        bounds[k] = Math.min(bounds[k], xyz[i]);
+        bounds[3 + k] = Math.max(bounds[3 + k], xyz[i]);
+      }
+    return { level: shown.level, bounds, positions: mesh.gather(xyz, plant.positions), normals: mesh.gather(normals, plant.normals) };
   }
 
   const floats = () => new Float32Array(3 * mesh.source.length);

@@ -16,9 +16,10 @@ export class ATHBones {
   #turn;
   #stemStarts; // The bones that are the first of their stem.
   #restLength;
+  #length;
   #least;
   #slices; // Of each bone that is a slice of a surface: its vertices, their offsets at rest, and what is known of both; else null.
-  #stems;  // Runs [first, stop) of bones that are slices of one surface.
+  #stems;  // Runs [first, stop) of bones that are slices of one surface, with the moment of each.
 
   constructor(scene) {
     let above = null;
@@ -42,10 +43,12 @@ export class ATHBones {
     this.#stemStarts = new Set(this.#list.first);
     this.#least = LEAST * extent(this.#rest);
     this.#tangents(this.#rest, this.#restTangent);
-    this.#restLength = this.#lengths(this.#rest);
+    this.#restLength = this.#lengths(this.#rest, new Float64Array(count));
+    this.#length = new Float64Array(count);
     this.#slices = slicesOf(this.#list.slices, count);
     const firsts = [...this.#list.first, count];
-    this.#stems = this.#list.first.map((first, at) => [first, firsts[at + 1]]).filter(([first]) => this.#slices[first]);
+    this.#stems = this.#list.first.map((first, at) => ({ first, stop: firsts[at + 1], moment: new Float64Array(9) }))
+      .filter(({ first }) => this.#slices[first]);
   }
 
   /** Vertices of the plant, in the source's order, that the bones follow; of a slice of a surface one of its vertices. */
@@ -53,20 +56,20 @@ export class ATHBones {
     return Int32Array.from(this.#list.vertex);
   }
 
-  /** Moves the bones to where the plant is. positions: x, y, z of all its vertices in the source's order. */
+  /** Moves the bones to where the plant is. positions: x, y, z of all its vertices in the source's order. No array or object is allocated. */
   pose(positions) {
     const { vertex, before } = this.#list, centre = this.#centre, tangent = this.#tangent;
     for (let bone = 0; bone < vertex.length; bone++) {
-      const { vertices } = this.#slices[bone] ?? { vertices: [vertex[bone]] };
+      const slice = this.#slices[bone];
       for (let k = 0; k < 3; k++) {
-        let sum = 0;
-        for (const one of vertices) sum += positions[3 * one + k];
-        centre[3 * bone + k] = sum / vertices.length;
+        let sum = slice ? 0 : positions[3 * vertex[bone] + k];
+        for (let i = 0; slice && i < slice.vertices.length; i++) sum += positions[3 * slice.vertices[i] + k];
+        centre[3 * bone + k] = sum / (slice ? slice.vertices.length : 1);
       }
     }
     this.#fit(positions);
     this.#tangents(centre, tangent);
-    const length = this.#lengths(centre);
+    const length = this.#lengths(centre, this.#length);
     for (let bone = 0; bone < vertex.length; bone++) {
       const turn = this.#turn[bone], inherited = before[bone] >= 0 ? this.#turn[before[bone]] : STILL;
       const slice = this.#slices[bone], object = this.#bones[bone];
@@ -86,35 +89,40 @@ export class ATHBones {
   // Turns and sizes of slices. A slice is turned with those before and behind it, near the turn of its whole surface, which decides
   // where they leave a turn free; and that of all surfaces decides for a surface.
   #fit(positions) {
-    const centre = this.#centre, rest = this.#rest, least = this.#least ** 2, whole = [];
-    const all = new Float64Array(9);
-    for (const [first, stop] of this.#stems) {
-      const moment = new Float64Array(9), middle = [0, 0, 0], restMiddle = [0, 0, 0];
+    const centre = this.#centre, rest = this.#rest, least = this.#least ** 2;
+    ofAll.fill(0);
+    for (let stem = 0; stem < this.#stems.length; stem++) {
+      const { first, stop, moment } = this.#stems[stem];
       let count = 0;
+      moment.fill(0);
+      middle.fill(0);
+      restMiddle.fill(0);
       for (let bone = first; bone < stop; bone++) {
-        const slice = this.#slices[bone];
+        const slice = this.#slices[bone], weight = slice.vertices.length;
         slice.measure(positions, centre, 3 * bone, least);
-        count += slice.vertices.length;
+        count += weight;
         for (let k = 0; k < 3; k++) {
-          middle[k] += slice.vertices.length * centre[3 * bone + k];
-          restMiddle[k] += slice.vertices.length * rest[3 * bone + k];
+          middle[k] += weight * centre[3 * bone + k];
+          restMiddle[k] += weight * rest[3 * bone + k];
         }
       }
       for (let k = 0; k < 3; k++) { middle[k] /= count; restMiddle[k] /= count; }
       for (let bone = first; bone < stop; bone++) this.#slices[bone].addTo(moment, centre, rest, 3 * bone, middle, restMiddle, 0);
-      moment.forEach((value, at) => { all[at] += value; });
-      whole.push(moment);
+      for (let at = 0; at < 9; at++) ofAll[at] += moment[at];
     }
-    bestTurn(all, STILL, ofPlant);
-    this.#stems.forEach(([first, stop], stem) => {
-      bestTurn(whole[stem], ofPlant, ofStem);
+    bestTurn(ofAll, STILL, ofPlant);
+    for (let stem = 0; stem < this.#stems.length; stem++) {
+      const { first, stop, moment } = this.#stems[stem];
+      bestTurn(moment, ofPlant, ofStem);
       for (let bone = first; bone < stop; bone++) {
-        const moment = new Float64Array(9);
-        for (const other of [bone, Math.max(bone - 1, first), Math.min(bone + 1, stop - 1)])
-          this.#slices[other].addTo(moment, centre, rest, 3 * other, centre, rest, 3 * bone);
-        bestTurn(moment, ofStem, this.#turn[bone]);
+        ofThree.fill(0);
+        for (let next = -1; next <= 1; next++) { // At an end it is itself its neighbour.
+          const other = Math.min(Math.max(bone + next, first), stop - 1);
+          this.#slices[other].addTo(ofThree, centre, rest, 3 * other, centre, rest, 3 * bone);
+        }
+        bestTurn(ofThree, ofStem, this.#turn[bone]);
       }
-    });
+    }
   }
 
   // Unit tangents of parabolas through each bone and its neighbours; 0 where nothing tells.
@@ -133,9 +141,10 @@ export class ATHBones {
     }
   }
 
-  // The lengths of the elements of its own stem at each bone, added up.
-  #lengths(centre) {
-    const { before } = this.#list, sum = new Float64Array(before.length);
+  // Writes the lengths of the elements of its own stem at each bone, added up.
+  #lengths(centre, sum) {
+    const { before } = this.#list;
+    sum.fill(0);
     for (let bone = 0; bone < before.length; bone++) {
       if (before[bone] < 0) continue;
       const length = here.fromArray(centre, 3 * bone).distanceTo(into.fromArray(centre, 3 * before[bone]));
@@ -201,41 +210,51 @@ function slicesOf(list, count) {
 // The rotation that fits a moment best, near `prior` where it leaves one free: the largest eigenvector of Horn's matrix (J. Opt. Soc. Am.
 // A 4(4), 1987), by Jacobi's method.
 function bestTurn(moment, prior, out) {
-  const size = Math.hypot(...moment) || 1, [xx, xy, xz, , yx, yy, yz, , zx, zy, zz] = matrix.makeRotationFromQuaternion(prior).elements;
-  const S = [xx, yx, zx, xy, yy, zy, xz, yz, zz].map((value, at) => moment[at] / size + PRIOR * value); // elements go by columns
-  const a = [
-    [S[0] + S[4] + S[8], S[7] - S[5], S[2] - S[6], S[3] - S[1]],
-    [S[7] - S[5], S[0] - S[4] - S[8], S[1] + S[3], S[2] + S[6]],
-    [S[2] - S[6], S[1] + S[3], S[4] - S[0] - S[8], S[5] + S[7]],
-    [S[3] - S[1], S[2] + S[6], S[5] + S[7], S[8] - S[0] - S[4]],
-  ];
-  const v = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
+  const { elements } = matrix.makeRotationFromQuaternion(prior); // by columns
+  let squares = 0;
+  for (let at = 0; at < 9; at++) squares += moment[at] ** 2;
+  const size = Math.sqrt(squares) || 1;
+  for (let at = 0; at < 9; at++) S[at] = moment[at] / size + PRIOR * elements[4 * (at % 3) + Math.floor(at / 3)];
+  a[0] = S[0] + S[4] + S[8];
+  a[5] = S[0] - S[4] - S[8];
+  a[10] = S[4] - S[0] - S[8];
+  a[15] = S[8] - S[0] - S[4];
+  a[1] = a[4] = S[7] - S[5];
+  a[2] = a[8] = S[2] - S[6];
+  a[3] = a[12] = S[3] - S[1];
+  a[6] = a[9] = S[1] + S[3];
+  a[7] = a[13] = S[2] + S[6];
+  a[11] = a[14] = S[5] + S[7];
+  v.fill(0);
+  for (let k = 0; k < 4; k++) v[5 * k] = 1;
   for (let sweep = 0; sweep < SWEEPS; sweep++)
     for (let p = 0; p < 3; p++)
       for (let q = p + 1; q < 4; q++) {
-        if (Math.abs(a[p][q]) < 1e-15) continue;
-        const theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+        if (Math.abs(a[4 * p + q]) < 1e-15) continue;
+        const theta = (a[5 * q] - a[5 * p]) / (2 * a[4 * p + q]);
         const t = (theta < 0 ? -1 : 1) / (Math.abs(theta) + Math.sqrt(theta * theta + 1)), c = 1 / Math.sqrt(t * t + 1), s = t * c;
         for (let k = 0; k < 4; k++) {
-          const x = a[k][p], y = a[k][q];
-          a[k][p] = c * x - s * y;
-          a[k][q] = s * x + c * y;
+          const x = a[4 * k + p], y = a[4 * k + q];
+          a[4 * k + p] = c * x - s * y;
+          a[4 * k + q] = s * x + c * y;
         }
         for (let k = 0; k < 4; k++) {
-          const x = a[p][k], y = a[q][k], u = v[k][p], w = v[k][q];
-          a[p][k] = c * x - s * y;
-          a[q][k] = s * x + c * y;
-          v[k][p] = c * u - s * w;
-          v[k][q] = s * u + c * w;
+          const x = a[4 * p + k], y = a[4 * q + k], u = v[4 * k + p], w = v[4 * k + q];
+          a[4 * p + k] = c * x - s * y;
+          a[4 * q + k] = s * x + c * y;
+          v[4 * k + p] = c * u - s * w;
+          v[4 * k + q] = s * u + c * w;
         }
       }
   let best = 0;
-  for (let k = 1; k < 4; k++) if (a[k][k] > a[best][best]) best = k;
-  out.set(v[1][best], v[2][best], v[3][best], v[0][best]).normalize();
+  for (let k = 1; k < 4; k++) if (a[5 * k] > a[5 * best]) best = k;
+  out.set(v[4 + best], v[8 + best], v[12 + best], v[best]).normalize();
 }
 
 const SWEEPS = 8; // Jacobi's method converges within them.
 const STILL = new Quaternion(), ofPlant = new Quaternion(), ofStem = new Quaternion(), matrix = new Matrix4(), smallest = new Quaternion();
+const ofAll = new Float64Array(9), ofThree = new Float64Array(9), middle = new Float64Array(3), restMiddle = new Float64Array(3);
+const S = new Float64Array(9), a = new Float64Array(16), v = new Float64Array(16); // of bestTurn: 3 and 4 rows
 const here = new Vector3(), into = new Vector3(), out = new Vector3(), carried = new Vector3(), now = new Vector3();
 
 function extent(points) {

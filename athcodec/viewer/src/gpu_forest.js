@@ -22,7 +22,8 @@ const SLOTS = 4;          // frames that a plant keeps: two that are shown, and 
 const CELL = 1.5;         // side of the cells of simplified geometry, in pixels' worth of error
 const COARSER = 2;        // from one shape to the next
 const FEWER = 0.85;       // A shape is made if it has at most this share of the vertices of the one before.
-const VIEW_WORDS = 32, FLOATS = 9;
+const VIEW_WORDS = 40, FLOATS = 9;
+const MEASURED = 1 << 16, WORKGROUP = 64; // Largest number of invocations that look for the furthest vertex, and those of a workgroup.
 const WHITE = 0xffffff;
 
 const plainMaterial = (lines) => (lines ? new LineBasicNodeMaterial({ color: 0x6b5b45 })
@@ -45,6 +46,7 @@ export class ATHForest extends Group {
   #device;
   #kernels;
   #choose;
+  #measure;
   #motions = new Map(); // By clip that is shown: a view that has its bytes fetched.
   #plants = [];         // {clip, phase}: what instances show, one of each clip and phase in use; phase: 0 to 1
   #times = [];          // For each plant at this frame: [{frame, weight}].
@@ -61,6 +63,7 @@ export class ATHForest extends Group {
   #loading = false;
   #version = 0;
   #inView = new Float32Array(VIEW_WORDS);
+  #beyond = 0;          // how far a shape's own vertices are from the plant's
   #zeros = null;
   #asked = null;        // the wind that was asked for last
   #strength = 1;
@@ -80,8 +83,9 @@ export class ATHForest extends Group {
     this.#material = material;
     this.#shape = shape;
     this.#kernels = new Kernels(this.#device, { blocks, time, hierarchy, finish, vertices });
-    this.#choose = this.#device.createComputePipeline({ layout: "auto",
-      compute: { module: this.#device.createShaderModule({ code: choose }), entryPoint: "main" } });
+    const module = this.#device.createShaderModule({ code: choose });
+    [this.#choose, this.#measure] = ["main", "measure"].map((entryPoint) => this.#device.createComputePipeline({ layout: "auto", compute: { module, entryPoint } }));
+    this.reach = this.#device.createBuffer({ size: 4, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
     this.view = this.#device.createBuffer({ size: 4 * VIEW_WORDS, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
     this.tolerances = this.#device.createBuffer({ size: 8 * MOST_SHAPES, usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
   }
@@ -135,10 +139,15 @@ export class ATHForest extends Group {
     this.#renderer.backend.createIndirectStorageAttribute(this.#draws);
     this.#lists = this.#storage(new Uint32Array(MOST_SHAPES * Math.max(1, this.#count)), 1);
     this.#zeros = new Uint32Array(5 * MOST_SHAPES);
-    this.#set = this.#device.createBindGroup({ layout: this.#choose.getBindGroupLayout(0),
-      entries: [this.#bufferOf(this.#instances), this.view, this.tolerances, this.#bufferOf(this.#draws), this.#bufferOf(this.#lists)]
-        .map((buffer, binding) => ({ binding, resource: { buffer } })) });
+    this.#set = this.#setOf(this.#choose, { 0: this.#bufferOf(this.#instances), 1: this.view, 2: this.tolerances,
+      3: this.#bufferOf(this.#draws), 4: this.#bufferOf(this.#lists), 5: this.reach });
     return this;
+  }
+
+  // buffers: by the numbers of their bindings
+  #setOf(pipeline, buffers) {
+    const entries = Object.entries(buffers).map(([binding, buffer]) => ({ binding: Number(binding), resource: { buffer } }));
+    return this.#device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries });
   }
 
   #clip(name) {
@@ -219,7 +228,8 @@ export class ATHForest extends Group {
     if (!is()) return;
     const shown = this.#plants.length, shared = this.#storage(new Float32Array(FLOATS * words[2] * shown), 1);
     const passes = new Passes(this.#device, this.#kernels, words, { slots: SLOTS * shown, shown, vertices: this.#bufferOf(shared) });
-    const own = { level, passes, shared, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
+    const measured = this.#setOf(this.#measure, { 1: this.view, 5: this.reach, 6: this.#bufferOf(shared) });
+    const own = { level, passes, shared, measured, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
       slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
     if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel));
     for (const clip of this.#motions.keys()) {
@@ -285,7 +295,8 @@ export class ATHForest extends Group {
     const list = this.#shapes.length;
     if (list === MOST_SHAPES) return;
     const geometry = this.#shape(simple, tolerance).clone(), { source } = simple.userData, lines = !geometry.hasAttribute("normal");
-    const place = this.#ath.channel.vertexPlaces, vertexOf = geometry.userData.vertices ?? source;
+    const place = this.#ath.channel.vertexPlaces, vertexOf = geometry.userData.vertices ?? source, offsets = geometry.getAttribute("athOffset");
+    for (let i = 0; i < (offsets?.count ?? 0); i++) this.#beyond = Math.max(this.#beyond, Math.hypot(offsets.getX(i), offsets.getY(i), offsets.getZ(i)));
     geometry.setAttribute("athVertex", new BufferAttribute(Uint32Array.from(vertexOf, (vertex) => place[vertex]), 1));
     geometry.setAttribute("position", new BufferAttribute(Float32Array.from({ length: 3 * vertexOf.length },
       (_, i) => this.#ath.rest[3 * vertexOf[Math.floor(i / 3)] + i % 3]), 3)); // the rest pose: not what rays find
@@ -343,17 +354,19 @@ export class ATHForest extends Group {
     const hidden = this.#look(camera, height);
     this.#loadNext(hidden);
     this.#place(seconds);
+    const shown = this.levels.filter(({ level }) => level === 0 || this.#error(level - 1) > hidden);
     for (const own of this.levels)
-      if (own.level === 0 || this.#error(own.level - 1) > hidden) this.#show(own);
+      if (shown.includes(own)) this.#show(own);
       else own.before.fill(null); // What a level showed earlier is not the image before the one that shows it again.
-    this.#select();
+    this.#select(shown);
   }
 
   // Where the camera is, for the shader. How large an error is hidden at the nearest instance that there may be.
   #look(camera, height) {
     this.updateWorldMatrix(true, false);
     camera.updateMatrixWorld();
-    const { sphere } = this.#ath, reach = sphere.center.length() + 1.2 * sphere.radius, numbers = this.#inView;
+    const { sphere, origin: less, channel: { info } } = this.#ath, numbers = this.#inView, rest = sphere.center.length() + sphere.radius + this.#beyond;
+    const near = sphere.center.length() + 1.2 * sphere.radius;
     const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld).applyMatrix4(new Matrix4().copy(this.matrixWorld).invert());
     const view = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse)
       .multiply(this.matrixWorld), camera.coordinateSystem ?? WebGPUCoordinateSystem);
@@ -361,9 +374,11 @@ export class ATHForest extends Group {
     const pixel = this.pixels * 2 * Math.tan(camera.fov * Math.PI / 360) / height, distance = this.#box.distanceToPoint(eye);
     numbers.set([eye.x, eye.y, eye.z, pixel], 24);
     new Uint32Array(numbers.buffer).set([this.#count, this.#shapes.length], 28);
-    numbers[30] = reach;
+    numbers[30] = near;
     new Uint32Array(numbers.buffer)[31] = Math.max(1, this.#count);
-    return pixel * Math.max(distance - 0.5 * reach * this.#size, 1e-6) / this.#size;
+    numbers.set([...info.origin.map((value, k) => value - less[k]), this.#beyond, rest], 32);
+    new Uint32Array(numbers.buffer)[37] = this.#heading.value.z;
+    return pixel * Math.max(distance - 0.5 * near * this.#size, 1e-6) / this.#size;
   }
 
   // The frames of the file that each plant shows. Clips are blended once all levels have them.
@@ -416,12 +431,18 @@ export class ATHForest extends Group {
     return { slots: [first + slot, first + slot], weight: 0 };
   }
 
-  #select() {
+  #select(levels) {
     const { queue } = this.#device, encoder = this.#device.createCommandEncoder();
     queue.writeBuffer(this.view, 0, this.#inView);
     queue.writeBuffer(this.#bufferOf(this.#draws), 0, this.#zeros);
-    this.bytesOfParameters += this.#inView.byteLength + this.#zeros.byteLength;
+    queue.writeBuffer(this.reach, 0, new Uint32Array(1));
+    this.bytesOfParameters += this.#inView.byteLength + this.#zeros.byteLength + 4;
     const pass = encoder.beginComputePass();
+    pass.setPipeline(this.#measure);
+    for (const { measured, shared } of levels) {
+      pass.setBindGroup(0, measured);
+      pass.dispatchWorkgroups(Math.ceil(Math.min(MEASURED, shared.count / FLOATS) / WORKGROUP));
+    }
     pass.setPipeline(this.#choose);
     pass.setBindGroup(0, this.#set);
     pass.dispatchWorkgroups(Math.ceil(Math.max(1, this.#count) / 64));
@@ -473,6 +494,7 @@ export class ATHForest extends Group {
   dispose() {
     this.#forget();
     this.view.destroy();
+    this.reach.destroy();
     this.tolerances.destroy();
   }
 }

@@ -5,13 +5,16 @@ import { pause } from "./pause.js";
 
 const STEPS = 8, SLICE_MS = 6; // Decoding looks at the clock every 8 steps and at the messages every 6 ms.
 const MOST_PREPARED = 256 << 20; // Largest size of the decoded segments that are kept, bytes.
+const COARSE = 1 / 8; // Largest share of a level's bytes that a coarser level has which is decoded before it.
 
 export class Jobs {
   #file; #views; #firstSegment; #signal; #tell;
   #prepared = new Map(); // {"segment/level": Segment}: the most recently used is the last.
   #failed = new Set();   // These "segment/level" need a damaged chunk.
   #busy = false;
-  #goingOnFrom = null;   // The preparation under way reads this segment.
+  #underway = new Set(); // These "segment/level" are in preparation: one runs, and the others wait for it.
+  #read = new Set();     // The preparations under way read these segments.
+  #bytes = [];           // bytes of the motion at each level, once they are asked for
 
   /** tell: functions that are called when a segment is `kept`, when it was `decoded` in steps, when it is found `damaged`. */
   constructor(file, views, firstSegment, signal, tell) {
@@ -40,33 +43,61 @@ export class Jobs {
     }
   }
 
-  #job() {
-    return [...this.#jobs()].find(([segment, level]) => level >= 0 && !this.#prepared.has(`${segment}/${level}`));
+  // Returns what to decode next, if it is coarser than `level`.
+  #job(level = Infinity) {
+    const job = [...this.#jobs()].find(([segment, wish]) => wish >= 0 && !this.#prepared.has(`${segment}/${wish}`));
+    return job && job[1] < level && !this.#underway.has(job.join("/")) ? job : null;
   }
 
-  // Yields segments and levels to decode: what the views show, what it blends into, what comes next; at first what a view begins with.
+  // Yields segments and levels to decode: coarse levels of what the views show and of what comes next, so that no boundary of
+  // segments shows level 0, then the levels that are asked for; at first what a view begins with.
   * #jobs() {
     if (this.#views.size === 0 && this.#prepared.size === 0) yield [this.#firstSegment, this.readyLevel(this.#firstSegment)];
-    const shown = [...this.#views.values()].flatMap(({ level, frames }) => frames.map((frame) => {
-      const [segment, other = -1] = around(this.#file, frame);
-      return { clip: clipAt(this.#file, frame), most: level, segment, other, level: this.readyLevel(segment, level) };
-    }));
-    for (const { segment, level } of shown) yield [segment, level];
-    for (const { other, level } of shown) if (other >= 0 && this.readyLevel(other, level) === level) yield [other, level];
-    for (const { clip: { firstSegment, segmentCount }, segment, most } of shown) {
-      const next = firstSegment + (segment - firstSegment + 1) % segmentCount;
-      yield [next, this.readyLevel(next, most)];
-    }
+    const now = [], blended = [], next = [];
+    for (const { level: most, frames } of this.#views.values())
+      for (const frame of frames) {
+        const [segment, other = -1] = around(this.#file, frame), level = this.readyLevel(segment, most);
+        const { firstSegment, segmentCount } = clipAt(this.#file, frame), after = firstSegment + (segment - firstSegment + 1) % segmentCount;
+        now.push([segment, level]);
+        if (other >= 0 && this.readyLevel(other, level) === level) blended.push([other, level]);
+        next.push([after, this.readyLevel(after, most)]);
+      }
+    for (const [segment, level] of [...now, ...next]) yield* this.#coarse(segment, level);
+    yield* now;
+    yield* blended;
+    yield* next;
   }
 
+  // Returns the levels of a segment to decode before a level, the coarsest first, unless a deeper one than these is decoded.
+  #coarse(segment, level) {
+    const coarse = [];
+    for (let finer = level, l = level - 1; l >= 0 && !this.#prepared.has(`${segment}/${l + 1}`); l--) {
+      const isHere = () => !this.#failed.has(`${segment}/${l}`) && this.#file.ranges(l, segment, segment).length === 0;
+      if (this.#size(l) > COARSE * this.#size(finer) || !isHere()) continue;
+      coarse.unshift([segment, l]);
+      finer = l;
+    }
+    return coarse;
+  }
+
+  #size(level) {
+    const { segmentCount } = this.#file.info;
+    return this.#bytes[level] ??= this.#file.ranges(level, 0, segmentCount - 1, true).reduce((sum, { size }) => sum + size, 0);
+  }
+
+  // What is wanted sooner, in the middle of it, is decoded first: a long preparation does not hold up a coarse level.
   async #prepareInSteps(segment, level) {
+    const key = `${segment}/${level}`;
+    let from = null;
+    this.#underway.add(key);
     try {
       const known = this.#known(segment, level), preparation = this.#file.preparation(segment, level, known);
-      this.#goingOnFrom = known.from;
+      this.#read.add(from = known.from);
       let start = performance.now();
       while (!preparation.step(STEPS)) {
         if (performance.now() - start < SLICE_MS) continue;
         await pause();
+        for (let job; !this.#signal.aborted && (job = this.#job(level));) await this.#prepareInSteps(...job);
         if (this.#signal.aborted) return;
         start = performance.now();
       }
@@ -74,8 +105,10 @@ export class Jobs {
       this.#tell.decoded(segment, level);
     } catch (error) {
       this.#damaged(segment, level, error);
+    } finally {
+      this.#read.delete(from);
+      this.#underway.delete(key);
     }
-    this.#goingOnFrom = null;
   }
 
   // Returns what a preparation may go on from, the segment at the deepest level decoded so far, and the segment that it is joined to.
@@ -106,7 +139,7 @@ export class Jobs {
     const wanted = new Set(Array.from(this.#jobs(), (job) => job.join("/")));
     for (const [oldest, old] of this.#prepared) {
       if (this.#prepared.size <= most) break;
-      if (old === this.#goingOnFrom || old === segment || wanted.has(oldest)) continue;
+      if (this.#read.has(old) || old === segment || wanted.has(oldest)) continue;
       old.free();
       this.#prepared.delete(oldest);
     }
