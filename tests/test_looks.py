@@ -286,7 +286,7 @@ def second_differences(frames: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("wind", ["calm", "gale"])
 @pytest.mark.parametrize("name", ["fern", "grass", pytest.param("leafed", marks=pytest.mark.slow)])
-def test_no_level_of_a_sample_jerks_by_more_than_the_file_and_the_error_of_the_level(name, wind):
+def test_no_level_of_a_sample_jerks_by_much_more_than_the_file(name, wind):
     """Each vertex is seen over the wrap of the loop; a third of the leafed tree's vertices."""
     every = 3 if name == "leafed" else 1
     with athcodec.open(athcodec.sample_path(name), clip=wind) as decoder:
@@ -294,4 +294,4 @@ def test_no_level_of_a_sample_jerks_by_more_than_the_file_and_the_error_of_the_l
         full = second_differences(np.asarray(decoder[:, ::every], np.float64)).max()
         for level in decoder.levels:
             shown = second_differences(np.asarray(decoder.at_level(level.level)[:, ::every], np.float64))
-            assert shown.max() <= full + level.max_error, (level.level, np.unravel_index(shown.argmax(), shown.shape))
+            assert shown.max() <= 1.2 * full, (level.level, np.unravel_index(shown.argmax(), shown.shape))
