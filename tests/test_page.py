@@ -126,6 +126,34 @@ def test_colours_that_tell_something_have_a_legend(page):
     assert not legend.is_visible()
 
 
+DARKEST = """() => {
+  const { stage, modules: { three } } = athcodecViewer, { canvas, panes: [{ scene }] } = stage;
+  const wanted = getComputedStyle(document.querySelector("#legend i")).backgroundColor;
+  for (const name of ["ground", "sky", "under"]) scene.getObjectByName(name).visible = false;
+  scene.background = new three.Color(wanted); // so that edges are no darker either
+  stage.render();
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, canvas.width, canvas.height), legend = wanted.match(/\\d+/g).map(Number);
+  let darkest = 1, differ = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    const share = Math.min(...legend.map((value, k) => data[i + k] / value));
+    darkest = Math.min(darkest, share);
+    differ += share < 0.99;
+  }
+  return [darkest, differ];
+}"""
+
+
+def test_colours_that_tell_something_are_those_of_their_legend_inside_a_crown_too(opened_file):
+    """All blades of the tuft have one order."""
+    page = opened_file(athcodec.sample_path("grass").read_bytes())
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.click("#colour [data-value=order]")
+    darkest, pixels = page.evaluate(DARKEST)
+    assert pixels > 500 and darkest > 0.7
+
+
 @pytest.mark.parametrize("size", [(390, 844), (844, 390), (1200, 800)])
 def test_a_window_of_any_size_shows_the_levels_and_says_in_their_figures_which_is_drawn(opened, sample_ath, size):
     with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
@@ -157,6 +185,7 @@ def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath
     assert 8 * fetched / seconds <= 1.02e6
     page.wait_for_function("() => document.getElementById('timing').textContent.includes('full detail after')")
     assert page.get_attribute("#progress", "aria-valuenow") == "100"
+    page.wait_for_function("() => getComputedStyle(document.getElementById('progress')).opacity === '0'")
 
 
 def test_loading_is_told_before_the_first_picture(opened, sample_ath):
@@ -215,6 +244,11 @@ def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
         page.wait_for_function(
             "([side, text]) => document.getElementById(`split-${side}`).innerText === text", arg=[side, text]
         )
+    page.click("#level-choice [data-value=auto]")
+    page.evaluate("athcodecViewer.stage.controls.object.position.multiplyScalar(8)")  # from afar less is enough
+    page.wait_for_function("() => document.getElementById('split-right').innerText.startsWith('Auto:')")
+    assert page.inner_text("#split-left").startswith(("Less detail:", "The same detail:", "More detail:"))
+    page.locator("#level-choice button").last.click()
     x, y = centre(page, "#split svg")
     drag(page, (x, y), (x - 150, y))
     share = page.evaluate("athcodecViewer.stage.split")

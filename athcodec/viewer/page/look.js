@@ -82,6 +82,13 @@ function setSplit(share) {
   app.stage.changed();
 }
 
+// Of the side of a split between two levels: the left one is of a level that is chosen, the right one of what is seen without it.
+function sideName(side) {
+  if (side > 0) return main().motion.automatic ? "Auto" : "Chosen detail";
+  const [left, right] = app.plants.map(({ motion }) => motion.level);
+  return state.intro ? "What has come" : left < right ? "Less detail" : left > right ? "More detail" : "The same detail";
+}
+
 /** Sets what is on either side. */
 function splitLabels() {
   const two = app.plants.length > 1;
@@ -89,7 +96,7 @@ function splitLabels() {
   if (!two) return;
   app.plants.forEach(({ ath, motion }, i) => {
     const of = Math.max(motion.level, 0), [bytes, error] = app.levelText(app.plants[i], of);
-    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : state.intro ? "What has come" : "Less detail";
+    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : sideName(i);
     const text = `${name}: ${bytes}, ${error} off`;
     const tag = $(i === 0 ? "split-left" : "split-right");
     if (tag.textContent !== text) tag.textContent = text;
