@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import branches, compare, features, rd, shown
+from bench import branches, compare, features, gallery, rd, shown
 from bench.store import read
 from bench.tables import table
 
 README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
-FORMATS = rd.ROOT / "docs" / "formats.md"
+FORMATS, GALLERY = rd.ROOT / "docs" / "formats.md", rd.ROOT / "docs" / "gallery.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +40,8 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
     yield README, "overview", compare.overview_text(read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign"))
     yield README, "picture", picture_text()
+    for name, text in gallery.captions():
+        yield GALLERY, name, text
     yield from shown.sections()
 
 
