@@ -105,6 +105,21 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     assert not page.is_visible("#level")
 
 
+def test_a_level_as_small_as_the_next_one_has_no_chip_and_is_reached_by_key(opened_file):
+    """Two levels of the fern are 11 kB."""
+    page = opened_file(athcodec.sample_path("fern").read_bytes())
+    sizes = [text.split("\n")[0] for text in page.locator("#level-choice button").all_inner_texts()[1:]]
+    with athcodec.open(athcodec.sample_path("fern")) as decoder:
+        count = len(decoder.levels)
+    assert len(sizes) == len(set(sizes)) == count - 1
+    page.locator("#level-choice button").last.click()
+    shown = set()
+    for _ in range(count):
+        shown.add(page.evaluate("Number(athcodecViewer.motion.target)"))
+        page.keyboard.press("[")
+    assert shown == set(range(count))
+
+
 def test_lines_run_once_along_each_branch_and_not_around_its_bark(opened_file, tmp_path):
     """Nine twigs of twelve rings on a stem of twelve vertices."""
     athcodec.encode(twigs(), tmp_path / "twigs.ath", rel_error=1e-3, effort="fast")
@@ -476,6 +491,12 @@ def test_no_card_covers_the_plant(opened_file, sample_ath, size):
         found = page.evaluate(PLACED)
         assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
         page.click("#toggle-panel")
+
+
+def test_in_a_window_that_cards_fill_the_plant_stands_behind_them(opened_file):
+    page = opened_file(athcodec.sample_path("grass").read_bytes(), "true", viewport={"width": 330, "height": 240})
+    page.wait_for_function("() => globalThis.athcodecViewer?.motion?.level > 0")
+    assert page.evaluate("athcodecViewer.stage.pixels") > 100
 
 
 def test_who_wants_less_motion_sees_a_still_first_frame_and_a_button(opened_file, sample_ath):
