@@ -9,6 +9,7 @@ import argparse
 import base64
 import io
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from bench import data
 from bench.tables import table
 
 FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
+SAMPLES = ("leafed", "fern", "grass")
+MADE = {"growth": (lambda: athcodec.sample_path("growth"), 1e-4), "bare": (lambda: data.path_of("fe_8k_200f"), 1e-3)}
 FLOOR = {"fern": 4.0, "grass": 9.0}  # plants around each tree of the forest
 TREES = 40
 SIZE = (640, 480)
@@ -41,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     args.out.mkdir(parents=True, exist_ok=True)
-    samples = {name: athcodec.sample_path(name) for name in ("leafed", "fern", "grass")}
+    samples = {name: athcodec.sample_path(name) for name in SAMPLES}
     for path in samples.values():
         path.with_suffix(".webp").write_bytes(picture.still(path, CARD))
     plants = samples | _encoded(args.out)
@@ -52,15 +55,22 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": [table(str(args.out), rows)], "broken": []}
 
 
+def captions() -> Iterator[tuple[str, str]]:
+    """Yield the name and the size of each plant of the gallery, by its file: points, frames, bytes, bound."""
+    for name in (*SAMPLES, *MADE):
+        path = athcodec.sample_path(name) if name in SAMPLES else FOLDER / f"{name}.ath"
+        with athcodec.open(path) as decoder:
+            file, size = decoder.file, path.stat().st_size
+            points, frames, error = file.vertex_count, file.info()["frames"], 1e3 * file.levels[-1].max_error
+        yield name, f"{points:,} points, {frames} frames, {size / 1e3:.{size < 1e4:d}f} kB, within {error:.2g} mm"
+
+
 def _encoded(folder: Path) -> dict[str, Path]:
     """Files of the clips that do not ship as such."""
     made = {}
-    for name, source, bound in (
-        ("growth", athcodec.sample_path("growth"), 1e-4),
-        ("bare", data.path_of("fe_8k_200f"), 1e-3),
-    ):
+    for name, (source, bound) in MADE.items():
         made[name] = folder / f"{name}.ath"
-        with athcodec.read(source) as clip:
+        with athcodec.read(source()) as clip:
             athcodec.encode(clip, made[name], rel_error=bound)
     return made
 

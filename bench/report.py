@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import branches, compare, engines, features, rd, shown
+from bench import branches, compare, engines, features, gallery, rd, shown
 from bench.store import read
 from bench.tables import table
 
 README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
 FORMATS, ENGINES = rd.ROOT / "docs" / "formats.md", rd.ROOT / "docs" / "engines.md"
+GALLERY = rd.ROOT / "docs" / "gallery.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +47,8 @@ def sections() -> Iterator[tuple[Path, str, str]]:
     if engines.RESULTS.exists():
         yield ENGINES, "engines", engines.table_text(read(engines.RESULTS))
     yield README, "picture", picture_text()
+    for name, text in gallery.captions():
+        yield GALLERY, name, text
     yield from shown.sections()
 
 

@@ -1,5 +1,5 @@
 """The samples with surfaces: a leafed tree, a fern and a tuft of grass in a calm wind and in a gale, grown, moved and
-encoded; and the tree that grows, as HDF5.
+encoded; and a young tree that grows, as HDF5.
 
 It writes the files that ship with athcodec, and measures them against the clips that they were made of.
 """
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """The table of the tree that grows."""
-    clip = data.RECIPES["growth_flowing"].make()
+    clip = data.RECIPES["sapling"].make()
     positions = (np.round(np.asarray(clip.positions) / GRID) * GRID).astype(np.float32)
     out = folder / athcodec.sample_path(GROWTH).name
     athcodec.write_hdf5(clip.replace(positions=positions), out, gzip=True)

@@ -1,5 +1,5 @@
 """A picture of the viewer: two levels of a file with layers of precision under the split, coloured by their distance
-from the deepest one."""
+from the deepest one. The page in it says the bound of the file."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from athcodec import MotionClip
 from athcodec.encoding.model.quantise import least_bound
 from athcodec.motion.clip import source_stem_index
+from bench.odd import SAMPLES
 
 
 def random_hierarchy(rng: np.random.Generator, branches: int, longest: int, roots: int = 1):
@@ -397,3 +398,8 @@ def bending_tube() -> MotionClip:
     clip.faces = ring_quads(40, 12)
     clip.check()
     return clip
+
+
+def flowing_growth() -> MotionClip:
+    """A tree of lines whose branches come out without a stop; its motion can be predicted from frame to frame."""
+    return SAMPLES["growth_flowing"].make()

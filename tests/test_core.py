@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from files import Parts, draft_of, with_header
 from header import Chunk, Clip, Fade, Fault, Info, Limits, Part, Range, core
-from plants import awkward
+from plants import awkward, flowing_growth
 
 import athcodec
 from athcodec import errors
@@ -735,6 +735,7 @@ def test_positions_go_to_the_callers_memory_at_levels_of_all_vertices_in_the_ord
         "predicted": lambda: last_branches_first(6),
         "doubles": lambda: last_branches_first(7, dtype=np.float64, offset=1e3, scale=1e6),
         "mixed": lambda: awkward(6, branches=6, shuffled=True),
+        "growth": flowing_growth,
     }
     clip = clips[name]() if name in clips else athcodec.read(athcodec.sample_path(name))
     player, went = Player(athcodec.encode(clip, attributes="none", effort="fast", **options)), set()

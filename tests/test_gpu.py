@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import WEBGPU_FLAGS
 from moving_meshes import leafed_tree
-from plants import blown_tree, bush, chain_plant, distance
+from plants import blown_tree, bush, chain_plant, distance, flowing_growth
 from test_blending import simulated
 from test_tubes import twigs
 
@@ -80,8 +80,8 @@ def files(tmp_path_factory):
     return file
 
 
-def sample(path: Path, name: str = "tree", **options) -> Checked:
-    with athcodec.read(sample_path(name)) as clip:
+def sample(path: Path, **options) -> Checked:
+    with athcodec.read(sample_path("tree")) as clip:
         return loaded(clip, path, **options)
 
 
@@ -100,7 +100,7 @@ MAKERS = {
     "several clips": several,
     "chain": lambda path: loaded(chain_plant(12, 150), path, rel_error=1e-4),
     "doubles": lambda path: loaded(bush(40, 5), path, rel_error=1e-5),
-    "growth": lambda path: sample(path, "growth"),
+    "growth": lambda path: loaded(flowing_growth(), path),
     "lossless": lambda path: sample(path, lossless=True, segment_frames=60),
 }
 

@@ -340,3 +340,40 @@ def test_what_no_level_has_is_refused(option, layered, tmp_path):
 def test_truncate_takes_one_of_its_options(options, layered, tmp_path):
     with pytest.raises(TypeError, match="expected one of level, max_error and target_size"):
         athcodec.truncate(layered, tmp_path / "cut.ath", **options)
+
+
+# ---- corrections that would be seen ----
+
+
+def drifting() -> athcodec.MotionClip:
+    """Forty blades that drift slowly and far: a correction of a coarse layer is much faster than they are."""
+    rng, share = np.random.default_rng(1), np.linspace(0, 1, 8)[:, None]
+    foot, height = rng.uniform(-1, 1, (40, 1, 3)) * [1, 0, 1], rng.uniform(0.6, 1.2, (40, 1, 1))
+    rest, turn = foot + share * height * [0, 1, 0], 2 * np.pi * np.arange(120)[:, None, None, None] / 120
+    positions = np.broadcast_to(rest, (120, *rest.shape)).copy()
+    for cycles, size in enumerate((0.15, 0.05, 0.02), 1):
+        way = size * rng.normal(size=(40, 1, 3)) * [1, 0.2, 1]
+        positions += way * share**2 * np.sin(cycles * turn + rng.uniform(0, 2 * np.pi, (40, 1, 1)))
+    return athcodec.MotionClip(
+        positions.reshape(120, -1, 3),
+        np.arange(120) / 30,
+        rest=rest.reshape(-1, 3),
+        vertex_branch=np.repeat(np.arange(40), 8),
+        branch_parent=np.full(40, -1),
+    )
+
+
+def test_no_part_of_a_slow_plant_twitches_at_a_level_of_the_default_ladder():
+    """A level that is named holds its error instead."""
+    clip = drifting()
+
+    def bends(positions: np.ndarray) -> float:
+        return float(np.linalg.norm(np.diff(positions.astype(np.float64), 2, axis=0), axis=2).max())
+
+    most, diagonal = bends(clip.block(0, 120)), np.linalg.norm(np.ptp(clip.block(0, 120), axis=(0, 1)))
+    with athcodec.open(BytesIO(athcodec.encode(clip, rel_error=1e-4, effort="fast"))) as decoder:
+        assert len(decoder.levels) == 4
+        assert all(bends(decoder.positions(level=level.level)) <= 2 * most for level in decoder.levels)
+    named = athcodec.encode(clip, rel_error=1e-4, effort="fast", ladder=(1e-2, 1e-3))
+    with athcodec.open(BytesIO(named)) as decoder:
+        assert decoder.levels[1].max_error <= 1e-2 * diagonal

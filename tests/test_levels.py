@@ -8,7 +8,7 @@ import pytest
 from files import Parts, opened
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plants import awkward_plants, blown_tree, bound_for, diagonal, distance, meadow, opening_flower
+from plants import awkward_plants, blown_tree, bound_for, diagonal, distance, flowing_growth, meadow, opening_flower
 from test_document import assert_same_bits
 
 import athcodec
@@ -88,9 +88,8 @@ def test_each_level_that_a_ladder_names_holds_the_error(plant, bound, ladder, ot
     "options", [{}, {"segment_frames": 16, "ladder": LADDER}, {"tam": athcodec.Thresholds(0, 0, 0, 0)}]
 )
 def test_levels_of_clips_loops_growth_and_storms_get_better(options, medley_clips):
-    growth = athcodec.read(athcodec.sample_path("growth"))
     tree = athcodec.read(athcodec.sample_path("tree"))
-    for clip in (athcodec.join(medley_clips), growth, tree, blown_tree(0, branches=60, frames=40)):
+    for clip in (athcodec.join(medley_clips), flowing_growth(), tree, blown_tree(0, branches=60, frames=40)):
         assert_levels_get_better(clip, coded(clip, rel_error=1e-3, **options))
 
 
@@ -116,7 +115,7 @@ def foot_drift(clip: athcodec.MotionClip, data: bytes) -> list[float]:
         lambda: meadow(40, faces=False, rows=40),  # Of two pieces each, whose maps are their own.
         lambda: opening_flower(12),
         lambda: blown_tree(0, branches=60, frames=40),
-        lambda: athcodec.read(athcodec.sample_path("growth")),
+        flowing_growth,
     ],
 )
 def test_what_is_rooted_stays_rooted_at_each_level(plants):

@@ -286,7 +286,7 @@ def second_differences(frames: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("wind", ["calm", "gale"])
 @pytest.mark.parametrize("name", ["fern", "grass", pytest.param("leafed", marks=pytest.mark.slow)])
-def test_no_level_of_a_sample_jerks_by_more_than_the_file_and_the_error_of_the_level(name, wind):
+def test_no_level_of_a_sample_jerks_by_much_more_than_the_file(name, wind):
     """Each vertex is seen over the wrap of the loop; a third of the leafed tree's vertices."""
     every = 3 if name == "leafed" else 1
     with athcodec.open(athcodec.sample_path(name), clip=wind) as decoder:
@@ -294,4 +294,19 @@ def test_no_level_of_a_sample_jerks_by_more_than_the_file_and_the_error_of_the_l
         full = second_differences(np.asarray(decoder[:, ::every], np.float64)).max()
         for level in decoder.levels:
             shown = second_differences(np.asarray(decoder.at_level(level.level)[:, ::every], np.float64))
-            assert shown.max() <= full + level.max_error, (level.level, np.unravel_index(shown.argmax(), shown.shape))
+            assert shown.max() <= 1.2 * full, (level.level, np.unravel_index(shown.argmax(), shown.shape))
+
+
+def test_the_growing_sample_gets_leaves_late_small_at_first_and_its_end_is_held_for_a_second():
+    clip = athcodec.read(athcodec.sample_path("growth"))
+    positions, fps = clip.block(0, clip.frame_count).astype(np.float64), round(clip.metadata["fps"])
+    moves = np.abs(np.diff(positions, axis=0)).max(axis=(1, 2)) > 0
+    assert moves[:-fps].all() and not moves[-fps:].any()
+    with_leaves = np.unique(clip.vertex_branch[clip.attributes["uv"][:, 0] > 1])
+    leaves = np.stack([positions[:, clip.vertex_branch == branch] for branch in with_leaves], axis=1)
+    size = np.linalg.norm(np.ptp(leaves, axis=2), axis=2)
+    size /= size[-1]
+    growing = len(positions) - fps
+    assert size.shape[1] > 50 and size[growing // 4].max() == 0
+    assert size[growing // 2].mean() < 0.3 and size.max() < 1.25
+    assert all(((0.05 < one) & (one < 0.5)).any() for one in size.T), "each is small at first"

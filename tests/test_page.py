@@ -105,6 +105,21 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
     assert not page.is_visible("#level")
 
 
+def test_a_level_as_small_as_the_next_one_has_no_chip_and_is_reached_by_key(opened_file):
+    """Two levels of the fern are 11 kB."""
+    page = opened_file(athcodec.sample_path("fern").read_bytes())
+    sizes = [text.split("\n")[0] for text in page.locator("#level-choice button").all_inner_texts()[1:]]
+    with athcodec.open(athcodec.sample_path("fern")) as decoder:
+        count = len(decoder.levels)
+    assert len(sizes) == len(set(sizes)) == count - 1
+    page.locator("#level-choice button").last.click()
+    shown = set()
+    for _ in range(count):
+        shown.add(page.evaluate("Number(athcodecViewer.motion.target)"))
+        page.keyboard.press("[")
+    assert shown == set(range(count))
+
+
 def test_lines_run_once_along_each_branch_and_not_around_its_bark(opened_file, tmp_path):
     """Nine twigs of twelve rings on a stem of twelve vertices."""
     athcodec.encode(twigs(), tmp_path / "twigs.ath", rel_error=1e-3, effort="fast")
@@ -124,6 +139,34 @@ def test_colours_that_tell_something_have_a_legend(page):
     assert "moves as one piece" in legend.inner_text()
     page.click("#colour [data-value=plant]")
     assert not legend.is_visible()
+
+
+DARKEST = """() => {
+  const { stage, modules: { three } } = athcodecViewer, { canvas, panes: [{ scene }] } = stage;
+  const wanted = getComputedStyle(document.querySelector("#legend i")).backgroundColor;
+  for (const name of ["ground", "sky", "under"]) scene.getObjectByName(name).visible = false;
+  scene.background = new three.Color(wanted); // so that edges are no darker either
+  stage.render();
+  const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+  copy.drawImage(canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, canvas.width, canvas.height), legend = wanted.match(/\\d+/g).map(Number);
+  let darkest = 1, differ = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    const share = Math.min(...legend.map((value, k) => data[i + k] / value));
+    darkest = Math.min(darkest, share);
+    differ += share < 0.99;
+  }
+  return [darkest, differ];
+}"""
+
+
+def test_colours_that_tell_something_are_those_of_their_legend_inside_a_crown_too(opened_file):
+    """All blades of the tuft have one order."""
+    page = opened_file(athcodec.sample_path("grass").read_bytes())
+    page.evaluate("athcodecViewer.setPlaying(false)")
+    page.click("#colour [data-value=order]")
+    darkest, pixels = page.evaluate(DARKEST)
+    assert pixels > 500 and darkest > 0.7
 
 
 @pytest.mark.parametrize("size", [(390, 844), (844, 390), (1200, 800)])
@@ -157,6 +200,7 @@ def test_the_loading_is_played_again_at_the_rate_that_is_chosen(page, sample_ath
     assert 8 * fetched / seconds <= 1.02e6
     page.wait_for_function("() => document.getElementById('timing').textContent.includes('full detail after')")
     assert page.get_attribute("#progress", "aria-valuenow") == "100"
+    page.wait_for_function("() => getComputedStyle(document.getElementById('progress')).opacity === '0'")
 
 
 def test_loading_is_told_before_the_first_picture(opened, sample_ath):
@@ -215,6 +259,11 @@ def test_two_levels_lie_under_one_split_that_is_dragged_and_moved_by_keys(page):
         page.wait_for_function(
             "([side, text]) => document.getElementById(`split-${side}`).innerText === text", arg=[side, text]
         )
+    page.click("#level-choice [data-value=auto]")
+    page.evaluate("athcodecViewer.stage.controls.object.position.multiplyScalar(8)")  # from afar less is enough
+    page.wait_for_function("() => document.getElementById('split-right').innerText.startsWith('Auto:')")
+    assert page.inner_text("#split-left").startswith(("Less detail:", "The same detail:", "More detail:"))
+    page.locator("#level-choice button").last.click()
     x, y = centre(page, "#split svg")
     drag(page, (x, y), (x - 150, y))
     share = page.evaluate("athcodecViewer.stage.split")
@@ -443,6 +492,12 @@ def test_no_card_covers_the_plant(opened_file, sample_ath, size):
         found = page.evaluate(PLACED)
         assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
         page.click("#toggle-panel")
+
+
+def test_in_a_window_that_cards_fill_the_plant_stands_behind_them(opened_file):
+    page = opened_file(athcodec.sample_path("grass").read_bytes(), "true", viewport={"width": 330, "height": 240})
+    page.wait_for_function("() => globalThis.athcodecViewer?.motion?.level > 0")
+    assert page.evaluate("athcodecViewer.stage.pixels") > 100
 
 
 def test_who_wants_less_motion_sees_a_still_first_frame_and_a_button(opened_file, sample_ath):

@@ -520,14 +520,14 @@ def sample_path(name: str = "tree") -> Path:
     Parameters
     ----------
     name : {"tree", "growth", "leafed", "fern", "grass"}, optional
-        A small finite-element tree in wind, a tree whose branches grow out of each other, or a leafed tree, a fern or
-        a tuft of grass in a calm wind and in a gale.
+        A small finite-element tree in wind, a young tree that grows and gets leaves, or a leafed tree, a fern or a
+        tuft of grass in a calm wind and in a gale.
 
     Returns
     -------
     pathlib.Path
-        An HDF5 file of athcodec's schema, with 120 frames of 1,001 vertices; of the last three an .ath of two loops of
-        150 frames, with 54,920, 2,844 and 1,400 vertices.
+        An HDF5 file of athcodec's schema, with 120 frames of 1,001 and of 1,476 vertices; of the last three an .ath of
+        two loops of 150 frames, with 54,920, 2,844 and 1,400 vertices.
 
     Raises
     ------

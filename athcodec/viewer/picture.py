@@ -41,8 +41,10 @@ _STILL_QUALITY = 78  # Quality of WebP, from 0 to 100, of a still.
 _MOVING_QUALITY = 45  # The same of a moving picture, for fewer bytes.
 _STILL_AT = 0.7  # Time of a still picture, over the clip's duration.
 _TIMEOUT = 300_000  # ms
-_WHOLE = "() => globalThis.athcodecViewer?.motion?.complete"
+_BEGUN = "() => globalThis.athcodecViewer?.motion"
+_WHOLE = "() => athcodecViewer.motion.complete"
 _ALONE = """() => {
+  athcodecViewer.setLevel(String(athcodecViewer.motion.levelCount - 1));
   athcodecViewer.stage.keepClear([]);
   athcodecViewer.stage.fit();
   athcodecViewer.frameView();
@@ -177,7 +179,8 @@ def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
         export_page(path, Path(folder) / "page.html", clip, host_mesh)
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.goto((Path(folder) / "page.html").as_uri() + "?intro=off&quality=full")
-        page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
+        page.wait_for_function(_BEGUN, timeout=_TIMEOUT)
         page.evaluate(_ALONE)
+        page.wait_for_function(_WHOLE, timeout=_TIMEOUT)
         for at in times:
             yield base64.b64decode(page.evaluate(_DRAWN, at))

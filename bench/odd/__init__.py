@@ -44,6 +44,7 @@ MAKERS: dict[str, Callable[..., MotionClip]] = {
         bending.scanned_tree,
         growing.growth,
         growing.growth_in_wind,
+        growing.sapling,
         growing.unfolding_leaves,
         grass,
         others.captured_stem,
@@ -71,16 +72,20 @@ def _morph(text: str, reach: tuple[float, float]) -> Odd:
 SAMPLES: dict[str, Odd] = {
     "growth_flowing": _odd(
         "growth",
-        "branches grow as the eased tips of their parents pass: the sample",
+        "branches grow as the eased tips of their parents pass",
         seed=4,
         frames=120,
         vertices=1001,
         eased=True,
         carried=True,
         flowing=True,
-    )
+    ),
+    "sapling": _odd(
+        "sapling", "a young tree grows and its leaves unfold: the sample", seed=4, frames=120, nodes=121, leaves=96
+    ),
 }
-"""Clips that ship with athcodec; the tables of the odd clips are without them."""
+"""A clip that ships with athcodec, and one that is as growth without a stop; the tables of the odd clips are without
+them."""
 
 CLIPS: dict[str, Odd] = {
     "growth": _odd("growth", "branches grow one after the other", frames=120, vertices=1001),

@@ -1,4 +1,5 @@
-"""Plants that grow: branches that come out one after the other, with and without wind, and leaves that unfold."""
+"""Plants that grow: branches that come out one after the other, with and without wind, and leaves that unfold on a twig
+or on a young tree."""
 
 from __future__ import annotations
 
@@ -6,11 +7,15 @@ import numpy as np
 
 from athcodec import MotionClip
 from bench.odd.bending import FPS, Bones, clip_of, gusty
+from bench.trees.leafed import SHADES, leaf_uv
+from bench.trees.leaves import LEAF_ANGLE, sheet
+from bench.trees.mesh import Tubes, bark_uv
 from bench.trees.plant import grow
-from bench.trees.ride import rotations, sideways
+from bench.trees.ride import Skeleton, rotations, sideways
 
 PARTS = 4  # Parts of the clip: trunk, orders 1 and 2 on each other, and rest.
 HELD = 1.0  # Seconds at the end of growth without a stop, in which nothing moves.
+WOOD = 0.8  # Share of the time of growth after which a sapling's branches have their lengths.
 
 
 def growth(
@@ -80,6 +85,72 @@ def growing(begin_and_end: np.ndarray, frames: int, eased: bool) -> np.ndarray:
     begin, end = begin_and_end.T
     share = np.clip((np.arange(frames)[:, None] - begin) / (end - begin), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share) if eased else share
+
+
+SIDES, STOUT, TIP = (
+    6,
+    1.4,
+    0.15,
+)  # Of a sapling's bark: vertices of a ring, radius over that of a tree, and of its tips.
+SPROUT = 0.3  # Part of its radius that a branch has as soon as it is out.
+LEAF_LENGTH, LEAF_WIDTH = 0.085, 0.62  # Length of a sapling's leaf over its height; width over length.
+BUD = 0.9  # Radians by which a closed leaf lies nearer to its twig.
+
+
+def sapling(seed: int, frames: int, nodes: int, leaves: int, height: float = 2.0) -> MotionClip:
+    """A young tree with bark, whose branches come out as the tips of their parents pass and thicken to the end; leaves
+    unfold where a branch has come to an end, small at first."""
+    plant, rng = grow(nodes, 2, height, seed), np.random.default_rng(seed)
+    bones, last = Bones.of(plant), frames - 1 - HELD * FPS
+    times = WOOD * flowing_begin_and_end(bones, frames, rng)
+    grown = growing(times, frames, eased=True)
+    moved, time = bones.bent(np.zeros((*grown.shape, 3)), grown), np.arange(frames) / FPS
+    skeleton = Skeleton(moved, bones.rest, plant.parent, plant.branch, plant.branch_parent, STOUT * plant.radius, time)
+    tubes = Tubes(skeleton, SIDES)
+    begin = times[:, 0]
+    thick = SPROUT * growing(np.stack([begin, begin + 0.1 * last], axis=1), frames, eased=True)
+    thick += (1.0 - SPROUT) * growing(np.stack([begin, np.full(len(begin), last)], axis=1), frames, eased=True)
+    is_tip = (np.diff(plant.branch, append=-1) != 0)[tubes.carrier] & (tubes.centre == tubes.carrier)
+    circles = tubes.offsets * np.where(is_tip, TIP, 1.0)[:, None, None]
+    bark = moved[:, tubes.centre, None] + thick[:, plant.branch[tubes.carrier], None, None] * circles
+    node, blades = _sapling_leaves(skeleton, times[:, 1], last, leaves, LEAF_LENGTH * height, rng)
+    quads = len(tubes.offsets) * SIDES + len(BLADE[0]) * np.arange(leaves)[:, None, None] + BLADE[1]
+    positions = np.concatenate([each.reshape(frames, -1, 3) for each in (bark, blades)], axis=1).astype(np.float32)
+    uv = leaf_uv(np.linspace(0, 1, len(BLADE[0]) // 2), rng.integers(0, SHADES, leaves))
+    return MotionClip(
+        positions,
+        time,
+        np.concatenate([tubes.branch, len(plant.branch_parent) + np.repeat(np.arange(leaves), len(BLADE[0]))]),
+        np.concatenate([plant.branch_parent, plant.branch[node]]),
+        rest=positions[-1],
+        faces=np.concatenate([tubes.faces, quads.reshape(-1, 4)]).astype(np.int32),
+        attributes={"uv": np.concatenate([bark_uv(skeleton, tubes), uv]).astype(np.float32)},
+        metadata={"unit": "m", "up_axis": "y", "fps": FPS, "surfaces": "bark, leaves"},
+    )
+
+
+BLADE = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
+
+
+def _sapling_leaves(
+    skeleton: Skeleton, ends: np.ndarray, last: float, count: int, length: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the (count,) nodes that leaves stand on, and their (T, count, V, 3) vertices. ends: (B,) frames at which
+    branches have their lengths; last: the frame from which nothing moves."""
+    rest = skeleton.rest
+    node = np.sort(rng.choice(np.flatnonzero((skeleton.branch > 0) | (rest[:, 1] > 0.8 * skeleton.height)), count))
+    begin = np.minimum(ends[skeleton.branch[node]] * rng.uniform(0.75, 1.0, count), WOOD * last)
+    end = np.minimum(begin + last * rng.uniform(0.15, 0.25, count), last)
+    opened = growing(np.stack([begin, end], axis=1), len(skeleton.positions), eased=True)
+    below = skeleton.direction(rest, node)
+    along = sideways(below, 2.4 * np.arange(count), LEAF_ANGLE)
+    across = np.cross(along, below)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.stack([along, across, np.cross(along, across)], axis=1)
+    own = BLADE[0] * (length * rng.uniform(0.7, 1.3, count))[:, None, None]
+    folded = rotations(-BUD * (1.0 - opened)[..., None] * across)
+    vertices = opened[..., None, None] * np.einsum("lvk,lki,tlji->tlvj", own, axes, folded)
+    return node, skeleton.positions[:, node, None] + vertices
 
 
 ROWS, WIDE = 6, 3  # vertices of a leaf along and across

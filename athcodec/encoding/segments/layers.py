@@ -51,6 +51,7 @@ from athcodec.encoding.segments.segment import (
     correction_step,
     find_corrections,
     learned_bases,
+    parts_that_keep_their_shape,
     stem_streams,
     stems_head,
     time_components,
@@ -58,6 +59,7 @@ from athcodec.encoding.segments.segment import (
 from athcodec.encoding.segments.settings import Choice, Settings
 from athcodec.encoding.streams import streams, writing
 from athcodec.errors import BoundError
+from athcodec.files.threads import ranges
 
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
@@ -68,6 +70,7 @@ SURFACE_MOTION_STEP = 1.0  # The same where they have faces or leaves.
 LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
+MOST_TWITCH = 1.5  # Largest second difference of corrections before the last layer, over the source's largest one.
 MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
@@ -90,7 +93,7 @@ class Layer:
     modes: LearnedModes | None
     ratio: int = 1  # The layer's step over that of the last layer.
     rest: streams.CodedRest | None = None  # The content of REFINED_REST.
-    holds_error: bool = True  # Whether corrections hold its error even where a level jerks with them.
+    holds_error: bool = True  # Whether corrections hold its error even where a level or a part of it jerks with them.
 
 
 @dataclass
@@ -620,7 +623,21 @@ class CodedMotion:
         settings = replace(layer.settings, limit=layer.settings.limit * factor)
         met = self._met if factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
         met = met if layer.ratio == 1 else streams.FREE_ENDS
-        return find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
+        corrections = find_corrections(decoded, self.positions, self._origin, settings, layer.plan, ends=met)
+        if layer.holds_error or not len(corrections.rows):
+            return corrections
+        parts = parts_that_keep_their_shape(layer.plan)
+        return corrections.without_twitches(parts, MOST_TWITCH * self._largest_bend)
+
+    @cached_property
+    def _largest_bend(self) -> float:
+        """Largest second difference of a vertex of the source. Beyond it a part is seen to twitch, however smoothly all
+        others move."""
+        parts = self._pool.map(
+            lambda start, stop: np.square(np.diff(self.positions[start:stop], 2, axis=2)).sum(axis=1).max(initial=0.0),
+            ranges(len(self.positions), 3 * self.positions.shape[2]),
+        )
+        return math.sqrt(max(parts, default=0.0))
 
     def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
         """Return the output of a level, neither joined nor corrected."""

@@ -30,7 +30,7 @@ from athcodec.encoding.segments.time_bases import Entries, InWaves, TimeComponen
 from athcodec.encoding.streams import streams, writing
 from athcodec.encoding.streams.polygons import Mesh
 from athcodec.errors import BoundError
-from athcodec.files.threads import SERIAL, ThreadPool, default_jobs
+from athcodec.files.threads import SERIAL, ThreadPool, default_jobs, ranges
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
@@ -637,6 +637,24 @@ class Corrections:
             return b""
         return writing.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
+    def without_twitches(self, parts: tuple[np.ndarray, np.ndarray], most: float) -> Corrections:
+        """Return the corrections of the parts and vertices that no second difference of them moves by more than `most`.
+        parts: first vertices and numbers of vertices that move together."""
+        vertices, number = np.unique(self.rows[:, 0], return_inverse=True)
+        rows = np.column_stack([number, self.rows[:, 1:]]).astype(np.int32)
+        twitches = np.zeros(self.shape[0], bool)
+        for start, stop in ranges(len(vertices), 3 * self.shape[2]):
+            some = rows[slice(*np.searchsorted(number, [start, stop]))] - np.array([start, 0, 0, 0, 0, 0], np.int32)
+            moves = np.zeros((stop - start, *self.shape[1:]))
+            streams.apply_corrections(moves, some, self.step)
+            bends = np.square(np.diff(moves, 2, axis=2)).sum(axis=1).max(axis=1, initial=0.0)
+            twitches[vertices[start:stop]] = bends > most**2
+        before, (first, count) = np.concatenate([[0], np.cumsum(twitches)]), parts
+        some_do = before[first + count] > before[first]
+        for start, size in zip(first[some_do], count[some_do]):
+            twitches[start : start + size] = True
+        return replace(self, rows=self.rows[~twitches[self.rows[:, 0]]])
+
     @contextmanager
     def applied(self, decoded: np.ndarray) -> Iterator[None]:
         """Correct the positions as long as the context lasts."""
@@ -732,7 +750,7 @@ def find_corrections(
     """Return corrections that keep the limit. If it serves, they move all of a rigid part or of a ring. ends: what they
     meet, in correction_step. Raises BoundError."""
     factor, is_narrow = 1.0, Feature.WIDE in settings.without
-    parts = _parts_that_keep_their_shape(plan)
+    parts = parts_that_keep_their_shape(plan)
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
@@ -749,7 +767,7 @@ def find_corrections(
             )
 
 
-def _parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
+def parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
     """Return first vertices and numbers of vertices of rigid pieces, and of the rings of others."""
     is_rigid = plan.pieces["flags"] & RIGID > 0
     rigid, tubes = plan.pieces[is_rigid], plan.pieces[~is_rigid & (plan.pieces["ring"] > 0)]

@@ -11,8 +11,10 @@ const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.met
 
 function levelControls() {
   const most = Math.max(...app.plants.map(({ motion }) => motion.levelCount)) - 1;
-  const values = ["auto", ...Array.from({ length: most + 1 }, (_, i) => String(i))];
-  const deepest = app.plants.find(({ motion }) => motion.levelCount > most);
+  const deepest = app.plants.find(({ motion }) => motion.levelCount > most), bytesOf = (level) => app.levelText(deepest, level)[0];
+  // A level gets no chip where the next one is as small, in the same figures, and better.
+  const worth = Array.from({ length: most + 1 }, (_, level) => level).filter((level) => level === most || bytesOf(level) !== bytesOf(level + 1));
+  const values = ["auto", ...worth.map(String)];
   const titles = values.slice(1).map((value) => `${upper(detailText(deepest.motion, Number(value)))}, error up to ${within(deepest, value)}`);
   const chips = values.slice(1).map((value) => app.levelText(deepest, Number(value)).join("\n")), areFew = values.length <= MOST_BUTTONS;
   if (areFew) app.level.fill(values, ["Auto", ...chips], ["As much detail as can be seen", ...titles]);
@@ -64,9 +66,10 @@ function tellLevel() {
   const means = motion.level < motion.target && !motion.failure ? ", sharpening…" : off <= 1 ? ", under a pixel" : "";
   $("arrived").textContent = state.forest ? "Each plant as its distance asks for" : `Shown: ${bytes}, at most ${error} off${means}`;
   $("arrived").title = off <= 1 ? "Under a pixel for 99 of 100 points" : "";
+  const chips = app.level.buttons.slice(1).map(({ dataset: { value } }) => Number(value)), marked = chips.find((level) => level >= shown);
   for (const { dataset } of app.level.buttons) {
     dataset.here = dataset.value === "auto" || Number(dataset.value) <= motion.readyLevel;
-    dataset.shown = !state.forest && dataset.value === String(shown);
+    dataset.shown = !state.forest && dataset.value === String(marked);
   }
   if (motion.automatic) $("level").value = motion.target;
   readOut();
@@ -82,6 +85,13 @@ function setSplit(share) {
   app.stage.changed();
 }
 
+// Of the side of a split between two levels: the left one is of a level that is chosen, the right one of what is seen without it.
+function sideName(side) {
+  if (side > 0) return main().motion.automatic ? "Auto" : "Chosen";
+  const [left, right] = app.plants.map(({ motion }) => motion.level);
+  return state.intro ? "What has come" : left < right ? "Less detail" : left > right ? "More detail" : "The same detail";
+}
+
 /** Sets what is on either side. */
 function splitLabels() {
   const two = app.plants.length > 1;
@@ -89,7 +99,7 @@ function splitLabels() {
   if (!two) return;
   app.plants.forEach(({ ath, motion }, i) => {
     const of = Math.max(motion.level, 0), [bytes, error] = app.levelText(app.plants[i], of);
-    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : state.intro ? "What has come" : "Less detail";
+    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : sideName(i);
     const text = `${name}: ${bytes}, ${error} off`;
     const tag = $(i === 0 ? "split-left" : "split-right");
     if (tag.textContent !== text) tag.textContent = text;
@@ -102,7 +112,7 @@ function tellScale() {
   if (app.colour.value !== "error") return;
   const plant = main(), { unit } = plant.ath.metadata, { motion, heatMost } = plant, none = !(heatMost > 0) || motion.level >= motion.levelCount - 1;
   const text = (length) => lengthText(length, unit), onlyRight = none && app.plants.length < 2;
-  $("scale-title").textContent = onlyRight ? "This is the full detail: choose less to see its error" : "Error against the full detail: 99 % of the points, and more";
+  $("scale-title").textContent = onlyRight ? "This is the full detail: choose less to see its error" : "Error against the full detail: 99\u00a0% of the points, and more";
   $("scale-low").textContent = text(0);
   $("scale-middle").textContent = text(heatMost / 4);
   $("scale-high").textContent = `${text(heatMost)}, more`;

@@ -10,7 +10,24 @@ import { outlined, surfaceDepth, surfaceMaterial, surfacesOf } from "./surfaces.
 const LEAF = [0.16, 0.29, 0.07], OVER = [0.30, 0.05, 0.01], PALE = [0.66, 0.68, 0.6]; // Of lines over a plant, and of the plant under them.
 const SLIMMEST = 4; // order from which on bark is as pale as it gets
 
-export const meshMaterial = () => new MeshLambertMaterial({ vertexColors: true, side: DoubleSide });
+// Colours that tell something are those of their legend inside a crown as well: light comes from the eye, on both sides.
+const EVEN = /* glsl */`
+#ifdef ATH_EVEN
+outgoingLight = diffuseColor.rgb * (0.72 + 0.28 * abs(dot(normal, normalize(vViewPosition))));
+#endif
+#include <opaque_fragment>`;
+
+function evenly(shader) {
+  shader.fragmentShader = shader.fragmentShader.replace("#include <opaque_fragment>", EVEN);
+}
+
+// isEven: whether it is lit so, or as the scene is.
+function light(material, isEven) {
+  if (material.toneMapped !== isEven) return;
+  Object.assign(material, { defines: isEven ? { ATH_EVEN: "" } : {}, toneMapped: !isEven, needsUpdate: true });
+}
+
+export const meshMaterial = () => Object.assign(new MeshLambertMaterial({ vertexColors: true, side: DoubleSide }), { onBeforeCompile: evenly });
 export const lineMaterial = () => new LineBasicMaterial({ vertexColors: true });
 
 // A geometry of its own for another motion: all but athPart is shared, and the colours if `withColour`.
@@ -129,6 +146,10 @@ export class Plant {
   // Bark and leaves as they look near by, or colours that tell something.
   #dress() {
     for (const { object, plain, tinted } of this.#drawn) if (plain) Object.assign(object, this.colour === "plant" ? plain : tinted);
+    for (const { object, other } of this.#drawn) {
+      const material = other ?? object.material; // which takes turns with bark and leaves
+      if (material.isMeshLambertMaterial) light(material, this.colour !== "plant");
+    }
     const drawn = this.#drawn.find(({ kind }) => kind === "plant"), wanted = Boolean(this.colour === "plant" && this.show !== "both" && this.ath.hasFaces && this.surfaces);
     if (!drawn || drawn.plain || wanted === Boolean(drawn.other)) return;
     if (wanted) this.#surface ??= this.motion.bind(surfaceMaterial(this.surfaces));

@@ -17,6 +17,7 @@ const EYE = 0.14, EYE_WIDE = 0.2; // Height of the eye over the ground, in heigh
 // against the sky, and of a low wide plant the ground under it is seen.
 const TALL = 0.7, WIDE = 1.02; // Size of the plant in the free part of the picture.
 const FROM = new Vector3(0.35, 0, 0.92).normalize();
+const LEAST_ROOM = 60; // CSS pixels beside the cards; where there are fewer, the plant stands behind them
 const HAZE_FROM = 0.4, HAZE_TO = 4.5; // Distances where the ground begins and ends to fade, in sizes of the ground.
 
 // Whether there is no graphics processor, so that each picture takes long.
@@ -114,7 +115,8 @@ export class Stage {
       rooms = rooms.flatMap(([l, t, r, b]) => (left >= r || right <= l || top >= b || bottom <= t ? [[l, t, r, b]]
         : [[l, t, left, b], [right, t, r, b], [l, t, r, top], [l, bottom, r, b]]));
     }
-    return rooms.reduce((best, room) => (value(room) > value(best) ? room : best));
+    const best = rooms.reduce((one, other) => (value(other) > value(one) ? other : one), [0, 0, 0, 0]);
+    return Math.min(best[2] - best[0], best[3] - best[1]) < LEAST_ROOM ? [0, 0, width, height] : best;
   }
 
   /** Elements that lie over the picture: what is looked at keeps clear of them. */

@@ -3,13 +3,28 @@
 
 const FIRST_BYTES = 12 << 10; // as the download's first request
 
+// Hands the pieces of a whole file to whoever gets the port, as they come: null is the end, and false a connection that was cut
+// off. Any answer ends the download.
+function piecesOf(body, stop) {
+  const { port1, port2 } = new MessageChannel(), reader = body.getReader();
+  const next = () => reader.read().then(({ done, value }) => {
+    port1.postMessage(done ? null : value, done ? [] : [value.buffer]);
+    if (!done) next();
+  }, () => port1.postMessage(false));
+  port1.onmessage = () => stop.abort();
+  next();
+  return port2;
+}
+
 // The answer in parts that a worker can be sent; null where the loader has to ask for itself.
 async function frontOf(url) {
-  const stop = new AbortController(), headers = { Range: `bytes=0-${FIRST_BYTES - 1}` };
+  const stop = new AbortController();
   try {
-    const answer = await fetch(url, { headers, cache: "no-store", signal: stop.signal });
-    if (answer.status === 206) return { status: 206, headers: [...answer.headers], bytes: await answer.arrayBuffer() };
-    stop.abort(); // A whole file would have to come before the worker had any of it.
+    const answer = await fetch(url, { headers: { Range: `bytes=0-${FIRST_BYTES - 1}` }, cache: "no-store", signal: stop.signal });
+    const { status } = answer, headers = [...answer.headers];
+    if (status === 206) return { status, headers, bytes: await answer.arrayBuffer() };
+    if (status === 200) return { status, headers, bytes: piecesOf(answer.body, stop) }; // from a server without ranges
+    stop.abort();
   } catch {
     // The loader tries it several times.
   }

@@ -77,6 +77,7 @@ function tellArrived() {
   const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched } = motion;
   const share = Math.min(1, bytesFetched / wanted), { first, whole } = counters.arrived, bar = $("progress");
   bar.firstElementChild.style.width = `${100 * share}%`;
+  bar.classList.toggle("full", share === 1);
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
   bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
   $("timing").hidden = !bandwidth;

@@ -175,8 +175,12 @@ export const surfaceMaterial = (surfaces) => new ATHPlantMaterial({ surfaces: su
 
 /** Returns the material with the leaves' outlines, in colours that tell something. */
 export function outlined(material, surfaces) {
-  material.onBeforeCompile = (shader) => given(shader, shader.fragmentShader
-    .replace("#include <common>", `#include <common>\n${SHAPE}`).replace("#include <map_fragment>", EDGE), surfaces);
+  const { onBeforeCompile: before } = material;
+  material.onBeforeCompile = (shader) => {
+    before(shader);
+    given(shader, shader.fragmentShader
+      .replace("#include <common>", `#include <common>\n${SHAPE}`).replace("#include <map_fragment>", EDGE), surfaces);
+  };
   material.customProgramCacheKey = () => `ath outlines ${surfaces}`;
   return soften(material);
 }

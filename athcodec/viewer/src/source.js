@@ -84,6 +84,24 @@ export class PacedSource {
   }
 }
 
+// The bytes of an answer that a page has begun to read: a buffer, or a stream of the pieces that come by a port.
+function bodyOf(bytes, signal) {
+  if (!(bytes instanceof MessagePort)) return bytes;
+  return new ReadableStream({
+    start(controller) {
+      bytes.onmessage = ({ data }) => {
+        if (data) controller.enqueue(data);
+        else if (data === null) controller.close();
+        else controller.error(new TypeError("connection cut off"));
+      };
+      signal.addEventListener("abort", () => {
+        bytes.postMessage("stop");
+        controller.error(signal.reason);
+      });
+    },
+  });
+}
+
 /** A file behind http or https. `ranged` is null until the first answer. */
 export class HttpSource {
   ranged = null;
@@ -94,7 +112,8 @@ export class HttpSource {
   #abort = new AbortController();
   #front; // the answer to the first request, where a page has sent that already
 
-  /** front: {status, headers, bytes} of an answer that begins at the first byte; null: there is none. */
+  /** front: {status, headers, bytes} of an answer that begins at the first byte, bytes being a buffer or a port by which the
+   * pieces come; null: there is none. */
   constructor(url, { headers = {}, credentials = "same-origin", front = null } = {}) {
     this.url = url;
     this.options = { headers, credentials };
@@ -129,7 +148,7 @@ export class HttpSource {
     this.requests++;
     const front = offset === 0 ? this.#front : null;
     this.#front = null;
-    const answer = front ? new Response(front.bytes, front) : await fetch(this.url, {
+    const answer = front ? new Response(bodyOf(front.bytes, this.#abort.signal), front) : await fetch(this.url, {
       headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
       cache: "no-store", // browsers' caches let ranges of one file wait for each other, and ask for some twice
     });
