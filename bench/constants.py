@@ -26,7 +26,7 @@ from unittest.mock import patch
 
 import athcodec
 from athcodec.encoding.search import progress
-from bench.clips import add_number, add_rel_error
+from bench.clips import add_number, add_rel_error, beginning
 from bench.store import Store
 from bench.suite import cases
 from bench.tables import environment, table
@@ -243,7 +243,7 @@ class _Files:
         for case in cases(self._args.clips or CLIPS, "quick"):
             if case.path is not None:
                 with athcodec.read(case.path) as clip:
-                    self.clips[case.name] = _beginning(clip, self._args.frames)
+                    self.clips[case.name] = beginning(clip, self._args.frames)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -301,21 +301,6 @@ class _Total:
             add(work, more)
 
         return noted
-
-
-def _beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
-    """Return the first frames of a clip, in memory."""
-    return athcodec.MotionClip(
-        clip.block(0, min(frames, clip.frame_count)),
-        clip.time[:frames],
-        clip.vertex_branch,
-        clip.branch_parent,
-        clip.source_rest,
-        clip.edges,
-        clip.faces,
-        metadata=clip.metadata,
-        stem_index=clip.stem_index,
-    )
 
 
 def _is_above(change: tuple[float, float]) -> bool:
