@@ -67,7 +67,6 @@ GONE = {  # Features that the format had, and that the figures spoke against.
 }
 USES: Mapping[Feature, str] = {  # Uses that bytes do not judge.
     Feature.RIGID: "the shape of leaves",
-    Feature.FREE_RIGID: "the shape of leaves",
     Feature.TURN: "the shape of leaves",
     Feature.LEVEL_0_REST: "the first picture",
     Feature.REFINED_REST: "the first picture",
@@ -91,13 +90,13 @@ judge.
 """
 
 NOTE_ALONE = """
-The same of files that have none of these features, over files to which one is added: what it saves where no other
-stands in for it. A feature without which it has nothing to do is in both. Clips are cut to their first frames.
+How many per cent larger files without any of these features are than files with one of them alone: what a feature saves
+where no other stands in for it. Features that it needs are in both. Clips are cut to their first frames.
 """
 
 DECISIONS = f"""
-The largest savings of clips of {MAKERS} makers, in per cent, by the tables above. A feature without a use stays if both
-are {LEAST:g} % or more in one of them.
+Left out, alone: the most that a feature saves on clips of {MAKERS} makers, in per cent, by the two tables above. It
+stays for its bytes if both are {LEAST:g} % or more in one of them, or else for a use that bytes do not judge.
 """
 
 NOT_JUDGED = """
@@ -290,8 +289,9 @@ def decisions(contents: Mapping[str, Iterable[Mapping[str, Any]]]) -> list[dict[
         best = [_best_of_makers(contents[name], feature.name.lower()) for name in ("sizes", "alone")]
         saves = any(len(clips) == MAKERS and clips[-1][0] >= LEAST for clips in best)
         words = [", ".join(f"{value:.1f} {file}" for value, file in clips if value > 0) or "-" for clips in best]
-        stays = ["bytes"] * saves + [use for use in [USES.get(feature)] if use]
-        rows.append({"feature": feature.value, "left out": words[0], "alone": words[1], "stays for": ", ".join(stays)})
+        stays = ["bytes"] * saves + [USES[one] for one in (feature,) if one in USES]
+        stays_for = ", ".join(stays) or "nothing"
+        rows.append({"feature": feature.value, "left out": words[0], "alone": words[1], "stays for": stays_for})
     return rows
 
 
@@ -310,7 +310,11 @@ def _growth(row: Mapping[str, Any]) -> float:
 
 
 def _file_name(row: Mapping[str, Any]) -> str:
-    return f"`{row['clip']}` at {row['bound']:g}" + (" in layers" if row["ladder"] else "")
+    return f"`{row['clip']}` at {_bound_name(row)}"
+
+
+def _bound_name(row: Mapping[str, Any]) -> str:
+    return f"{row['bound']:g}" + (" in layers" if row["ladder"] else "")
 
 
 def _maker(clip: str) -> str:
@@ -325,21 +329,27 @@ def _rounded(value: float) -> str:
 def table_text(contents: Mapping[str, Any]) -> str:
     """Return the tables of spec/rationale.md: Markdown, with the clips that were measured below each."""
     parts = []
-    for name, notes in (("sizes", (NOTE, NOT_JUDGED)), ("alone", (NOTE_ALONE,))):
+    for name, heading, notes in (
+        ("sizes", "Left out of files that have all others", (NOTE, NOT_JUDGED)),
+        ("alone", "Added to files that have no other", (NOTE_ALONE,)),
+    ):
         sizes = [own for own in contents.get(name, []) if own["with"] >= LEAST_BYTES]
         files: dict[str, list[str]] = {}
         for own in sizes:
             bounds = files.setdefault(own["clip"], [])
-            bound = f"{own['bound']:g}" + (" in layers" if own["ladder"] else "")
+            bound = _bound_name(own)
             if bound not in bounds:
                 bounds.append(bound)
         clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
+        lengths = ", ".join(str(frames) for frames in sorted({own["frames"] for own in sizes if "frames" in own}))
+        clips += f"; the first {lengths} frames of each" if lengths else ""
         made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
         parts += [
+            f"### {heading}",
             _markdown(summary(sizes)),
             *(" ".join(text.split()) for text in (f"Files: {clips}.", made_by, *notes)),
         ]
-    parts += [_markdown(decisions(contents)), " ".join(DECISIONS.split())]
+    parts += ["### The rows that decide", _markdown(decisions(contents)), " ".join(DECISIONS.split())]
     return "\n\n".join(parts) + "\n"
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from athcodec.encoding.options.features import Feature
 from bench import features, report
 from bench.store import read
 
@@ -40,3 +41,27 @@ def test_the_table_of_features_counts_the_makers_whose_clips_a_feature_serves():
     ]
     (row,) = features.summary(sizes)
     assert row["makers"] == 2 and row["most of"] == "`skfem_blade` at 0.001"
+
+
+def test_a_feature_stays_for_its_bytes_if_it_saves_enough_for_two_makers_left_out_or_alone():
+    def rows(feature, **without):
+        key = {"bound": 1e-3, "ladder": "", "frames": 64, "feature": feature, "with": 1000}
+        return [{"clip": clip, "without": size} | key for clip, size in without.items()]
+
+    left_out = rows("copies", skfem_leaf=1040, skfem_blade=1100) + rows("repeats", helios_bed=1040)
+    alone = rows("copies", skfem_leaf=1040, helios_bed=1029) + rows("repeats", helios_bed=1500, skfem_leaf=1030)
+    decided = {row["feature"]: row for row in features.decisions({"sizes": left_out, "alone": alone})}
+    copies, repeats = (decided[feature.value] for feature in (Feature.COPIES, Feature.REPEATS))
+    assert copies["left out"] == "10.0 `skfem_blade` at 0.001" and copies["stays for"] == "nothing"
+    assert repeats["alone"] == "50.0 `helios_bed` at 0.001, 3.0 `skfem_leaf` at 0.001"
+    assert repeats["stays for"] == "bytes"
+    assert decided[Feature.TURN.value]["stays for"] == "the shape of leaves"
+
+
+def test_a_feature_alone_is_measured_beside_those_that_it_needs(monkeypatch):
+    files = object.__new__(features._Files)
+    files._polygons = None
+    monkeypatch.setattr(files, "_file", lambda options, without: (None, len(without)), raising=False)
+    switches = len(Feature) - len(features.OF_OPTIONS)
+    assert files.sizes_alone((Feature.COPIES,)) == (switches - 1, switches)
+    assert files.sizes_alone((Feature.COMMON_BASIS,)) == (switches - 2, switches - 1)
