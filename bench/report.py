@@ -36,6 +36,7 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         file = rd.RESULTS / f"{name}.json"
         if file.exists():
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
+    yield BENCHMARKS, "lost", compare.lost_text(read(rd.RESULTS / f"{name}.json") for name in ("foreign", "held-out"))
     if branches.RESULTS.exists():
         yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
     yield README, "overview", compare.overview_text(read(rd.RESULTS / f"{name}.json") for name in ("rd", "foreign"))

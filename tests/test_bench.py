@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from athcodec.encoding.options.features import Feature
-from bench import features, report
+from bench import codec_registry, compare, features, report
 from bench.store import read
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -65,3 +65,18 @@ def test_a_feature_alone_is_measured_beside_those_that_it_needs(monkeypatch):
     switches = len(Feature) - len(features.OF_OPTIONS)
     assert files.sizes_alone((Feature.COPIES,)) == (switches - 1, switches)
     assert files.sizes_alone((Feature.COMMON_BASIS,)) == (switches - 2, switches - 1)
+
+
+def test_where_another_codec_is_smaller_is_told_by_kinds_with_shares_of_our_files():
+    def point(codec, kind, size, bound, settings=""):
+        key = {"clip": "shader_card_tree", "status": "ok", "codec": codec, "kind": kind, "bound": bound}
+        return key | {"bytes": size, "settings": settings}
+
+    ours = "motion transformed, chunk_bytes HIERARCHY 100, REST 100, STEMS 700, CORRECTIONS 100"
+    points = [point("athcodec", codec_registry.OURS, 1000, bound, ours) for bound in (1e-3, 1e-4)]
+    points += [point("global PCA (Alexa)", "baseline", size, bound) for bound, size in ((1e-3, 900), (1e-4, 1001))]
+    text = compare.lost_text([{"clips": [{"clip": "shader_card_tree"}], "points": points}], (1e-3, 1e-4))
+    assert text.startswith("Of 2 foreign and held-out sizes, another codec's file is smaller in 1:")
+    row = next(line for line in text.splitlines() if "`shader_card_tree`" in line)
+    cells = [cell.strip() for cell in row.split("|")]
+    assert cells[3:7] == ["1", "10.0 to 10.0", "global PCA 1", "70, 10"]
