@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
@@ -80,3 +81,27 @@ def test_where_another_codec_is_smaller_is_told_by_kinds_with_shares_of_our_file
     row = next(line for line in text.splitlines() if "`shader_card_tree`" in line)
     cells = [cell.strip() for cell in row.split("|")]
     assert cells[3:7] == ["1", "10.0 to 10.0", "global PCA 1", "70, 10"]
+
+
+def test_every_constant_that_rules_the_encoder_has_a_line_of_its_own_and_a_comment():
+    for folder in (ROOT / "athcodec" / "encoding", ROOT / "athcodec" / "motion" / "branches"):
+        for file in sorted(folder.rglob("*.py")):
+            text = file.read_text("utf-8")
+            lines = text.splitlines()
+            for node in ast.parse(text).body:
+                if not isinstance(node, ast.Assign) or not _is_of_numbers(node.value):
+                    continue
+                (target,) = node.targets
+                place = f"{file.relative_to(ROOT)}:{node.lineno}"
+                assert isinstance(target, ast.Name), f"{place}: got several constants in a line"
+                line, before = lines[node.end_lineno - 1], lines[node.lineno - 2]
+                assert "  # " in line or before.startswith("# "), f"{place}: got no unit and reason beside {target.id}"
+
+
+def _is_of_numbers(value):
+    """Return whether an expression has numbers alone."""
+    leaves = [part for part in ast.walk(value) if isinstance(part, (ast.Constant, ast.Name, ast.Call, ast.Dict))]
+    return bool(leaves) and all(
+        isinstance(leaf, ast.Constant) and isinstance(leaf.value, (int, float)) and not isinstance(leaf.value, bool)
+        for leaf in leaves
+    )
