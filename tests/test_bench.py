@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from athcodec.encoding.options.features import Feature
-from bench import codec_registry, compare, features, report
+from bench import codec_registry, compare, constants, features, report
 from bench.store import read
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -81,6 +81,22 @@ def test_where_another_codec_is_smaller_is_told_by_kinds_with_shares_of_our_file
     row = next(line for line in text.splitlines() if "`shader_card_tree`" in line)
     cells = [cell.strip() for cell in row.split("|")]
     assert cells[3:7] == ["1", "10.0 to 10.0", "global PCA 1", "70, 10"]
+
+
+def test_constants_are_told_apart_by_what_moves_a_file_and_by_what_was_measured():
+    of_module = {}
+    for one in constants.constants():
+        of_module.setdefault(one.full_name.rpartition(".")[0], []).append(one)
+    (quiet, some), (loud, others) = sorted(of_module.items(), key=lambda item: -len(item[1]))[:2]
+    key = {"clip": "helios_bed", "frames": 8, "bound": 1e-4, "work": 100, "commit": "0123abcd"}
+    sizes = {"": 1000, quiet: 1004, loud: 1006, others[0].full_name: 994, others[1].full_name: None}
+    sizes |= {others[2].full_name: 1005}
+    text = constants.left_text({"files": [key | {"constants": name, "bytes": size} for name, size in sizes.items()]})
+    count = len(constants.constants())
+    assert text.startswith(f"{count} constants are left: 2 move a file ")
+    assert f", {len(some) + 1} move neither, {len(others) - 3} are of a module that moves one" in text
+    assert f", {count - len(some) - len(others)} have not been measured. Measured: 2 modules, 3 constants" in text
+    assert text.endswith("on 1 clip of 8 frames at 0.0001 (commits 0123abcd).")
 
 
 def test_every_constant_that_rules_the_encoder_has_a_line_of_its_own_and_a_comment():
