@@ -20,6 +20,7 @@ from athcodec.sources import FRAME_SUFFIXES
 from athcodec.sources.numbering import numbered_files
 
 REL_ERROR = 1e-4
+POLYGONS = ("face_vertex_counts", "face_vertex_indices")  # Attributes that hold the faces of a clip of many sizes.
 POSITIONS: dict[str, Any] = {"attributes": "none", "ladder": "none"}  # Options of a file of positions in one layer.
 
 
@@ -111,3 +112,19 @@ def measure(
     for start, block in decoder.blocks(level, frames=frames):
         meter.add(clip.block(start, start + len(block)), block)
     return meter
+
+
+def beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
+    """The first frames of a clip, in memory, with its structure and faces alone."""
+    return athcodec.MotionClip(
+        clip.block(0, min(frames, clip.frame_count)),
+        clip.time[:frames],
+        clip.vertex_branch,
+        clip.branch_parent,
+        clip.source_rest,
+        clip.edges,
+        clip.faces,
+        {name: clip.attributes[name] for name in POLYGONS if name in clip.attributes},
+        metadata=clip.metadata,
+        stem_index=clip.stem_index,
+    )

@@ -64,6 +64,39 @@ is. Commits that measured athcodec / the best others: {} / {}{}.
 """
 
 
+OTHER_KIND = "others"
+LOST_CLIPS = (  # Kinds of motion that another codec may describe in fewer bytes, and how names of their clips begin.
+    ("cards in the wind of a shader", "shader_card"),
+    ("blades displaced by a texture that travels", "blender_bent_grass"),
+    ("shape keys", "blender_shape_keys"),
+    ("one leaf that vibrates", "skfem"),
+    ("stems held at both ends", "mujoco_cable_vine"),
+    ("organs that grow, triangles apart", "helios_bindweed"),
+    ("cloth at the tightest bound", "blender_cloth"),
+    ("cloth at the tightest bound", "blender_bract"),
+)
+LOST_WHY: Mapping[str, str] = {
+    "cards in the wind of a shader": "A few waves of one formula move all cards. PCA stores the form of each wave over "
+    "the whole plant; athcodec stores maps of each card, whose three axes are rows of their own.",
+    "blades displaced by a texture that travels": "One displacement passes through all blades, which PCA takes "
+    "together; athcodec codes each blade by itself, in a time basis that all share.",
+    "shape keys": "The motion is a weighted sum of a few forms of the whole tree, which are as many components of PCA; "
+    "athcodec stores them stem by stem.",
+    "one leaf that vibrates": "A few modes of the whole blade move all of its pieces of 64 vertices.",
+    "stems held at both ends": "What moves a stem from both of its ends at once is shared by all of its pieces, each "
+    "of which is coded about the one before.",
+    "organs that grow, triangles apart": "Differences say vertices that stand still or follow a neighbour as well as "
+    "predictions do, and need no rest pose.",
+    "cloth at the tightest bound": "No codec predicts many vertices within the bound: what is left is noise.",
+}
+MOTION_CHUNKS = ("STEMS", "SHAPES", "AFFINES", "PREDICTED")
+REST_CHUNKS = ("REST", "SOURCE_REST", "REFINED_REST")
+LOST_CAPTION = """
+Smaller by: the smallest file of another codec against ours, in per cent, least and most. Codecs: how many of these
+files each made. Motion, rest pose: shares of our files that both take; the rest is corrections, hierarchy and header.
+"""
+
+
 def measured(points: Iterable[Point]) -> list[Point]:
     """Points with a file whose error is within their bound."""
     return [point for point in points if point["status"] == OK]
@@ -177,6 +210,52 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
 def _count_in_words(compared: int, smaller: int) -> str:
     words = f"Of {compared} sizes of athcodec, another codec's is smaller in"
     return f"{words} {smaller}:" if smaller else words
+
+
+def lost_text(suites: Iterable[Mapping[str, Any]], bounds: Collection[float] = BOUNDS) -> str:
+    """Return a table, by kinds of motion, of the sizes at which another codec's file is smaller, and why."""
+    kinds: dict[str, list[tuple[str, Point, Point]]] = {}
+    compared = 0
+    for contents in suites:
+        for clip in contents["clips"]:
+            sizes = sizes_of(contents["points"], clip["clip"])
+            for bound in bounds:
+                ours, best = sizes.get((Athcodec.name, bound)), best_other(sizes, bound)
+                compared += bool(ours and best)
+                if ours and best and best["bytes"] < ours["bytes"]:
+                    kind = next((kind for kind, start in LOST_CLIPS if clip["clip"].startswith(start)), OTHER_KIND)
+                    kinds.setdefault(kind, []).append((clip["clip"], ours, best))
+    table = [_lost_row(kind, kinds[kind]) for kind in sorted(kinds, key=lambda kind: -len(kinds[kind]))]
+    count = sum(map(len, kinds.values()))
+    sentence = f"Of {compared} foreign and held-out sizes, another codec's file is smaller in {count}:"
+    return f"{sentence}\n\n{markdown(table)}\n\n{' '.join(LOST_CAPTION.split())}\n"
+
+
+def _lost_row(kind: str, lost: Sequence[tuple[str, Point, Point]]) -> dict[str, Any]:
+    savings = [100 * (1 - best["bytes"] / ours["bytes"]) for _, ours, best in lost]
+    chunks = [_chunk_bytes(ours) for _, ours, _ in lost]
+    motion, rest = (
+        100
+        * sum(sum(sizes.get(name, 0) for name in names) for sizes in chunks)
+        / sum(sum(one.values()) for one in chunks)
+        for names in (MOTION_CHUNKS, REST_CHUNKS)
+    )
+    codecs = Counter(short(best["codec"]) for _, _, best in lost)
+    return {
+        "motion": kind,
+        "clips": ", ".join(f"`{clip}`" for clip in dict.fromkeys(clip for clip, _, _ in lost)),
+        "sizes": len(lost),
+        "smaller by %": f"{min(savings):.1f} to {max(savings):.1f}",
+        "codecs": ", ".join(f"{name} {number}" for name, number in codecs.items()),
+        "motion, rest pose %": f"{motion:.0f}, {rest:.0f}",
+        "why": LOST_WHY.get(kind, "-"),
+    }
+
+
+def _chunk_bytes(ours: Point) -> dict[str, int]:
+    """Return the bytes of each kind of chunk in a file of athcodec, as its settings state them."""
+    words = ours["settings"].partition("chunk_bytes ")[2].split(", ")
+    return {name: int(size) for name, size in (word.split() for word in words if word)}
 
 
 def _percent(one: int, other: int) -> str:

@@ -13,6 +13,7 @@ import inspect
 import sys
 import time
 import warnings
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,8 +27,9 @@ from unittest.mock import patch
 
 import athcodec
 from athcodec.encoding.search import progress
-from bench.clips import add_number, add_rel_error
-from bench.store import Store
+from athcodec.files.shown import counted
+from bench.clips import add_number, add_rel_error, beginning
+from bench.store import Store, commits
 from bench.suite import cases
 from bench.tables import environment, table
 
@@ -59,7 +61,8 @@ FIXED: Mapping[str, Sequence[str]] = {
     "assembly": ("SPOOL_BYTES",),
     "decisions": ("CHUNK_BYTES", "LEVEL_BYTES"),
     "joins": ("END_FRAMES", "WIDTHS", "SLOPED", "TURN"),
-    "layers": ("MOST_LAYERS", "MOST_LEVELS"),
+    "layers": ("MOST_LAYERS", "MOST_LEVELS", "LARGEST", "RMS"),
+    "motion": ("LEARNED_NUMBERS", "NO_ROOT", "RANGES", "LEAST_RANGE", "LARGE_BYTES"),
     "rigid": ("MOST_TURN",),
     "rings": ("LEAST_RING", "LARGEST_RING"),
     "quantise": (
@@ -75,8 +78,8 @@ FIXED: Mapping[str, Sequence[str]] = {
     "survey": ("MAX_DEPTH", "_READ_VALUES", "_WORK_VERTICES"),
     "time_bases": ("LEAST_STEP", "MOST_STEP"),
     "trials": ("PRELUDES_KEPT",),
-    "writing": ("IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
-    "polygons": ("PLACES_IN_ROWS",),
+    "writing": ("BY_STEP", "BY_RATE", "ONE_BY_ONE", "IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
+    "polygons": ("PLACES_IN_ROWS", "CORNERS_OF_REST", "FACES_OF_REST", "MESH_PARTS"),
     "attachment": ("QUERY",),
     "point_runs": ("PAIRS_AT_ONCE",),
     "price": ("AT_ONCE",),
@@ -130,7 +133,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     known = [one for one in constants() if args.modules is None or one.module.rpartition(".")[2] in args.modules]
     groups: dict[str, list[Constant]] = {}
     for one in known:
-        groups.setdefault(one.module.removeprefix("athcodec."), []).append(one)
+        groups.setdefault(_module(one), []).append(one)
     with _Files(args) as files:
         for name, members in groups.items():
             for factor in FACTORS:
@@ -142,9 +145,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
                 for one, clip in product(members, moved):
                     files.moves(one.full_name, [one], factor, clip)
     rows = [row for name, members in groups.items() for row in _rows(files, name, members)]
-    left = sum(row["moves"] in ("yes", "fails") for row in rows)
     modules = [_row(files, name, name) | {"constants": len(members)} for name, members in groups.items()]
-    counts = {"constants": len(rows), "move a file or its work": left, "do not": len(rows) - left}
+    counts = {"constants": len(rows)} | Counter(row["moves"] for row in rows)
     tables = [table("Constants", rows, NOTE), table("Modules", modules), table("Counts", [counts])]
     return {"tables": tables, "broken": []}
 
@@ -243,7 +245,7 @@ class _Files:
         for case in cases(self._args.clips or CLIPS, "quick"):
             if case.path is not None:
                 with athcodec.read(case.path) as clip:
-                    self.clips[case.name] = _beginning(clip, self._args.frames)
+                    self.clips[case.name] = beginning(clip, self._args.frames)
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -303,21 +305,6 @@ class _Total:
         return noted
 
 
-def _beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
-    """Return the first frames of a clip, in memory."""
-    return athcodec.MotionClip(
-        clip.block(0, min(frames, clip.frame_count)),
-        clip.time[:frames],
-        clip.vertex_branch,
-        clip.branch_parent,
-        clip.source_rest,
-        clip.edges,
-        clip.faces,
-        metadata=clip.metadata,
-        stem_index=clip.stem_index,
-    )
-
-
 def _is_above(change: tuple[float, float]) -> bool:
     return abs(change[0]) > BYTES_LIMIT or abs(change[1]) > WORK_LIMIT
 
@@ -349,3 +336,60 @@ def _row(files: _Files, name: str, title: str) -> dict[str, Any]:
     else:
         row["moves"] = "yes" if any(map(_is_above, all_changes)) else "no"
     return row
+
+
+def left_text(contents: Mapping[str, Any]) -> str:
+    """Return for a document how many constants are left, and what all stored figures say of them."""
+    usual, largest = {}, defaultdict(list)
+    for row in contents["files"]:
+        if row["constants"] == NONE:
+            usual[_panel(row)] = row
+    for row in contents["files"]:
+        if row["constants"] != NONE:
+            largest[row["constants"]].append(_is_moved(row, usual[_panel(row)]))
+    verdicts = Counter(_verdict(one, largest) for one in constants())
+    panels = defaultdict(set)
+    for clip, frames, bound in usual:
+        panels[frames, bound].add(clip)
+    clips = "; ".join(
+        f"{counted(len(names), 'clip')} of {frames} frames at {bound:g}"
+        for (frames, bound), names in sorted(panels.items())
+    )
+    words = ", ".join(f"{verdicts[verdict]} {verdict}" for verdict in VERDICTS if verdicts[verdict])
+    modules = sum(1 for name in largest if name in {_module(one) for one in constants()})
+    return (
+        f"{len(constants())} constants are left: {words}. Measured: {modules} modules, "
+        f"{len(largest) - modules} constants by themselves, on {clips} (commits {commits(contents['files'])})."
+    )
+
+
+VERDICTS = (  # What stored figures say of constants.
+    f"move a file by more than {100 * BYTES_LIMIT:g} % or its work by more than {100 * WORK_LIMIT:g} % by themselves",
+    "move neither",
+    "are of a module that moves one and have not been measured by themselves",
+    "have not been measured",
+)
+
+
+def _verdict(one: Constant, moved: Mapping[str, Sequence[bool]]) -> str:
+    by_itself, as_module = moved.get(one.full_name), moved.get(_module(one))
+    if by_itself is not None:
+        return VERDICTS[0] if any(by_itself) else VERDICTS[1]
+    if as_module is None:
+        return VERDICTS[3]
+    is_alone = sum(_module(other) == _module(one) for other in constants()) == 1
+    return VERDICTS[1] if not any(as_module) else VERDICTS[0] if is_alone else VERDICTS[2]
+
+
+def _module(one: Constant) -> str:
+    return one.full_name.removesuffix(f".{one.name}")
+
+
+def _panel(row: Mapping[str, Any]) -> tuple[str, int, float]:
+    return row["clip"], row["frames"], row["bound"]
+
+
+def _is_moved(row: Mapping[str, Any], usual: Mapping[str, Any]) -> bool:
+    if row.get("bytes") is None:
+        return True
+    return _is_above((row["bytes"] / usual["bytes"] - 1, row["work"] / usual["work"] - 1))

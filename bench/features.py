@@ -2,6 +2,8 @@
 
 The encoder searches its settings anew without the feature (athcodec.encoding.options.features), so that others may
 stand in for it. A feature that a file does not use costs nothing when it is left out; that file is not made again.
+Features that stand in for each other seem to save nothing so. With --alone, all features that the encoder can do
+without are left out at once, and each is added back.
 Every figure is saved as it is measured, and is not measured again.
 """
 
@@ -25,14 +27,14 @@ from athcodec.encoding.preparation.branch_trials import best_branches
 from athcodec.encoding.search.progress import Work
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.polygons import Polygons
-from bench.clips import add_ladder, measure
+from bench.clips import add_ladder, add_number, beginning, measure
 from bench.foreign import CLIPS, PROGRAMS
 from bench.store import IN_BRACKETS, Store, commits
 from bench.suite import SUITES, cases
 from bench.tables import environment, table
 
 RESULTS = Path(__file__).parent / "results" / "features.json"
-KEYS = {"sizes": ("clip", "bound", "ladder", "feature")}
+KEYS = {"sizes": ("clip", "bound", "ladder", "feature"), "alone": ("clip", "frames", "bound", "ladder", "feature")}
 BOUNDS = (1e-3, 1e-4)
 SHORT_SEGMENT = 32  # Frames of the segments of files that are to meet.
 OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all files, that make a file have the feature.
@@ -47,12 +49,31 @@ OPTIONS: Mapping[Feature, dict[str, Any]] = {  # Options, beside those of all fi
 }
 # Options of the file without a feature that no search omits.
 OPTIONS_WITHOUT: Mapping[Feature, dict[str, Any]] = {Feature.HOST: {}, Feature.ATTRIBUTES: {}}
+OF_OPTIONS = frozenset(OPTIONS_WITHOUT)
+NEEDS: Mapping[Feature, frozenset[Feature]] = {  # Features without which a feature has nothing to do.
+    Feature.COMMON_BASIS: frozenset({Feature.TIME_BASES}),
+    Feature.WAVE_BASES: frozenset({Feature.TIME_BASES}),
+    Feature.FREE_RIGID: frozenset({Feature.RIGID}),
+    Feature.TURN: frozenset({Feature.RIGID}),
+    Feature.CONNECTED: frozenset({Feature.ADAPTIVE}),
+    Feature.LEVEL_0_REST: frozenset({Feature.REFINED_REST}),
+}
 LEAST = 3.0  # Per cent that a feature has to save on clips of MAKERS makers.
 MAKERS = 2  # Makers of clips that a feature without another use has to serve.
 GONE = {  # Features that the format had, and that the figures spoke against.
     "loose": "a search for loose branches",
     "lattice": "lattice points of predicted motion",
     "straight": "waves that end in straight lines",
+}
+USES: Mapping[Feature, str] = {  # Uses that bytes do not judge.
+    Feature.RIGID: "the shape of leaves",
+    Feature.TURN: "the shape of leaves",
+    Feature.LEVEL_0_REST: "the first picture",
+    Feature.REFINED_REST: "the first picture",
+    Feature.HOST: "the mesh of the host",
+    Feature.JOINS: "seams",
+    Feature.PERIODIC: "the seam of a loop",
+    Feature.ATTRIBUTES: "arrays of the source",
 }
 LEAST_BYTES = 500  # Smallest file in the table: a few bytes of smaller ones are many per cent.
 
@@ -66,6 +87,16 @@ have rest poses that keep faces, those for {Feature.CONNECTED.value}, {Feature.S
 {SHORT_SEGMENT} frames; where several are left out at once, all of these. Files below {LEAST_BYTES} bytes, of which a
 byte is many per cent, are left out. A feature stays that serves clips of {MAKERS} makers, or a use that bytes do not
 judge.
+"""
+
+NOTE_ALONE = """
+How many per cent larger files without any of these features are than files with one of them alone: what a feature saves
+where no other stands in for it. Features that it needs are in both. Clips are cut to their first frames.
+"""
+
+DECISIONS = f"""
+Left out, alone: the most that a feature saves on clips of {MAKERS} makers, in per cent, by the two tables above. It
+stays for its bytes if both are {LEAST:g} % or more in one of them, or else for a use that bytes do not judge.
 """
 
 NOT_JUDGED = """
@@ -85,30 +116,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--features", nargs="+", type=_features, metavar="NAME", help="these alone; A+B leaves out both at once"
     )
+    add_number(parser, "--alone", 0, "add each to a file of so many first frames that has no other; 0: leave each out")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_ladder(parser, "none")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    wanted = args.features or [(feature,) for feature in Feature]
+    wanted = args.features or [(feature,) for feature in Feature if not (args.alone and feature in OF_OPTIONS)]
     store, broken = Store(args.results, environment(args.argv), KEYS), []
     chosen = cases(args.clips, args.suite or "quick") if args.clips or args.suite else []
+    name, frames = ("alone", {"frames": args.alone}) if args.alone else ("sizes", {})
     for case in chosen:
         for bound in args.bounds:
-            key = {"clip": case.name, "bound": bound, "ladder": " ".join(f"{error:g}" for error in args.ladder)}
-            missing = [own for own in wanted if not store.find("sizes", key | {"feature": _name(own)})]
+            ladder = " ".join(f"{error:g}" for error in args.ladder)
+            key = {"clip": case.name, "bound": bound, "ladder": ladder} | frames
+            missing = [each for each in wanted if not store.find(name, key | {"feature": _name(each)})]
             if case.path is None or not missing:
                 continue
             with tempfile.TemporaryDirectory() as folder, athcodec.read(case.path) as clip:
-                files = _Files(clip, bound, args.ladder, Path(folder) / "clip.ath")
+                part = beginning(clip, args.alone) if args.alone else clip
+                files = _Files(part, bound, args.ladder, Path(folder) / "clip.ath")
                 for features in missing:
-                    sizes = dict(zip(("with", "without"), files.sizes(features)))
-                    store.add("sizes", key | {"feature": _name(features)} | sizes)
-                    growth = 100 * (sizes["without"] / sizes["with"] - 1)
-                    print(f"{case.name} {bound:g} {_name(features)} {growth:.2f}", file=sys.stderr, flush=True)
-                broken += [f"{case.name} at {bound:g} without {name}" for name in files.broken]
-    sizes = store.contents()["sizes"]
-    return {"tables": [table("Features", summary(sizes), NOTE, NOT_JUDGED)], "broken": broken}
+                    both = files.sizes_alone(features) if args.alone else files.sizes(features)
+                    row = key | {"feature": _name(features)} | dict(zip(("with", "without"), both))
+                    store.add(name, row)
+                    print(f"{case.name} {bound:g} {_name(features)} {_growth(row):.2f}", file=sys.stderr, flush=True)
+                broken += [f"{case.name} at {bound:g} without {left_out}" for left_out in files.broken]
+    contents = store.contents()
+    tables = [table("Features", summary(contents["sizes"]), NOTE, NOT_JUDGED)]
+    tables.append(table("Features alone", summary(contents["alone"]), NOTE_ALONE))
+    tables.append(table("What decides", decisions(contents), DECISIONS))
+    return {"tables": tables, "broken": broken}
 
 
 def _features(word: str) -> tuple[Feature, ...]:
@@ -131,27 +169,36 @@ class _Files:
             clip = with_branches(clip, best_branches(clip, BoundOption(rel_error=bound), Work())[0])
         self._clip, self._bound, self._ladder, self._path = clip, bound, ladder, path
         self._polygons = Polygons.of_attributes(clip.attributes) if clip.faces is None else Polygons.of_rows(clip.faces)
-        self._whole: dict[str, tuple[Draft, int]] = {}
+        self._kept: dict[tuple[str, frozenset[Feature]], tuple[Draft, int]] = {}
         self.broken: list[str] = []
 
     def sizes(self, features: tuple[Feature, ...]) -> tuple[int, int]:
         """Return the bytes with some features, by the options of all of them, and without them."""
-        feature = features[0]
-        options = {name: value for each in features for name, value in OPTIONS.get(each, {}).items()}
-        if self._polygons is None and "rest_error" in options:
-            options = {}
-        plan, size = self._with_all(options)
+        feature, options = features[0], self._options(features)
+        plan, size = self._file(options)
         if not any(self._uses(plan, feature) for feature in features):
             return size, size
         if feature in OPTIONS_WITHOUT:
-            return size, self._with_all(OPTIONS_WITHOUT[feature])[1]
-        return size, self._made(options, frozenset(features))[1]
+            return size, self._file(OPTIONS_WITHOUT[feature])[1]
+        return size, self._file(options, frozenset(features))[1]
 
-    def _with_all(self, options: dict[str, Any]) -> tuple[Draft, int]:
-        """Return the file that has all features, made once."""
-        if repr(options) not in self._whole:
-            self._whole[repr(options)] = self._made(options, frozenset())
-        return self._whole[repr(options)]
+    def sizes_alone(self, features: tuple[Feature, ...]) -> tuple[int, int]:
+        """Return the bytes with some features and none besides but those that they need, and without them."""
+        needed = frozenset().union(*(NEEDS.get(feature, frozenset()) for feature in features))
+        options, left_out = self._options(features), frozenset(Feature) - OF_OPTIONS - needed
+        return tuple(self._file(options, without)[1] for without in (left_out - {*features}, left_out))
+
+    def _options(self, features: Iterable[Feature]) -> dict[str, Any]:
+        """Return the options of all of some features, beside those of all files."""
+        options = {name: value for each in features for name, value in OPTIONS.get(each, {}).items()}
+        return {} if self._polygons is None and "rest_error" in options else options
+
+    def _file(self, options: dict[str, Any], without: frozenset[Feature] = frozenset()) -> tuple[Draft, int]:
+        """Return a file without some features, made once."""
+        key = repr(options), without
+        if key not in self._kept:
+            self._kept[key] = self._made(options, without)
+        return self._kept[key]
 
     def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> tuple[Draft, int]:
         given = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
@@ -211,9 +258,8 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     for own in sizes:
         if own["with"] < LEAST_BYTES:
             continue
-        name = f"`{own['clip']}` at {own['bound']:g}" + (" in layers" if own["ladder"] else "")
-        value = 100 * (own["without"] / own["with"] - 1)
-        growth.setdefault(own["feature"], {})[name] = value
+        value = _growth(own)
+        growth.setdefault(own["feature"], {})[_file_name(own)] = value
         makers.setdefault(own["feature"], set()).update({_maker(own["clip"])} if value >= LEAST else ())
     rows = []
     titles = {feature.name.lower(): feature.value for feature in Feature} | GONE
@@ -236,6 +282,41 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
+def decisions(contents: Mapping[str, Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """Return for each feature the rows that decide whether it stays."""
+    rows = []
+    for feature in Feature:
+        best = [_best_of_makers(contents[name], feature.name.lower()) for name in ("sizes", "alone")]
+        saves = any(len(clips) == MAKERS and clips[-1][0] >= LEAST for clips in best)
+        words = [", ".join(f"{value:.1f} {file}" for value, file in clips if value > 0) or "-" for clips in best]
+        stays = ["bytes"] * saves + [USES[one] for one in (feature,) if one in USES]
+        stays_for = ", ".join(stays) or "nothing"
+        rows.append({"feature": feature.value, "left out": words[0], "alone": words[1], "stays for": stays_for})
+    return rows
+
+
+def _best_of_makers(sizes: Iterable[Mapping[str, Any]], feature: str) -> list[tuple[float, str]]:
+    """Return the per cent that a feature saves at most, and the file, of those makers whose clips it serves most."""
+    best: dict[str, tuple[float, str]] = {}
+    for own in sizes:
+        if own["feature"] == feature and own["with"] >= LEAST_BYTES:
+            maker, each = _maker(own["clip"]), (_growth(own), _file_name(own))
+            best[maker] = max(best.get(maker, each), each)
+    return sorted(best.values(), reverse=True)[:MAKERS]
+
+
+def _growth(row: Mapping[str, Any]) -> float:
+    return 100 * (row["without"] / row["with"] - 1)
+
+
+def _file_name(row: Mapping[str, Any]) -> str:
+    return f"`{row['clip']}` at {_bound_name(row)}"
+
+
+def _bound_name(row: Mapping[str, Any]) -> str:
+    return f"{row['bound']:g}" + (" in layers" if row["ladder"] else "")
+
+
 def _maker(clip: str) -> str:
     """Return the program that made a clip, or the clip's name if it is none of others."""
     return PROGRAMS[CLIPS[clip].program][0] if clip in CLIPS else clip
@@ -246,20 +327,37 @@ def _rounded(value: float) -> str:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """Return the table of spec/rationale.md: Markdown, with the clips that were measured below."""
-    sizes = contents["sizes"]
-    rows = summary(sizes)
-    lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|--:|"] if rows else []
+    """Return the tables of spec/rationale.md: Markdown, with the clips that were measured below each."""
+    parts = []
+    for name, heading, notes in (
+        ("sizes", "Left out of files that have all others", (NOTE, NOT_JUDGED)),
+        ("alone", "Added to files that have no other", (NOTE_ALONE,)),
+    ):
+        sizes = [own for own in contents.get(name, []) if own["with"] >= LEAST_BYTES]
+        files: dict[str, list[str]] = {}
+        for own in sizes:
+            bounds = files.setdefault(own["clip"], [])
+            bound = _bound_name(own)
+            if bound not in bounds:
+                bounds.append(bound)
+        clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
+        lengths = ", ".join(str(frames) for frames in sorted({own["frames"] for own in sizes if "frames" in own}))
+        clips += f"; the first {lengths} frames of each" if lengths else ""
+        made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
+        parts += [
+            f"### {heading}",
+            _markdown(summary(sizes)),
+            *(" ".join(text.split()) for text in (f"Files: {clips}.", made_by, *notes)),
+        ]
+    parts += ["### The rows that decide", _markdown(decisions(contents)), " ".join(DECISIONS.split())]
+    return "\n\n".join(parts) + "\n"
+
+
+def _markdown(rows: list[dict[str, Any]]) -> str:
+    """Return a table in Markdown, with numbers at the right."""
+    if not rows:
+        return ""
+    is_text = [name in ("without", "most of", "feature", "left out", "alone", "stays for") for name in rows[0]]
+    lines = ["| " + " | ".join(rows[0]) + " |", "|" + "|".join("---" if text else "--:" for text in is_text) + "|"]
     lines += ["| " + " | ".join("-" if cell is None else str(cell) for cell in row.values()) + " |" for row in rows]
-    files: dict[str, list[str]] = {}
-    for own in sizes:
-        if own["with"] < LEAST_BYTES:
-            continue
-        bounds = files.setdefault(own["clip"], [])
-        name = f"{own['bound']:g}" + (" in layers" if own["ladder"] else "")
-        if name not in bounds:
-            bounds.append(name)
-    clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
-    made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
-    paragraphs = [" ".join(text.split()) for text in (f"Files: {clips}.", made_by, NOTE, NOT_JUDGED)]
-    return "\n\n".join(["\n".join(lines), *paragraphs]) + "\n"
+    return "\n".join(lines)

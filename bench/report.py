@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import branches, compare, engines, features, gallery, rd, shown
+from bench import branches, compare, constants, engines, features, gallery, rd, shown
 from bench.store import read
 from bench.tables import table
 
 README = rd.ROOT / "README.md"
 RATIONALE, BENCHMARKS = rd.ROOT / "spec" / "rationale.md", rd.ROOT / "docs" / "benchmarks.md"
+DECIDES = rd.ROOT / "docs" / "how-the-encoder-decides.md"
 FORMATS, ENGINES = rd.ROOT / "docs" / "formats.md", rd.ROOT / "docs" / "engines.md"
 GALLERY = rd.ROOT / "docs" / "gallery.md"
 
@@ -37,6 +38,9 @@ def sections() -> Iterator[tuple[Path, str, str]]:
         file = rd.RESULTS / f"{name}.json"
         if file.exists():
             yield RATIONALE if name == "features" else BENCHMARKS, name, text(read(file))
+    yield BENCHMARKS, "lost", compare.lost_text(read(rd.RESULTS / f"{name}.json") for name in ("foreign", "held-out"))
+    if constants.RESULTS.exists():
+        yield DECIDES, "constants", constants.left_text(read(constants.RESULTS))
     if branches.RESULTS.exists():
         yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
     yield (

@@ -54,7 +54,8 @@ from athcodec.errors import BoundError, ClipError
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, LADDERS
 
-CHUNK_BYTES, LEVEL_BYTES = 6, 6  # Bytes of the front for a chunk, and for the errors of a level and segment.
+CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
+LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.

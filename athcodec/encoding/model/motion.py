@@ -42,7 +42,8 @@ from athcodec.decoding.container import from_short_float
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 NO_ROOT = -1  # Root of streams without a learned basis (core/model/motion.h).
-RANGES, LEAST_RANGE = 24, 1024  # Parts of a plant that threads take at a time, and their least number of vertices.
+RANGES = 24  # Parts of a plant of which threads take one at a time; more cost more calls, fewer leave threads idle.
+LEAST_RANGE = 1024  # Vertices of the smallest such part, below which a call costs more than its work.
 PERIOD = 128  # Vertices from one run of a sample to the next.
 LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}

@@ -26,11 +26,11 @@ CORRECTION_STEP = 1.12  # Step of corrections, in limits. Rounding leaves at mos
 
 # Weights of the value, the slope and the bend of a row at its ends, in squared steps. Where segments meet they are
 # END_WEIGHTS over the square of the change of velocity in a usual frame, in bounds, because motion hides errors.
-LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)
-MOST_END_WEIGHTS = (10.0, 300.0, 50.0)
-END_WEIGHTS = (5.0, 1.0, 0.25)
-# If the velocity changes by less than STRAIGHT bounds in a usual frame, every bend at an end is seen.
-STRAIGHT, STRAIGHT_END_WEIGHTS = 0.05, (20.0, 600.0, 50.0)
+LEAST_END_WEIGHTS = (0.25, 2.5, 2.5)  # Least weights, however much motion hides.
+MOST_END_WEIGHTS = (10.0, 300.0, 50.0)  # Largest weights, however little it hides.
+END_WEIGHTS = (5.0, 1.0, 0.25)  # Weights at a change of velocity of one bound.
+STRAIGHT = 0.05  # Change of velocity in a usual frame, in bounds, below which every bend at an end is seen.
+STRAIGHT_END_WEIGHTS = (20.0, 600.0, 50.0)  # Weights then, in place of the largest.
 
 
 def end_weights(usual_change: float) -> tuple[float, ...]:
@@ -133,8 +133,9 @@ def bits(numbers: np.ndarray) -> np.ndarray:
 
 
 BIT_PARTS = 2.0**16  # Parts of a bit in which estimates count.
-# Largest lags, in vertices, that are tried for stems and for stems that may be whole meshes, and that a file can hold.
-LONGEST_LAG, LONGEST_ROW, MOST_LAG = 40, 600, 65535
+LONGEST_LAG = 40  # Largest lag, in vertices, that is tried for a stem: rings have at most 32.
+LONGEST_ROW = 600  # Largest lag, in vertices, that is tried for a stem that may be a whole mesh: the row of a grid.
+MOST_LAG = 65535  # Largest lag, in vertices, that a file can hold.
 MESH = 1000  # Vertices from which on a stem may be a whole mesh.
 SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which a lag of them all tells apart.
 

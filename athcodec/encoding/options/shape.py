@@ -20,11 +20,13 @@ from athcodec.motion.polygons import sides
 from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
 
 OF_BOUND = "bound"
-EDGE_STEP, HEIGHT_STEP = 0.025, 0.05  # Largest step of a branch, over the lengths of edges and heights of faces.
+EDGE_STEP = 0.025  # Largest step of a branch over the length of its edges, which rounding stretches by as much.
+HEIGHT_STEP = 0.05  # Largest step of a branch over the height of its faces, whose normals rounding turns.
 SMALL_FACES = 0.05  # Share of a branch's faces that may be smaller than those that its step is made for.
 LEAST_SIZE = 1e-5  # Least size, in diagonals, of edges and heights that count.
 LENGTH_STEP = 0.85  # Largest step over the error that is asked for.
-WHOLE_DETAIL, MOST_DETAIL = 128, 255  # Detail of a step of 1, and the largest (FORMAT.md, Detail).
+WHOLE_DETAIL = 128  # Detail of a step of 1 (FORMAT.md, Detail).
+MOST_DETAIL = 255  # Largest detail (FORMAT.md, Detail).
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,9 @@ from athcodec.encoding.streams import streams
 from athcodec.motion.hierarchy import Hierarchy
 
 LARGE = 5_000  # Vertices up to which a plant is not sampled.
-LEAST_SAMPLE, ENOUGH, MOST_SAMPLE = 3_500, 4_000, 1 << 16  # Vertices of a sample; LEAST_SHARE up to ENOUGH.
+LEAST_SAMPLE = 3_500  # Least vertices of a sample.
+ENOUGH = 4_000  # Vertices of a sample up to which it has LEAST_SHARE of the plant.
+MOST_SAMPLE = 1 << 16  # Most vertices of a sample.
 LEAST_SHARE = 0.4  # Least share of the plant in a sample.
 SEGMENT_SHARE = 1 / 64  # Share of the plant that each segment of the clip adds to a sample.
 SMALL = 1 << 18  # Vertices times frames up to which trials are so cheap that choices are made again.

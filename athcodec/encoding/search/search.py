@@ -37,7 +37,8 @@ NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
-STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
+STEP_TRIALS = 12  # Trials of steps for which choices leave work.
+FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.

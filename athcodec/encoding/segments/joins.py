@@ -26,9 +26,10 @@ SEEN = 1 << 12  # About how many vertices joins are chosen by.
 END_FOOTPRINTS = {2: (5, 16, 27, 32), 1: (0, 0, 16, 32)}
 AXES = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 1, 1]])
 NO_CORRECTIONS = np.empty((0, 6), np.int32)
-# Ticks are changes of velocity at a seam over those of a usual frame. Up to SMOOTH they are invisible, and beyond ROUGH
-# each weighs ROUGH_WORTH more.
-SMOOTH, ROUGH, ROUGH_WORTH = 1.2, 1.4, 30.0
+# Ticks are changes of velocity at a seam over those of a usual frame.
+SMOOTH = 1.2  # Largest tick that nobody sees.
+ROUGH = 1.4  # Tick from which on each more weighs ROUGH_WORTH.
+ROUGH_WORTH = 30.0  # Cost, in ticks, of a tick beyond ROUGH.
 STILL = 0.05  # Least change of velocity in a usual frame, over the source's: a level that stands still must not jump.
 ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
 ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.

@@ -63,25 +63,30 @@ from athcodec.files.threads import ranges
 
 # Steps of the first layer and of others before the last, over that of a file whose bound is the error that the layer
 # holds. Where there are leaves, corrections take more bytes than finer steps.
-STEP_FACTORS, LEAVES_STEP_FACTORS = (1.7, 1.25), (0.8, 0.8)
+STEP_FACTORS = (1.7, 1.25)  # Factors for plants without leaves.
+LEAVES_STEP_FACTORS = (0.8, 0.8)  # Factors for plants with leaves.
 FEW_ROOTS = 4  # Up to so many roots a scene counts as one plant.
 MOTION_STEP = 2.0  # Largest step of the first layer of more roots, over the RMS motion of all vertices.
 SURFACE_MOTION_STEP = 1.0  # The same where they have faces or leaves.
-LEAST_ABOVE_BOUND, LEAST_APART = 4.0, 2.5  # Errors of layers over the bound, and over the next error of a ladder.
+LEAST_ABOVE_BOUND = 4.0  # Least error, over the bound, of a layer before the last: a closer one costs too much.
+LEAST_APART = 2.5  # Least error of a layer over that of the next.
 MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
 MOST_TWITCH = 1.5  # Largest second difference of corrections before the last layer, over the source's largest one.
-MOST_LAYERS, MOST_LEVELS = 8, 32  # Limits of a file.
+MOST_LAYERS = 8  # Layers of a file (FORMAT.md, Limits).
+MOST_LEVELS = 32  # Levels of a file (FORMAT.md, Limits).
 LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
 LARGEST = MEASURES.index("max")
 RMS = MEASURES.index("rms")
 LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
-FINER_MAPS, COARSER_MAPS = 3, 16  # Half octaves by which steps of maps may move for that.
+FINER_MAPS = 3  # Half octaves by which steps of maps may become finer for that.
+COARSER_MAPS = 16  # Half octaves by which steps of maps may become coarser for that.
 MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
-LEVEL_0_SHARE, LEVEL_0_BYTES = 1.03, 24  # Factor and bytes that a rest pose of level 0 may add to the first layer's.
+LEVEL_0_SHARE = 1.03  # Bytes of the first layer's rest pose with one of level 0 before it, over those without.
+LEVEL_0_BYTES = 24  # Bytes that it may add besides.
 
 
 @dataclass

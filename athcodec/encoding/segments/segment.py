@@ -41,9 +41,11 @@ ROWS_AT_ONCE = 1 << 14  # Rows of coefficients whose moments are added at once.
 LEAST_THREADED = 16 << 20  # Bytes of a segment from which a clip of one segment is coded by several threads.
 WORK_BYTES = 1 << 28  # Memory of the segments coded at once, unless `jobs` says how many.
 SAMPLED = 4000  # Number of vertices from which trials find corrections of a sample of them only.
-LEAST_SAMPLED, SPARSE = 256, 16  # Vertices from which one of so many is enough if many frames are to be corrected.
+LEAST_SAMPLED = 256  # Vertices from which on a part of them is enough if many frames are to be corrected.
+SPARSE = 16  # Vertices of which one is in the smallest such part.
 SPREAD = 512  # Vertices all over the plant of which frames beyond the limit are counted.
-MANY, MANY_SHARE = 8000, 0.06  # Frames of vertices beyond the limit that are many, and more for each that is coded.
+MANY = 8000  # Frames of vertices beyond the limit that are many.
+MANY_SHARE = 0.06  # More of them for each frame of a vertex that is coded.
 SEGMENT_WORK = 9  # Memory of a segment while it is coded, over its float32 positions.
 
 

@@ -19,7 +19,8 @@ from athcodec.motion.algebra import multiply, principal
 
 MOST_SAMPLE = 8192  # Integer that stands for 1.
 PRECISION = 0.6  # Step of a row's integers, over the step at which they err as much as all tracks in the row.
-LEAST_STEP, MOST_STEP = -200, 0  # Smallest and largest step of a row, in half octaves.
+LEAST_STEP = -200  # Smallest step of a row, in half octaves (FORMAT.md, Basis in waves).
+MOST_STEP = 0  # Largest step of a row, in half octaves (FORMAT.md, Basis in waves).
 TOLERANCE = 5e-4  # Mean square, in squared steps, that a basis may leave out.
 
 

@@ -14,9 +14,10 @@ from athcodec.errors import ClipError
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
 
-CORNERS_OF_REST, FACES_OF_REST = 8, 4  # Corners and faces per vertex up to which a rest pose goes by faces.
+CORNERS_OF_REST = 8  # Corners for each vertex up to which a rest pose goes by faces (FORMAT.md, Connected rest poses).
+FACES_OF_REST = 4  # Faces for each vertex up to which it does.
 MESH_PARTS = 3  # Calls of the core that build a mesh.
-PLACES_IN_ROWS = 1, 3, 4, 6  # Columns of PLACES that are tried: faces with vertices of their own have 3 or 4 corners.
+PLACES_IN_ROWS = (1, 3, 4, 6)  # Columns of PLACES that are tried: faces with vertices of their own have 3 or 4 corners.
 
 
 def pack(polygons: Polygons, places: Places, has_sides: bool = True) -> bytes:

@@ -284,7 +284,8 @@ class MetEnds:
         return MetEnds(self.closed, self.decided[first:last] - np.array([start, 0, 0, 0, 0, 0], np.int32))
 
 
-FIRST, LAST = 1, 2
+FIRST = 1  # Bit of MetEnds.closed: the first frame of a segment.
+LAST = 2  # Bit of MetEnds.closed: the last frame.
 FREE_ENDS = MetEnds()
 
 

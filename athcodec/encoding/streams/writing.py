@@ -55,7 +55,8 @@ _RATIO = struct.Struct("<H")
 _SHIFT = struct.Struct("<B")
 _STEP = struct.Struct("<f")  # Of REFINED_REST, PREDICTED and CORRECTIONS.
 _POLYGONS = struct.Struct("<II")
-_IS_MIXED, _IS_DERIVED = 8, 16  # Bits of the first byte of FACES and EDGES.
+_IS_MIXED = 8  # Bit of the first byte of FACES: polygons of several sizes.
+_IS_DERIVED = 16  # Bit of the first byte of EDGES: they are the sides of the faces.
 
 
 def _order(chunk: Chunk) -> tuple[int, ...]:

@@ -20,9 +20,12 @@ ROUNDS = 12  # Fits, each by what the one before leaves least of.
 LEAST_WEIGHED = 1e-5  # Of the diagonal: what a vertex is off by, below which it counts no more for it.
 MOST_LEFT = 0.2  # Share of the squares of all motion that the rest of it is at most if there is motion in common.
 LEAST_TURN = 0.7  # Radians by which all turn at least where a foot stands still, or nothing is rigid.
-RIGID, RIGID_SHARE = 1e-5, 0.01  # Of the diagonal: what vertices move at most that stand still; share that does.
-LEAST_STEADY, WIDE = 8, 0.03  # Such vertices, and the spread of these over the diagonal, in two directions.
-FEET, LEAST_FEET = 4, 3  # Vertices of a branch that carries others.
+RIGID = 1e-5  # Distance, in diagonals, that a vertex moves at most beside the common motion to count as steady.
+RIGID_SHARE = 0.01  # Least share of the vertices that has to be steady.
+LEAST_STEADY = 8  # Least number of steady vertices: a turn known by fewer is one of noise.
+WIDE = 0.03  # Least spread of steady vertices in two directions, in diagonals.
+FEET = 4  # Vertices of a branch that carries others by which its turn is known, far apart.
+LEAST_FEET = 3  # Least number of these: fewer tell no turn.
 STEADY_FEET = 1e-4  # Of the diagonal: what feet are off by at most.
 FLAT = 0.05  # Extent of feet across their line, over that along it, that turns are known by.
 

@@ -7,8 +7,8 @@ import numpy as np
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.seen import cheapest_of_each, components, numbered
 
-PATCH_ROUNDS = 8
-MOST_PATCHES = 2000
+PATCH_ROUNDS = 8  # Largest number of rounds in which vertices change to other patches, and small patches join others.
+MOST_PATCHES = 2000  # Largest number of patches, which bounds the time that they take.
 CRUMB = 12  # Vertices below which a patch joins a neighbour.
 
 

@@ -18,9 +18,10 @@ NEAR = (16, 96)  # Nearest points of each one, at least and at most, among which
 PAIRS = 1 << 19  # Pairs in all, if that is more than the least.
 ROUNDS = 6  # Rounds of linking loose ends, among ever fewer points and so ever further away.
 PRECISION = 1e-7  # Part of the diagonal, and of the distance from the origin, below which a point stands still.
-USUAL, ALIKE = 0.25, 30.0  # Links are steady up to ALIKE times this quantile of all points' steadiest ones.
+USUAL = 0.25  # Quantile of the changes in length of all points' steadiest links that is a usual one.
+ALIKE = 30.0  # Times a usual change, up to which a link is steady.
 STEADY = 0.05  # Largest change of a steady link's length over its ends' motion against each other.
-PLIANT = 3.0  # Times that quantile, below which the shorter of two links is the better.
+PLIANT = 3.0  # Times a usual change, below which the shorter of two links is the better.
 UNSTEADY = 0.2  # A loose point is linked only if the link's length changes by less than this part.
 UNLIKE = 4.0  # Its other links must change more than this many times as much.
 OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.
@@ -28,7 +29,7 @@ CROWD = 1.5  # Part of the length of a point's links within which other steady p
 CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
 SCATTERED = 0.05  # Links for each point, among its nearest ones, below which points form no runs.
 JOINED = 0.5  # Smallest share of the points that must be linked; with fewer, the points form no runs.
-PAIRS_AT_ONCE = 1 << 13
+PAIRS_AT_ONCE = 1 << 13  # Pairs of points whose distances are computed at once, which bounds memory.
 
 
 def run_links(frames: np.ndarray) -> np.ndarray | None:

@@ -17,11 +17,12 @@ from athcodec.encoding.segments.segment import CodedPrelude, Source
 from athcodec.encoding.segments.settings import Settings
 from athcodec.encoding.streams import streams
 
-# Steps that are tried, over the error of a level.
+# Steps that are tried, over the error of a level: half octaves, and octaves from 8 on.
 QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)
-# Qualities for up to so many roots, whose maps are mostly a few bytes.
-FEW_ROOTS, ROOT_QUALITIES = 4, (0.7, 1.4, 2.8)
-FILE_SHARE, FEW_BYTES = 0.02, 320  # The maps may take this share of the file, or these bytes if that is more.
+FEW_ROOTS = 4  # Roots up to which their maps have steps of their own: these are mostly a few bytes.
+ROOT_QUALITIES = (0.7, 1.4, 2.8)  # Steps of these maps that are tried, over the error of level 0.
+FILE_SHARE = 0.02  # Share of the file that the maps may take.
+FEW_BYTES = 320  # Bytes that they may take if these are more.
 SMALL_FILE_SHARE = 0.04  # A file without layers may give its maps this share if that is less than FEW_BYTES.
 ERROR_TOLERANCE = 1.08  # Cheaper maps may err by this much more than the finest ones.
 FRAMES = 8  # Frames by which the error of a level is measured.

@@ -33,17 +33,20 @@ from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
 REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
-USUAL_REST_RATIO = 0.5
+USUAL_REST_RATIO = 0.5  # Step of the rest pose, in bounds, that is taken where none other is tried.
 REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TRIAL_SEGMENTS = 3  # Segments of a trial.
-TRIAL_FRAMES, TOO_MANY = 64, 1.2  # Predicted motion is given up if so many frames promise so many times the bytes
-FEW_FRAMES, FAR_TOO_MANY = 8, 3.0  # allowed, or in long segments, in which a look at these costs little, these.
+TRIAL_FRAMES = 64  # Frames of each segment by which predicted motion is given up.
+TOO_MANY = 1.2  # Bytes, over those allowed, that these have to promise for that.
+FEW_FRAMES = 8  # Frames by which it is given up before in long segments, where they cost little.
+FAR_TOO_MANY = 3.0  # Bytes, over those allowed, that these have to promise for that.
 STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
 CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
 FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
 FINE = 9e-4  # Bound, in diagonals, below which second differences are held to one limit.
-UNSEEN, INVISIBLE = 1e-5, 1e-6  # Bounds, in diagonals, below which twitches count for less, and for nothing.
+UNSEEN = 1e-5  # Bound, in diagonals, below which twitches count for less: a hundredth of a pixel.
+INVISIBLE = 1e-6  # Bound, in diagonals, below which they count for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
 HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
 MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.

@@ -28,7 +28,8 @@ CARRIER = 8.0  # Size of a part that carries others, in bounds, up to which it i
 FRAMES = 12  # Frames of a segment by which rigid parts are found.
 TURN_STEP = qz.half_octave(-7)  # Largest step of rotations, in radians: their errors are 1 to 2 degrees.
 MOST_TURN = 15  # Half octaves below 1 radian of the finest largest step.
-CALM_STEP, CALM_COST = 1.15, 1.03  # A calmer step is finer by this factor; all calmer steps cost at most this factor.
+CALM_STEP = 1.15  # Factor by which a calmer step is finer.
+CALM_COST = 1.03  # Bytes that all calmer steps may cost, over those of the first.
 CALM_ROUNDS = 32  # Steps finer than the first that are tried at most: the last is 1/87 of it.
 CALM_SHARE = 1e-4  # Share of the vertices of small rigid parts, over all frames, that may be corrected.
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from athcodec.encoding.model.quantise import bits
 
-LEAST_RING, LARGEST_RING = 2, 32  # Vertices of a ring.
+LEAST_RING = 2  # Least vertices of a ring (FORMAT.md, HIERARCHY).
+LARGEST_RING = 32  # Most vertices of a ring (FORMAT.md, HIERARCHY).
 LEAST_RINGS = 4  # Rings of a tube.
 FINE = 1e-3  # Unit, in lengths of a stem, of the differences by which a period is found.
 WITHIN = 0.1  # Largest share of the squared motion of a tube that is within its rings.

@@ -12,8 +12,10 @@ from athcodec.encoding.segments.settings import Settings
 
 WALKS = 3  # Largest number of walks of both steps.
 LONGEST_WALK = 10  # Grid points that a walk moves at most.
-STEP_FACTOR, REST_STEP_FACTOR = 1.15, 1.4  # Ratios of neighbouring grid points.
-FINE_FACTOR, FINE_REST_FACTOR = 1.04, 1.12  # Factors of a search at effort "best".
+STEP_FACTOR = 1.15  # Ratio of neighbouring steps of motion on the grid.
+REST_STEP_FACTOR = 1.4  # Ratio of neighbouring steps of the rest pose, by which bytes change less.
+FINE_FACTOR = 1.04  # Ratio of steps of motion at effort "best".
+FINE_REST_FACTOR = 1.12  # Ratio of steps of the rest pose at effort "best".
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # Shares of a level's vertices that may have weights below that of the level's step.
 WEIGHT_POWERS = (0.5, 1.0)  # Powers of a level's weight that are tried as the factor on its step.
 
