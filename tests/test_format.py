@@ -119,6 +119,14 @@ def test_a_decoder_before_1_0_takes_its_own_version_and_one_of_1_x_every_minor_v
     assert all(rule(*version) for version in known) and not any(rule(*version) for version in unknown)
 
 
+@pytest.mark.parametrize("name", ["errors-announced", "errors-by-chance", "everything", "clips-three"])
+def test_the_error_table_of_a_vector_is_the_same_to_the_document_and_the_code(spec, name):
+    """No item of the vectors asks for it."""
+    data = (VALID / f"{name}.ath").read_bytes()
+    with opened(data) as decoder:
+        assert np.array(spec.read_front(data)[0].errors).tobytes() == decoder.file.errors.tobytes()
+
+
 def test_checksum_has_the_check_value_of_the_document(spec):
     text = " ".join(section("Checksums").split())
     value = int(re.search(r'bytes "123456789" is (0x[0-9A-F]{8})', text)[1], 16)
