@@ -28,7 +28,7 @@ from athcodec import errors
 from athcodec._native import BRANCH, crc32c
 from athcodec.decoding import container
 from athcodec.encoding.streams import streams, writing
-from spec.document import TAKEN_FOR_GRANTED, TEXT, code_of, rules, run, section, table
+from spec.document import TAKEN_FOR_GRANTED, TEXT, File, code_of, rules, run, section, table
 from spec.dump import lines as dump_lines
 from spec.scripted import Script, write
 
@@ -119,6 +119,14 @@ def test_a_decoder_before_1_0_takes_its_own_version_and_one_of_1_x_every_minor_v
     assert all(rule(*version) for version in known) and not any(rule(*version) for version in unknown)
 
 
+@pytest.mark.parametrize("name", ["errors-announced", "errors-by-chance", "everything", "clips-three"])
+def test_the_error_table_of_a_vector_is_the_same_to_the_document_and_the_code(spec, name):
+    """No item of the vectors asks for it."""
+    data = (VALID / f"{name}.ath").read_bytes()
+    with opened(data) as decoder:
+        assert np.array(spec.read_front(data)[0].errors).tobytes() == decoder.file.errors.tobytes()
+
+
 def test_checksum_has_the_check_value_of_the_document(spec):
     text = " ".join(section("Checksums").split())
     value = int(re.search(r'bytes "123456789" is (0x[0-9A-F]{8})', text)[1], 16)
@@ -152,17 +160,39 @@ def test_no_step_of_the_way_for_a_first_decoder_needs_a_function_or_a_constant_o
     spec, definitions = run(), definitions_of_the_code()
     rows = {int(row["Step"]): row for row in table("A way for a first decoder", "Step")}
     assert rows.keys() >= WORKS.keys()
-    known: list[tuple[str, str, str]] = []
+    known: set[str] = set()
     for step, row in sorted(rows.items()):
-        known += re.findall(r"\[([^\]]+)\]\(#[^)]*\)(?: (up to|without) `(\w+)`)?", row["Sections"])
+        known |= sections_of(row)
         vectors = re.findall(r"`(\S+)\.ath`", row["What works then"])
         assert bool(vectors) == (step in {3, 5, 6, 8})
         with calls_noted(spec, definitions) as called:
             for data in [(VALID / f"{name}.ath").read_bytes() for name in vectors] or [EXAMPLE]:
                 WORKS.get(step, lambda *_: None)(spec, data)
-        needed = called.union(*(definitions[name].constants for name in called))
+        needed = with_constants(definitions, called)
         assert bool(needed) == (step in WORKS)
-        assert {name for name in needed if not is_in(definitions, known, name)} == set(), f"step {step}"
+        assert {name for name in needed if definitions[name].section not in known} == set(), f"step {step}"
+
+
+FEATURES = table("Features", "A file uses")
+
+
+@pytest.mark.parametrize("at", range(len(FEATURES)), ids=[row["Vector"].strip("`") for row in FEATURES])
+def test_a_feature_needs_the_first_half_of_the_document_its_sections_and_those_of_the_rows_above(at):
+    spec, definitions, row = run(), definitions_of_the_code(), FEATURES[at]
+    known = set().union(*map(sections_of, [*table("A way for a first decoder", "Step"), *FEATURES[:at]]))
+    path = VALID / f"{row['Vector'].strip('`')}.ath"
+    mesh = path.with_suffix(".mesh")
+    with calls_noted(spec, definitions) as called:
+        file = File(path.read_bytes(), True, mesh.read_bytes() if mesh.exists() else None, spec)
+        levels = [] if row["A file uses"] == "static data" else [*map(str, range(file.header.level_count)), "rest"]
+        for item in levels or ["static"]:
+            file.answer(item)
+    stands = {definitions[name].section for name in with_constants(definitions, called)}
+    assert stands - known <= sections_of(row) and stands & sections_of(row) - known
+
+
+def sections_of(row: dict[str, str]) -> set[str]:
+    return set(re.findall(r"\[([^\]]+)\]\(#", row["Sections"]))
 
 
 @dataclass(frozen=True)
@@ -170,8 +200,11 @@ class Definition:
     """A function, class or constant of the code: where it stands, and which constants it names."""
 
     section: str
-    last_line: int
     constants: frozenset[str]
+
+
+def with_constants(definitions: dict[str, Definition], names: set[str]) -> set[str]:
+    return names.union(*(definitions[name].constants for name in names))
 
 
 def definitions_of_the_code() -> dict[str, Definition]:
@@ -184,7 +217,6 @@ def definitions_of_the_code() -> dict[str, Definition]:
     return {
         name: Definition(
             [title for at, title in headings if at <= node.lineno][-1],
-            node.end_lineno,
             frozenset(constants & {part.id for part in ast.walk(node) if isinstance(part, ast.Name)} - {name}),
         )
         for name, node in nodes.items()
@@ -216,17 +248,6 @@ def calls_noted(spec: ModuleType, names: Iterable[str]) -> Iterator[set[str]]:
         vars(spec).update(originals)
 
 
-def is_in(definitions: dict[str, Definition], sections: list[tuple[str, str, str]], name: str) -> bool:
-    """Whether it stands in one of these sections: in all, up to a function, or without a function."""
-    parts = [(word, function) for section, word, function in sections if section == definitions[name].section]
-    return any(
-        not word
-        or (word == "up to" and definitions[name].last_line <= definitions[function].last_line)
-        or (word == "without" and name != function)
-        for word, function in parts
-    )
-
-
 def test_no_variable_of_the_code_has_the_name_of_a_function():
     tree = code_of(TEXT)
     functions = {node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
@@ -237,10 +258,10 @@ def test_no_variable_of_the_code_has_the_name_of_a_function():
 
 
 def test_every_section_stands_on_the_way_for_a_first_decoder_or_beside_the_feature_that_needs_it():
-    named = set(re.findall(r"\[([^\]]+)\]\(#", section("A way for a first decoder")))
+    named = set().union(*map(sections_of, table("A way for a first decoder", "Step") + FEATURES))
     with_code = set()
     for title, text in re.findall(r"^#+ (.+)\n((?:(?!#+ ).*\n)*?(?=^#+ |\Z))", text_without_code(), re.M):
-        with_code |= {title} if "CODE" in text else set()
+        with_code |= {title} if "\nCODE\n" in text else set()
     assert len(with_code) > 30 and with_code - named == set()
 
 

@@ -114,7 +114,7 @@ static void show_parts(user *u, int32_t argument, int is_float64)
         REQUIRE(cut[i].first == next && cut[i].count > 0, "parts ascend and leave nothing out");
         next += cut[i].count;
     }
-    REQUIRE(next == u->info.vertex_count, "parts hold every vertex");
+    REQUIRE(next == u->info.place_count, "parts hold every place");
     if (is_float64) {
         ath_matrices_float64(u->file, u->held, HELD + 1, at, matrices, 12 * number);
         ath_exact_float64(u->file, u->held, HELD + 1, at, stems, 3 * number);
@@ -148,8 +148,8 @@ static void ask(user *u, int32_t argument)
         ath_level_for(u->file, argument & 4 ? segment : 0, segment, measure, argument, 0.02 * argument, 1080.0, 1.0);
     REQUIRE(level >= 0 && level < u->info.level_count, "a distance asks for a level that there is");
     for (int32_t i = 0; i < u->info.chunk_count; i += 1 + argument) ath_check_chunk(u->file, i, NULL);
-    int32_t last = u->info.vertex_count - 1;
-    REQUIRE(ath_vertex_source(u->file)[last] <= last, "vertices are those of the source");
+    int32_t last = u->info.place_count - 1;
+    REQUIRE(ath_vertex_source(u->file)[last] < u->info.vertex_count, "vertices are those of the source");
     REQUIRE(ath_branch_source(u->file)[u->info.branch_count - 1] < u->info.branch_count, "so are branches");
     const ath_clip *clip = ath_clips(u->file) + argument % u->info.clip_count;
     const double *times = ath_times(u->file) + clip->first_frame;

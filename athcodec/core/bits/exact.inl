@@ -8,7 +8,7 @@ enum { EXACT_BITS = 64 };
 
 typedef struct {
     ath_context size[EXACT_BITS + 1][EXACT_BITS]; /* by the length of the difference before */
-    ath_context mantissa[EXACT_BITS][4];
+    ath_context mantissa[EXACT_BITS][MANTISSA_CONTEXTS];
 } exact_model;
 
 static void exact_model_init(exact_model *model)
@@ -16,7 +16,7 @@ static void exact_model_init(exact_model *model)
     for (int32_t before = 0; before <= EXACT_BITS; before++)
         for (int32_t bin = 0; bin < EXACT_BITS; bin++) context_init(&model->size[before][bin], 60000);
     for (int32_t bin = 0; bin < EXACT_BITS; bin++)
-        for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
+        for (int32_t i = 0; i < MANTISSA_CONTEXTS; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
 static uint64_t bits_of(double number, int is_float64)

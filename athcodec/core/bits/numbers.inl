@@ -4,11 +4,11 @@
 
 #include "bits/range_coder.inl"
 
-enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MAGNITUDE_CLIP = 1 << 20 };
+enum { NUMBER_CLASSES = 28, NUMBER_BINS = 30, MANTISSA_CONTEXTS = 3, MAGNITUDE_CLIP = 1 << 20 };
 
 typedef struct {
     ath_context size[NUMBER_CLASSES][NUMBER_BINS + 2]; /* rows of whole cache lines */
-    ath_context mantissa[NUMBER_BINS][4];
+    ath_context mantissa[NUMBER_BINS][MANTISSA_CONTEXTS];
 } number_model;
 
 /* Returns the bits in x: 0 for 0, 1 for 1, 2 for 2 and 3, ... */
@@ -62,11 +62,12 @@ static void number_model_init(number_model *model)
         }
     }
     for (int32_t bin = 0; bin < NUMBER_BINS; bin++)
-        for (int32_t i = 0; i < 4; i++) context_init(&model->mantissa[bin][i], 30000);
+        for (int32_t i = 0; i < MANTISSA_CONTEXTS; i++) context_init(&model->mantissa[bin][i], 30000);
 }
 
 /* Codes the bits of a number below its leading one. The first two have contexts. length: at least 1. */
-ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[4], int32_t length, uint64_t value)
+ATH_INLINE uint64_t code_mantissa(ath_coder *coder, ath_context contexts[MANTISSA_CONTEXTS], int32_t length,
+                                  uint64_t value)
 {
     uint64_t built = 1;
     for (int32_t bit = length - 2; bit >= 0; bit--) {

@@ -477,7 +477,7 @@ ATH_API int32_t ath_ready_level(const ath_file *file, int32_t segment);
 /* A level cuts the plant into parts: nodes, which are subtrees that one matrix moves, and exact runs, which are stems
  * whose vertices have positions of their own. Parts ascend and hold every vertex once. The last level has only runs. */
 typedef struct ath_part {
-    int32_t first, count; /* vertices */
+    int32_t first, count; /* vertices in file order, one for each place */
     int32_t branch;       /* branch of a node; -1 for an exact run */
     int32_t index;        /* index of a node's matrix, or of a run's first vertex among the exact vertices */
 } ath_part;

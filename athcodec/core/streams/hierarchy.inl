@@ -113,7 +113,7 @@ static int code_attach(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     ath_branch *branch = branches + b, *parent = branches + branch->parent;
     int32_t step = code_signed(coder, &model->attach, *mean, branch->attach - parent->first - parent->subtree);
     int32_t place = parent->subtree + step;
-    if (step < -(1 << 28) || step > 1 << 28 || place < 0 || place >= parent->count) return 0;
+    if (place < 0 || place >= parent->count) return 0;
     branch->attach = parent->first + place;
     parent->subtree = place;
     *mean = averaged(*mean, step);

@@ -184,7 +184,7 @@ static int code_node(ath_coder *coder, affine_model *model, const ath_plan *plan
     const ath_node *node = plan->nodes + n;
     int32_t before = model->step_before, above_count = -1;
     int32_t change = code_signed(coder, &model->step, 32, *rows->step - before);
-    if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
+    if (before + change < -200 || before + change > 200) return 0;
     *rows->step = model->step_before = before + change;
     for (int32_t r = 0; r < node->rank; r++)
         above_count = code_row(coder, &model->rows, frames, frames, r, above_count, ath_row(rows->rows, r, frames));
@@ -210,7 +210,7 @@ static int code_basis_rows(ath_coder *coder, basis_model *model, int32_t frames,
 {
     for (int32_t r = 0; r < count; r++) {
         int32_t before = model->step_before, change = code_signed(coder, model->steps, 32, exponents[r] - before);
-        if (change < -400 || change > 400 || before + change < -200 || before + change > 200) return 0;
+        if (before + change < -200 || before + change > 200) return 0;
         exponents[r] = model->step_before = before + change;
     }
     model->above_count = code_row(coder, model->rows, frames, frames, 0, model->above_count, row);
