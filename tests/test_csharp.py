@@ -160,7 +160,8 @@ def test_constants_are_those_of_the_headers():
 
 
 PLAYED = (
-    r"level (\d+) of (\d+), (\d+) of (\d+) bytes, (\d+) triangles, (\w+) with texture coordinates, ([\d.]+) ms a frame\n"
+    r"level (\d+) of (\d+), (\d+) of (\d+) bytes, (\d+) triangles, "
+    r"(\w+) with texture coordinates, ([\d.]+) ms a frame\n"
 )
 
 

@@ -67,7 +67,9 @@ def player(installed, raylib, tmp_path_factory) -> Path:
     """The example, built by its CMakeLists.txt as a copy of it would be."""
     build = tmp_path_factory.mktemp("player")
     found = f"-DCMAKE_PREFIX_PATH={installed};{raylib}", f"-Draylib_DIR={raylib}"
-    printed("cmake", "-S", CORE / "examples", "-B", build, *found, f"-DCMAKE_BUILD_TYPE={BUILD}", f"-DCMAKE_C_FLAGS={FLAGS}")
+    printed(
+        "cmake", "-S", CORE / "examples", "-B", build, *found, f"-DCMAKE_BUILD_TYPE={BUILD}", f"-DCMAKE_C_FLAGS={FLAGS}"
+    )
     printed("cmake", "--build", build)
     return build / "raylib_player"
 

@@ -149,7 +149,9 @@ VIEW = np.dtype(
 )
 
 
-def chosen(card, vertices: np.ndarray, instances: np.ndarray, tolerances: list[float], **view: object) -> list[set[int]]:
+def chosen(
+    card, vertices: np.ndarray, instances: np.ndarray, tolerances: list[float], **view: object
+) -> list[set[int]]:
     """The instances that choose.wgsl appends to the list of each shape."""
     module = card.device.create_shader_module(code=(SHADERS / "choose.wgsl").read_text("utf-8"))
     count, shapes = len(instances), len(tolerances)
@@ -159,7 +161,9 @@ def chosen(card, vertices: np.ndarray, instances: np.ndarray, tolerances: list[f
     shape = np.zeros(shapes, np.dtype([("tolerance", "f4"), ("list", "u4")]))
     shape["tolerance"], shape["list"] = tolerances, np.arange(shapes)
     buffers = [instances, None, shape, 5 * shapes, shapes * count, 1, vertices]
-    made = [card.buffer(each if isinstance(each, int) else each.view(np.uint32)) for each in buffers if each is not None]
+    made = [
+        card.buffer(each if isinstance(each, int) else each.view(np.uint32)) for each in buffers if each is not None
+    ]
     made.insert(1, card.buffer(words.view(np.uint32), "UNIFORM"))
     encoder = card.device.create_command_encoder()
     work = encoder.begin_compute_pass()
@@ -198,5 +202,5 @@ def test_no_instance_that_is_in_view_is_left_out(card, headed):
     drawn = lists[0] | lists[1]
     assert not lists[0] & lists[1] and set(np.flatnonzero((x > 10).any(axis=1)).tolist()) <= drawn
     assert len(drawn) < 500 and lists[0] and lists[1]
-    far = np.flatnonzero((np.abs(10 - instances[:, 0]) > 20 * instances[:, 3] + 1e-3)).tolist()
+    far = np.flatnonzero(np.abs(10 - instances[:, 0]) > 20 * instances[:, 3] + 1e-3).tolist()
     assert lists[1] == drawn & set(far), "the coarsest whose error is at most a tenth of the distance"

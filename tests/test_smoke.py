@@ -135,6 +135,7 @@ def test_a_call_that_no_longer_fits_the_core_ends_the_build_with_the_line_of_the
 RUNS = {  # Words of each verb after a clip, or alone.
     "rd": "CLIP --bounds 1e-3 --codecs RAW",
     "report": "--help",
+    "engines": "--help",
     "sample": "--help",
     "viewer": "--help",
     "gallery": "--help",
