@@ -139,7 +139,7 @@ def test_the_gallery_states_the_figures_and_the_bounds_of_its_files():
             frames, size = decoder.file.frame_count, path.stat().st_size / 1000
             points, bound = (
                 f"{decoder.file.vertex_count:,} points",
-                f"within {1000 * decoder.levels[-1].max_error:.2g} mm",
+                f"within {1000 * decoder.file.levels[-1].max_error:.2g} mm",
             )
             assert figures == f"{points}, {frames} frames, {size:.{1 if size < 10 else 0}f} kB, {bound}"
 
