@@ -129,17 +129,19 @@ def test_sizes_and_times_stand_only_in_what_is_written_from_stored_results():
         assert not stated or page.name == "gallery.md", page
 
 
-def test_the_gallery_states_the_figures_of_its_files():
-    text = (ROOT / "docs" / "gallery.md").read_text("utf-8")
-    stated = re.findall(r'<ath-viewer src="([^"]+)"[^>]*>.*?<p>[^<]*: ([^<]*)</p>', text, re.DOTALL)
+def test_the_gallery_states_the_figures_and_the_bounds_of_its_files():
+    text = " ".join(re.sub(r"<!--.*?-->", "", (ROOT / "docs" / "gallery.md").read_text("utf-8")).split())
+    stated = re.findall(r'<ath-viewer src="([^"]+)"[^>]*>.*?<p>[^<]*: ([^<]*?) ?</p>', text)
     assert len(stated) == 5
     for source, figures in stated:
         path = ROOT / "docs" / source
         with athcodec.open(path) as decoder:
             frames, size = decoder.file.frame_count, path.stat().st_size / 1000
-            assert (
-                figures == f"{decoder.file.vertex_count:,} points, {frames} frames, {size:.{1 if size < 10 else 0}f} kB"
+            points, bound = (
+                f"{decoder.file.vertex_count:,} points",
+                f"within {1000 * decoder.file.levels[-1].max_error:.2g} mm",
             )
+            assert figures == f"{points}, {frames} frames, {size:.{1 if size < 10 else 0}f} kB, {bound}"
 
 
 def run(*command, **options):

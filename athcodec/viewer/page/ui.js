@@ -28,7 +28,7 @@ export function lengthText(length, unit) {
 export function shortLength(length, unit) {
   if (!(unit in UNITS)) return lengthText(Number(length.toPrecision(2)), unit);
   const mm = 1e3 * length * UNITS[unit], [size, name] = mm < 99.5 ? [1, "mm"] : mm < 995 ? [10, "cm"] : [1000, "m"];
-  return `${countText(Number((mm / size).toPrecision(2)))} ${name}`;
+  return `${countText(Number((mm / size).toPrecision(2)))}\u00a0${name}`;
 }
 
 /** A level, for people: "detail 2 of 6". */
