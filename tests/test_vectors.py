@@ -3,6 +3,7 @@ WebAssembly decoder and the code of FORMAT.md; and the program that tests the de
 
 from __future__ import annotations
 
+import hashlib
 import re
 import sys
 from fnmatch import fnmatch
@@ -28,6 +29,14 @@ def run(*words, code: int = 0) -> str:
 
 
 # ---- the files ---------------------------------------------------------------------------------------------
+
+
+def test_the_checksums_of_all_files_of_the_vectors_are_listed():
+    sums = dict(line.split("  ")[::-1] for line in (conformance.FOLDER / "SHA256SUMS").read_text("utf-8").splitlines())
+    files = {path for path in conformance.FOLDER.rglob("*") if path.is_file() and path.name != "SHA256SUMS"}
+    assert sums == {
+        path.relative_to(conformance.FOLDER).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files
+    }
 
 
 def test_every_file_is_listed_once_and_has_not_changed():

@@ -7,6 +7,7 @@ expected error of a vector is stated here; expected.txt gets the results of FORM
 vector never changes once it exists: a better one gets another name.
 """
 
+import hashlib
 from importlib import import_module
 from pathlib import Path
 
@@ -55,4 +56,12 @@ def write(folder: Path = conformance.FOLDER) -> int:
     if not lines or not lines[0].startswith("#"):
         lines = [f"# {text}" if text else "#" for text in conformance.LISTING.splitlines()] + lines
     listed.write_text("\n".join(lines) + "\n", "utf-8")
+    write_sums(folder)
     return made
+
+
+def write_sums(folder: Path = conformance.FOLDER) -> None:
+    """Writes SHA256SUMS, the checksums of all other files of the vectors, as `sha256sum --check` reads them."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "SHA256SUMS")
+    sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}" for path in files]
+    (folder / "SHA256SUMS").write_text("\n".join(sums) + "\n", "utf-8")

@@ -36,8 +36,8 @@ invalid(
     "host-mesh-and-source-rest: SOURCE_REST beside the host's mesh",
     lambda: hosted().add(Entry(SOURCE_REST, source_rest_chunk(b""))),
 )
-table(
-    "source-rest-twice: two chunks SOURCE_REST",
+whole(
+    "table-source-rest-twice BAD_CHUNK_TABLE: two chunks SOURCE_REST",
     lambda: still(FORK, source_rest=bent(FORK, [])).add(Entry(SOURCE_REST, bent(FORK, []))),
 )
 invalid(
@@ -45,8 +45,8 @@ invalid(
     lambda: still(FORK, source_rest=b"\2" + bent(FORK, [])[1:]),
 )
 for kind_, place_, level_, segment_ in (("stage", "the last stage", 3, 0), ("segment", "the last segment", 2, 2)):
-    table(
-        f"unknown-motion-{kind_}-beyond: an optional chunk of an unknown motion kind behind {place_}",
+    whole(
+        f"table-unknown-motion-{kind_}-beyond BAD_CHUNK_TABLE: an unknown chunk of motion behind {place_}",
         lambda level_=level_, segment_=segment_: fork().add(Entry(0x8018, FUTURE, level_, segment_)),
     )
 whole(
