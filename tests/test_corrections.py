@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import athcodec
+from athcodec._native import BRANCH
 from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.motion import Plan
 from athcodec.encoding.segments import segment
 from athcodec.encoding.streams import streams
 
@@ -130,3 +132,13 @@ def test_a_trial_corrects_some_of_very_many_frames_only(monkeypatch):
     monkeypatch.setattr(segment, "find_corrections", lambda *words: trials.append(find(*words)) or trials[-1])
     athcodec.encode(positions, fps=24, rel_error=1e-4)
     assert 0 < max(len(one.rows) for one in trials) < segment.MANY + segment.MANY_SHARE * positions[..., 0].size
+
+
+@pytest.mark.parametrize("part", [2, 4, 16])
+def test_corrections_of_one_long_branch_are_estimated_on_vertices_all_along_it(part):
+    count = 1525
+    branches = np.zeros(1, BRANCH)
+    branches["parent"], branches["attach"], branches["count"] = -1, -1, count
+    vertices = Plan(branches, count).sample(part).vertices
+    thirds, _ = np.histogram(vertices, 3, (0, count))
+    assert len(vertices) < count and (thirds > 0).all()

@@ -44,6 +44,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 NO_ROOT = -1  # Root of streams without a learned basis (core/model/motion.h).
 RANGES = 24  # Parts of a plant of which threads take one at a time; more cost more calls, fewer leave threads idle.
 LEAST_RANGE = 1024  # Vertices of the smallest such part, below which a call costs more than its work.
+LEAST_PIECES = 3  # Pieces of a sample, if there are as many.
 PERIOD = 128  # Vertices from one run of a sample to the next.
 LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
@@ -208,6 +209,9 @@ class Plan:
         pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
         # Long pieces that all begin at the start of a period would all be in the sample.
         pieces = pieces[:: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))]
+        if len(pieces) < LEAST_PIECES:  # Few long pieces that begin elsewhere would leave one of them, calm or wild.
+            stride = max(1, min(part, len(self.pieces) // LEAST_PIECES))
+            pieces = self.pieces[stride // 2 :: stride]
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first

@@ -39,9 +39,10 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
-SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
+SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
-CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
+CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first moves from which on the mean pose is better.
+TURNED_LEAST_SHARE = 0.5  # Least share of its bytes in waves that time bases have brought a turning root down to.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -137,7 +138,10 @@ class Search:
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
             other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
-            search = other if other.first_cost() <= search.first_cost() else search  # Shapes that turn sum a few, too.
+            turned = (search.of_sample or search).trials
+            plain_cost = other.first_cost()  # Shapes that turn sum a few, too.
+            is_clear = plain_cost <= TURNED_LEAST_SHARE * turned.cost(turned.start)
+            search = other if is_clear or plain_cost <= search.first_cost() else search
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -318,7 +322,8 @@ class Search:
             return self
         self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
-        return other if other.first_cost() < self.first_cost() else self
+        of_mean, of_rest = ((one.of_sample or one).trials for one in (other, self))
+        return other if of_mean.cost(of_mean.start) < of_rest.cost(of_rest.start) else self
 
     @property
     def _may_have_mean_pose(self) -> bool:
@@ -329,7 +334,7 @@ class Search:
 
     def about_best_reference(self) -> Search:
         """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: the
-        mean pose if it is far ahead at first settings, else it is tried with what was chosen about the rest pose, and
+        mean pose if it is far ahead at first moves, else it is tried with what was chosen about the rest pose, and
         goes on from there. In small clips both are searched up to their steps."""
         if not self._may_have_mean_pose:
             return self
@@ -342,8 +347,8 @@ class Search:
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
         if not self.makes_all_again:
-            at_first = ((one, one.start) for one in (about_rest.trials, about_mean.trials))
-            of_rest, of_mean = (np.array([one.cost(start), one.level_costs(start).sum()]) for one, start in at_first)
+            at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
+            of_rest, of_mean = (np.array([one.cost(first), one.level_costs(first).sum()]) for one, first in at_first)
             if (of_rest > CLEAR_RATIO * of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
@@ -361,6 +366,8 @@ class Search:
         source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
         ath = replace(trials.ath, rest=source.rest + source.origin)
         start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
+        if not any(trials.start.rotation_step_factors):  # What sways far and does not turn sways about its mean, too.
+            start = replace(start, rotation_step_factors=trials.start.rotation_step_factors)
         return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
 
     def _like(self, other: Search, settings: Settings) -> Settings:

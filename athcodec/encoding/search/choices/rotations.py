@@ -76,11 +76,13 @@ def first_move(settings: Settings, trials: Trials) -> Settings:
     """Return the cheapest of settings in waves and in time bases, on both kinds of branches: where work is short, no
     other choice saves as much."""
     in_waves = trials.cheapest(tried := _in_waves(settings, trials))
-    turns = any(settings.rotation_step_factors)  # Such tracks are no sums of a few shapes.
-    if not turns and trials.work.fits(2 * trials.work_of_trial):
-        tried += learned_bases.candidates(replace(settings, still=True), trials) if tried[1:] else []
-        if not in_waves.still:  # One time basis alone would win against waves.
-            tried += learned_bases.candidates(settings, trials)[:1]
+    if not trials.work.fits(2 * trials.work_of_trial):
+        return in_waves
+    if any(settings.rotation_step_factors):  # What turns steadily is a sum of a few shapes in each kind of branches.
+        return trials.cheapest([*tried, *learned_bases.candidates(in_waves, trials)])
+    tried += learned_bases.candidates(replace(settings, still=True), trials) if tried[1:] else []
+    if not in_waves.still:  # One time basis alone would win against waves.
+        tried += learned_bases.candidates(settings, trials)[:1]
     return trials.cheapest(tried)
 
 
