@@ -38,7 +38,7 @@ NEAR_RATIO = 1.1  # Bytes of these, over the least.
 SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
 
 STEP_TRIALS, FIRST_LAYER_TRIALS = 12, 6  # Trials for which choices leave work: of steps, and of the first of layers.
-SEARCHED_SHARE = 0.5  # Share of the bytes of motion at its first settings that a search usually comes down to.
+SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first settings from which on the mean pose is better.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
@@ -198,12 +198,12 @@ class Search:
         return search._cost_of_frames(search.at_best_step, frames_ratio)
 
     def expected(self, frames_ratio: float) -> float:
-        """Return about the bytes of a file of so many times the frames, by the choice that saves most. All
-        that is compared so takes the same few trials, whatever work is left."""
+        """Return about the bytes of a file of so many times the frames, by its bytes in waves and in time bases. What
+        is compared so takes the same few trials, whatever work is left: with either alone sizes are ranked well, but
+        not one in waves against one in time bases."""
         search = self.of_sample or self
-        first = rotations.first_move(search.trials.start, search.trials)
-        share = 1.0 if any(first.learned_bases) else SEARCHED_SHARE  # A search saves less of what is in time bases.
-        return search._cost_of_frames(first, share * frames_ratio)
+        typical = rotations.typical_moves(search.trials.start, search.trials)
+        return sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
