@@ -187,7 +187,7 @@ def _are_even(label: np.ndarray) -> bool:
 def _are_plants(found: Found) -> bool:
     """Return whether branches are copies of one plant side by side. Rings of one stem would hang on each other."""
     roots = np.count_nonzero(found.branch_parent < 0)
-    return _are_even(found.vertex_branch) and roots > PLANTS * len(found.branch_parent)
+    return _are_even(found.vertex_branch) and bool(roots > PLANTS * len(found.branch_parent))
 
 
 def _leaves_many_alone(found: Found) -> bool:
