@@ -41,7 +41,7 @@ FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are
 STILL = 1e-6  # Of the diagonal: change of a distance that is none.
 PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the source says nothing.
 COPIES, ALIKE_PARTS = 8, 0.8  # Parts, and share of them that are of one size, which is no accident.
-PLANTS = 0.5  # Part of such parts that are roots above which they are plants.
+PLANTS = 0.5  # Part of the branches that are roots by their price above which they are plants side by side.
 FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
@@ -133,7 +133,7 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
     yield dataclasses.replace(first, stem_index=None)
-    if roots > 1:
+    if 1 < roots <= PLANTS * len(first.branch_parent):
         yield _by_contact(seen, first)
     if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
         yield arranged(seen, seen.parts, None, "components")
