@@ -8,6 +8,7 @@ import pytest
 import athcodec
 from athcodec import MotionClip
 from athcodec.motion.branches.forest import cheapest_forest
+from bench.scenes import fields
 
 FRAMES = 32
 MOST = 1.05  # Size on branches that are found, over that on true ones.
@@ -86,3 +87,12 @@ def test_the_cheapest_forest_is_the_one_that_trying_all_finds():
             end = np.take_along_axis(step, end, axis=1)
         is_forest = (end == 5).all(axis=1)
         assert total == pytest.approx(cost[np.arange(5), every[is_forest]].sum(axis=1).min())
+
+
+def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():
+    clip = fields.stems(seed=3, plants=20).clip
+    true, found = (
+        len(athcodec.encode(one, ladder="none", attributes="none"))
+        for one in (clip, clip.replace(vertex_branch=None, branch_parent=None, stem_index=None))
+    )
+    assert found <= MOST * true

@@ -18,7 +18,7 @@ from athcodec.motion.branches.forest import cheapest_forest
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
-from athcodec.motion.branches.seen import Seen, cheapest_of_each, components
+from athcodec.motion.branches.seen import Seen, cheapest_of_each, components, sizes_of_each
 from athcodec.motion.clip import source_stem_index, stem_index_of
 
 NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are sought.
@@ -28,6 +28,7 @@ STAYING = 300.0  # Weight of the variation of two branches' distance against its
 RELATED = 0.5  # Cost factor for each word that the names of two branches have in common, place by place.
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
 ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
+WORTH_LEVELS = 0.01  # Part of the bits of roots that hanging saves at least: a few in levels of their own cost more.
 MOST_STRAIN = 30.0  # Bits at most that a contact costs because it is far or does not stay.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
@@ -76,7 +77,7 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
     vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
     child, parent = label[vertices].T
     cost = np.tile(contacts.cost, 2)
-    size = np.maximum(_sizes(frames[0], label)[child], cost / MOST_STRAIN)
+    size = np.maximum(sizes_of_each(frames[0], label)[child], cost / MOST_STRAIN)
     hanging = prices.on_others(vertices) + cost / np.maximum(size, np.finfo(float).tiny)
     alone = prices.as_roots()
     if root is not None:
@@ -87,6 +88,8 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
         *(count, np.append(child, every), np.append(parent, np.full(count, count)), np.append(hanging, alone))
     )
     hangs = chosen < len(child)
+    if (alone - np.append(hanging, alone)[chosen]).sum() < WORTH_LEVELS * alone.sum():
+        hangs[:] = False
     base, above = _stillest(frames, label), np.full(count, -1)
     base[hangs], above[hangs] = vertices[chosen[hangs], 0], parent[chosen[hangs]]
     return _Joints(above, base)
@@ -143,7 +146,7 @@ def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
     """Return the branch of each part, among the large ones, of which some vertex moves least."""
-    size = _sizes(frames[0], label)
+    size = sizes_of_each(frames[0], label)
     largest = np.zeros(parts.max() + 1)
     np.maximum.at(largest, parts, size)
     way = ((frames[:, still] - frames[0, still]) ** 2).sum(axis=(0, 2))
@@ -154,21 +157,12 @@ def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.n
     return order[np.unique(parts[order], return_index=True)[1]]
 
 
-def _sizes(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return the diagonals of the branches' bounding boxes."""
-    order = np.argsort(label, kind="stable")
-    first = np.searchsorted(label[order], np.arange(label.max() + 1))
-    low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
-    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
-    return diagonals
-
-
 def _contacts(frames: np.ndarray, label: np.ndarray, names: Sequence[Sequence[str]]) -> _Contacts:
     """Return the pair of vertices of every two near branches that best keeps its distance: they may hang together
     there."""
     pairs = _near_pairs(frames[0], label)
     gap = np.linalg.norm(frames[0, pairs[:, 0]] - frames[0, pairs[:, 1]], axis=1)
-    near = gap <= _sizes(frames[0], label)[label[pairs]].max(axis=1)
+    near = gap <= sizes_of_each(frames[0], label)[label[pairs]].max(axis=1)
     pairs, cost = pairs[near], gap[near]
     for start in range(0, len(pairs), QUERY // len(frames)):
         some = slice(start, start + QUERY // len(frames))

@@ -41,6 +41,8 @@ STEADY_NEXT = 0.2  # Change of the distance of two vertices, over their motion, 
 FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are of two parts.
 STILL = 1e-6  # Of the diagonal: change of a distance that is none.
 PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the source says nothing.
+COPIES, ALIKE_PARTS = 8, 0.8  # Parts, and share of them that are of one size, which is no accident.
+PLANTS = 0.5  # Part of the branches that are roots by their price above which they are plants side by side.
 FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
@@ -91,7 +93,10 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
         yield from _distinct(itertools.chain([first], _others(seen, first)))
         return
-    yield from _in_order(seen)
+    for found in _in_order(seen):
+        yield found
+        if _are_plants(found):
+            return
     yield single
     if first is not None:
         yield first
@@ -129,7 +134,7 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
     yield dataclasses.replace(first, stem_index=None)
-    if roots > 1:
+    if 1 < roots <= PLANTS * len(first.branch_parent):
         yield _by_contact(seen, first)
     if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
         yield arranged(seen, seen.parts, None, "components")
@@ -145,25 +150,45 @@ def _by_contact(seen: Seen, first: Found) -> Found:
 
 
 def _in_order(seen: Seen) -> Iterator[Found]:
-    """Yield parts of points that nothing joins whose vertices follow each other in the source, as programs write them.
-    The next one belongs to another part where the two do not keep their distance, or are far from each other, too:
-    what stands in the ground keeps its distance from the feet around it."""
+    """Yield parts of points that nothing joins whose vertices follow each other in the source, as programs write
+    them."""
+    for label in _labels_in_order(seen):
+        yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)
+
+
+def _labels_in_order(seen: Seen) -> list[np.ndarray]:
+    """Return labels of such parts, (N,) each. The next vertex belongs to another part where the two do not keep their
+    distance, or are far from each other, too: what stands in the ground keeps its distance from the feet around it.
+    Where these are of one size, as copies are, there is no doubt of them."""
     frames, count = seen.frames[1:], seen.clip.vertex_count
     if len(seen.mesh) or count < 2:
-        return
+        return []
     way = frames[:, 1:] - frames[:, :-1]
     apart = np.linalg.norm(way, axis=2)
     moved = np.sqrt(((way - way.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
     still = STILL * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
     is_unsteady = apart.std(axis=0) > STEADY_NEXT * moved + still
     is_far = apart.mean(axis=0) > FAR_NEXT * np.quantile(apart.mean(axis=0), 1 - PARTS_IN_ORDER)
+    labels: list[np.ndarray] = []
     before = 0
     for begins in (is_unsteady, is_unsteady | is_far):
         parts = int(np.count_nonzero(begins)) + 1
         if before < parts <= PARTS_IN_ORDER * count and parts > 1:
-            label = np.append(0, np.cumsum(begins))
-            yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)
+            labels.append(np.append(0, np.cumsum(begins)))
         before = parts
+    return labels[-1:] if labels and _are_even(labels[-1]) else labels
+
+
+def _are_even(label: np.ndarray) -> bool:
+    """Return whether most parts, some at least, are of one size."""
+    sizes = np.bincount(label)
+    return len(sizes) >= COPIES and bool(np.bincount(sizes).max() >= ALIKE_PARTS * len(sizes))
+
+
+def _are_plants(found: Found) -> bool:
+    """Return whether branches are copies of one plant side by side. Rings of one stem would hang on each other."""
+    roots = np.count_nonzero(found.branch_parent < 0)
+    return _are_even(found.vertex_branch) and bool(roots > PLANTS * len(found.branch_parent))
 
 
 def _leaves_many_alone(found: Found) -> bool:

@@ -1,20 +1,29 @@
 """About how many bits the motion of a branch takes on each other one, and as a root.
 
 A branch takes the bits of what is left of the motion of a few of its vertices once its parent's is taken off: the
-way of the vertex that it hangs on, with the turn of the parent or without. Motion is written in the components that all
-branches' motion over time has (Karhunen-Loeve), since the encoder learns such bases, too.
+way of the vertex that it hangs on, with the turn of the parent, with its turn there, or without. Motion is written in
+the components that all branches' motion over time has (Karhunen-Loeve), since the encoder learns such bases, too. A few
+vertices in a few frames tell a right parent from a wrong one beside it by a few bits only, so what is smaller than the
+branch that would hang on it is charged some.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 
 from athcodec.motion.algebra import rotations_of
-from athcodec.motion.branches.seen import cheapest_of_each, moments_of_each, sums_of_each
+from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.seen import cheapest_of_each, moments_of_each, sizes_of_each, sums_of_each
 
 STEP = 1e-4  # Of the diagonal: about the steps of quantisation, below which motion costs nothing.
 SHOWN = 3  # Vertices of a branch, far from each other, whose motion stands for its own.
 HANGING = 30.0  # Bits of hanging on anything: a flag, a vertex, and the errors of what it hangs on.
+SMALLER = 10.0  # Bits of hanging on what is smaller, and as many again of hanging on what is not twice as large.
+AROUND = 12  # Vertices about the one that a branch hangs on, whose turn is that of its parent there.
+APART = 16.0  # Distance of branches, in diagonals, at which no vertex has a neighbour of another one.
 AT_ONCE = 1 << 14  # Pairs of vertices whose prices are computed at once.
 FLAT = 1e-6  # Ratio of the extents of a branch below which its turns are not known.
 
@@ -23,14 +32,14 @@ class Prices:
     """Bits of the motion of labelled branches in a few frames, (1 + F, N, 3), of which the first is the rest pose."""
 
     def __init__(self, frames: np.ndarray, label: np.ndarray):
-        self._rest, self._label = frames[0], label
+        self._frames, self._rest, self._label = frames, frames[0], label
         self._ways = (frames[1:] - frames[0]).transpose(1, 2, 0)  # (N, 3, F)
         self._shown = _far_vertices(self._rest, label)
         tracks = self._ways[self._shown].reshape(-1, len(frames) - 1)
         self._components = np.linalg.eigh(tracks.T @ tracks)[1]
-        self._turns = _turns(frames, label)
-        extent = np.ptp(frames.reshape(-1, 3), axis=0)
-        self._step = STEP * float(np.linalg.norm(extent)) + np.finfo(float).tiny
+        self._turns, self._sizes = _turns(frames, label), sizes_of_each(frames[0], label)
+        self._diagonal = float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0))) + np.finfo(float).tiny
+        self._step = STEP * self._diagonal
 
     def as_roots(self) -> np.ndarray:
         """Return the bits of each branch as a root, (B,)."""
@@ -39,15 +48,45 @@ class Prices:
     def on_others(self, vertices: np.ndarray) -> np.ndarray:
         """Return the bits of a branch that hangs on another, (C,), for pairs of a vertex of the branch and the vertex
         of the other that it hangs on, (C, 2)."""
-        chunks = range(0, len(vertices), AT_ONCE)
-        return np.concatenate([np.zeros(0), *(self._on(vertices[first : first + AT_ONCE]) for first in chunks)])
+        bits, some = np.zeros(len(vertices)), np.argsort(vertices[:, 1], kind="stable")
+        for first in range(0, len(vertices), AT_ONCE):
+            chunk = some[first : first + AT_ONCE]
+            bits[chunk] = self._on(vertices[chunk])
+        return bits + self._of_sizes(*self._label[vertices].T)
 
     def _on(self, vertices: np.ndarray) -> np.ndarray:
         child, attach = self._label[vertices[:, 0]], vertices[:, 1]
         left = self._ways[self._shown[child]] - self._ways[attach][:, None]
         arm = self._rest[self._shown[child]] - self._rest[attach][:, None]
-        turned = np.einsum("cijf,cpj->cpif", self._turns[self._label[attach]], arm)
-        return HANGING + np.minimum(self._bits(left), self._bits(left - turned))
+        bits = self._bits(left)
+        where, place = np.unique(attach, return_inverse=True)
+        for turns in self._turns[self._label[attach]], self._turns_at(where)[place]:
+            np.minimum(bits, self._bits(left - np.einsum("cijf,cpj->cpif", turns, arm)), out=bits)
+        return HANGING + bits
+
+    def _of_sizes(self, child: np.ndarray, parent: np.ndarray) -> np.ndarray:
+        """Return the bits of hanging on what is not larger, (C,)."""
+        smaller, larger = self._sizes[child], self._sizes[parent]
+        return SMALLER * ((larger < smaller).astype(float) + (larger < 2 * smaller))
+
+    def _turns_at(self, vertices: np.ndarray) -> np.ndarray:
+        """Return the rotations about vertices, (K,), of what is near them on their branches, as `_turns` has them."""
+        near = self._tree.query(self._apart[vertices], k=min(AROUND, len(self._rest)), distance_upper_bound=APART / 2)[
+            1
+        ]
+        near = near.reshape(len(vertices), -1)
+        near = np.where(near < len(self._rest), near, near[:, :1])  # Small branches have fewer.
+        poses = self._frames[:, near.ravel()]
+        return _turns(poses, np.repeat(np.arange(len(vertices)), near.shape[1]))
+
+    @cached_property
+    def _apart(self) -> np.ndarray:
+        """The vertices in a space of four dimensions, (N, 4), in which branches are apart."""
+        return np.column_stack([self._rest / self._diagonal, APART * self._label])
+
+    @cached_property
+    def _tree(self) -> Any:
+        return scipy_module("spatial").cKDTree(self._apart)
 
     def _bits(self, tracks: np.ndarray) -> np.ndarray:
         """Return the bits of some tracks of each of some branches, (K, p, 3, F)."""

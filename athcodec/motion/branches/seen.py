@@ -147,6 +147,15 @@ def moments_of_each(values: np.ndarray, others: np.ndarray, label: np.ndarray, c
     return sums_of_each(products, label, count).reshape(-1, 3, 3)
 
 
+def sizes_of_each(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return the diagonals of the branches' bounding boxes."""
+    order = np.argsort(label, kind="stable")
+    first = np.searchsorted(label[order], np.arange(label.max() + 1))
+    low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
+    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
+    return diagonals
+
+
 def copies_of(clip: MotionClip) -> np.ndarray:
     """Return the number of the copy that each vertex is of, (N,), from 1 on; 0 for none (MotionClip, part_copies)."""
     parts = _parts(clip)

@@ -86,6 +86,19 @@ def first_move(settings: Settings, trials: Trials) -> Settings:
     return trials.cheapest(tried)
 
 
+def typical_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
+    """Return the cheapest of settings in waves, and of those in time bases, whatever work is left."""
+    has_other = not trials.without(Feature.STILL)
+    in_waves = min([settings, *([_other_kind(settings).in_waves()] if has_other else [])], key=trials.cost)
+    if any(settings.rotation_step_factors):
+        return in_waves, in_waves
+    kinds = [
+        replace(settings, still=still, learned_pieces=None) for still in ((True, False) if has_other else (False,))
+    ]
+    in_bases = [candidate for kind in kinds for candidate in learned_bases.candidates(kind, trials)]
+    return in_waves, min(in_bases, key=trials.cost, default=in_waves)
+
+
 def _in_waves(settings: Settings, trials: Trials) -> list[Settings]:
     """Return the settings and, unless they are hopeless, those with the other kind of branches, in waves."""
     if trials.without(Feature.STILL):
