@@ -50,12 +50,12 @@ def add_clips(parser: argparse.ArgumentParser, kinds: str = "motion clips") -> N
     )
 
 
-def add_number(parser: argparse.ArgumentParser, name: str, default: Any, what: str, metavar: str = "N") -> None:
+def add_number(parser: argparse.ArgumentParser, name: str, default: Any, text: str, metavar: str = "N") -> None:
     """Add an option that takes a number, or several where its default is several."""
     several = {"nargs": "+"} if isinstance(default, tuple) else {}
     kind = type(default[0] if several else default)
     parser.add_argument(
-        name, type=kind, default=default, metavar=metavar, help=f"{what} (default %(default)s)", **several
+        name, type=kind, default=default, metavar=metavar, help=f"{text} (default %(default)s)", **several
     )
 
 
@@ -97,8 +97,8 @@ def encoded(
     with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
-        given = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
-        summary = athcodec.encode(clip, file, **given | settings)
+        options = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
+        summary = athcodec.encode(clip, file, **options | settings)
         with athcodec.open(file, strict=True, host_mesh=clip) as decoder:
             yield Encoded(clip, summary, decoder)
 

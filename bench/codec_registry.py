@@ -76,11 +76,11 @@ def _named(name: str) -> Codec:
     if ":" in name:
         module, _, attribute = name.partition(":")
         return _instance(getattr(importlib.import_module(module), attribute))
-    found = next((codec for codec in all_codecs() if codec.name == name), None)
-    if found is None:
+    codec_of_name = next((codec for codec in all_codecs() if codec.name == name), None)
+    if codec_of_name is None:
         known = "; ".join(codec.name for codec in all_codecs())
         raise SystemExit(f"codec: got {name!r}; expected MODULE:NAME or one of: {known}")
-    return found
+    return codec_of_name
 
 
 # ---- which code made a result ----

@@ -154,8 +154,8 @@ class _Files:
         return self._whole[repr(options)]
 
     def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> tuple[Draft, int]:
-        given = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
-        plan = draft(self._clip, rel_error=self._bound, **given)
+        settings = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
+        plan = draft(self._clip, rel_error=self._bound, **settings)
         coded = code_segments(self._clip, plan, range(plan.segment_count))
         summary = write(self._clip, plan, coded, self._path)
         with athcodec.open(self._path, strict=True, host_mesh=self._clip) as decoder:
@@ -182,12 +182,12 @@ class _Files:
             return of_all[feature]
         if choice.predicted:
             return False
-        learned = any(any(own.learned_bases) for own in both)
+        learned = any(any(settings_of_file.learned_bases) for settings_of_file in both)
         return {
-            Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
-            Feature.SHAPES: any(own.learned_pieces is not None for own in both),
+            Feature.ROTATIONS: any(any(settings_of_file.rotation_step_factors) for settings_of_file in both),
+            Feature.SHAPES: any(settings_of_file.learned_pieces is not None for settings_of_file in both),
             Feature.TIME_BASES: learned,
-            Feature.COMMON_BASIS: any(own.common_basis for own in both),
+            Feature.COMMON_BASIS: any(settings_of_file.common_basis for settings_of_file in both),
             Feature.WAVE_BASES: learned,
             Feature.SHEETS: bool((settings.forms == SHEET).any()),
             Feature.RINGS: bool((settings.forms > SHEET).any()),
@@ -208,13 +208,13 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each feature that was measured, in per cent of the bytes with it."""
     growth: dict[str, dict[str, float]] = {}
     makers: dict[str, set[str]] = {}
-    for own in sizes:
-        if own["with"] < LEAST_BYTES:
+    for row in sizes:
+        if row["with"] < LEAST_BYTES:
             continue
-        name = f"`{own['clip']}` at {own['bound']:g}" + (" in layers" if own["ladder"] else "")
-        value = 100 * (own["without"] / own["with"] - 1)
-        growth.setdefault(own["feature"], {})[name] = value
-        makers.setdefault(own["feature"], set()).update({_maker(own["clip"])} if value >= LEAST else ())
+        name = f"`{row['clip']}` at {row['bound']:g}" + (" in layers" if row["ladder"] else "")
+        value = 100 * (row["without"] / row["with"] - 1)
+        growth.setdefault(row["feature"], {})[name] = value
+        makers.setdefault(row["feature"], set()).update({_maker(row["clip"])} if value >= LEAST else ())
     rows = []
     titles = {feature.name.lower(): feature.value for feature in Feature} | GONE
     for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):
@@ -252,11 +252,11 @@ def table_text(contents: Mapping[str, Any]) -> str:
     lines = ["| " + " | ".join(rows[0]) + " |", "|---|--:|--:|--:|--:|--:|--:|---|--:|"] if rows else []
     lines += ["| " + " | ".join("-" if cell is None else str(cell) for cell in row.values()) + " |" for row in rows]
     files: dict[str, list[str]] = {}
-    for own in sizes:
-        if own["with"] < LEAST_BYTES:
+    for size_row in sizes:
+        if size_row["with"] < LEAST_BYTES:
             continue
-        bounds = files.setdefault(own["clip"], [])
-        name = f"{own['bound']:g}" + (" in layers" if own["ladder"] else "")
+        bounds = files.setdefault(size_row["clip"], [])
+        name = f"{size_row['bound']:g}" + (" in layers" if size_row["ladder"] else "")
         if name not in bounds:
             bounds.append(name)
     clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))

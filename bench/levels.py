@@ -88,15 +88,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
                 depth = file.tables.header.stages[stored.level]
-                meter, ours = meters[stored.level], meters[stored.level].error
+                meter, error = meters[stored.level], meters[stored.level].error
                 has_nodes = ath is not None and depth <= ath.height
                 paper = _measure_paper(result.clip, ath, depth) if has_nodes else None
-                row = case | _level_row(stored, ours, paper) | _better(file.levels, stored.level, meter)
+                row = case | _level_row(stored, error, paper) | _better(file.levels, stored.level, meter)
                 levels.append(row)
-                broken += _broken_lines(path, stored, ours, result.decoder)
+                broken += _broken_lines(path, stored, error, result.decoder)
                 broken += _worse_lines(path, row, file.tables.header.is_predicted)
                 if has_nodes:
-                    gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
+                    gaps.append(case | _gap_row(result, ath, stored.level, error.diagonal))
     return {
         "tables": [
             table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
@@ -111,9 +111,9 @@ def _same_nodes(result: Encoded) -> Ath:
     """The paper's ATH with the thresholds of the file."""
     hierarchy = result.decoder.file.hierarchy
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
-    ours, theirs = result.decoder.file.table1(), ath.table1()
-    if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
-        raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
+    stored, computed = result.decoder.file.table1(), ath.table1()
+    if any(stored[key] != computed[key] for key in ("depth", "nodes", "leaves")):
+        raise RuntimeError(f"nodes of the ATH: got {stored} in the file, {computed} from the clip")
     return ath
 
 
@@ -124,16 +124,16 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
     return meter
 
 
-def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
-    diagonal = ours.diagonal
+def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
+    diagonal = error.diagonal
     return {
         "nodes": stored.nodes,
         "bytes": stored.bytes,
-        "max": ours.max_error / diagonal,
-        "RMS": ours.rms_error / diagonal,
+        "max": error.max_error / diagonal,
+        "RMS": error.rms_error / diagonal,
         "paper max": paper and paper.max_error / diagonal,
         "paper RMS": paper and paper.rms_error / diagonal,
-        "ratio": ours.rms_error / paper.rms_error if paper and paper.rms_error else None,
+        "ratio": error.rms_error / paper.rms_error if paper and paper.rms_error else None,
     }
 
 
@@ -141,7 +141,7 @@ def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, fl
     """How much worse than the level before, and than the source's own second differences, a level is."""
     before, this = levels[max(level - 1, 0)], levels[level]
     pairs = (this.max_error, before.max_error), (this.rms_error, before.rms_error)
-    worse = max(own / other if other else float(own > 0) for own, other in pairs)
+    worse = max(ratio / other if other else float(ratio > 0) for ratio, other in pairs)
     return {
         "of the one before": worse if level else None,
         "second difference": meter.figures()["smoothness"]["acceleration_ratio"],
@@ -158,13 +158,13 @@ def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
     ]
 
 
-def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
+def _broken_lines(path: Path, stored: Level, error: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
     """A line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
     is_last = stored.level == decoder.file.level_count - 1
     allowed = decoder.file.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
-    if ours.max_error <= allowed:
+    if error.max_error <= allowed:
         return []
-    return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; expected at most {allowed:.9g}"]
+    return [f"{path.name}, level {stored.level}: got an error of {error.max_error:.9g}; expected at most {allowed:.9g}"]
 
 
 # ---- files ----
@@ -237,13 +237,13 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
     paper = ath.attachment_gaps(source, result.decoder.file.tables.header.stages[level])
     joints = _Joints(result.decoder, level)
-    ours = joints.gaps(frames)
+    gaps = joints.gaps(frames)
     return {
         "joints": len(joints.branch),
         "measured": len(joints.measured),
         "loose": joints.loose,
-        "max": ours.max / diagonal,
-        "RMS": ours.rms / diagonal,
+        "max": gaps.max / diagonal,
+        "RMS": gaps.rms / diagonal,
         "paper max": paper.max / diagonal,
         "paper RMS": paper.rms / diagonal,
     }

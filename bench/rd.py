@@ -261,9 +261,11 @@ def summary(
         rows = [{name: point[name] for name in columns} for point in without]
         return {"tables": tables + ([table("Without a file", rows)] if rows else []), "broken": list(_broken(points))}
     for name in names:
-        own = [point for point in points if point["clip"] == name]
-        if own:
-            tables.append(table(title(name), [_row(point) for point in own], POINTS_NOTE, _processors(own)))
+        points_of_clip = [point for point in points if point["clip"] == name]
+        if points_of_clip:
+            tables.append(
+                table(title(name), [_row(point) for point in points_of_clip], POINTS_NOTE, _processors(points_of_clip))
+            )
     return {"tables": tables, "broken": list(_broken(points))}
 
 

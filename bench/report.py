@@ -64,8 +64,8 @@ def put(document: Path, name: str, text: str) -> None:
 def parted(text: str, name: str) -> tuple[str, str, str]:
     """What a document has up to the first marker of a name, between both, and from the second one on."""
     first, last = f"<!-- {name}: written by python -m bench report -->\n", f"<!-- end of {name} -->\n"
-    before, found, rest = text.partition(first)
+    before, marker, rest = text.partition(first)
     inside, ended, after = rest.partition(last)
-    if not (found and ended):
+    if not (marker and ended):
         raise SystemExit(f"document: found no {first.strip()} with its end; expected both lines, each once")
     return before + first, inside, last + after

@@ -73,7 +73,7 @@ class Mesh:
     def without_faces(self) -> Mesh:
         return Mesh(self.positions, None, self.time)
 
-    def taken(self, vertices: np.ndarray, number: np.ndarray) -> Mesh:
+    def with_vertices(self, vertices: np.ndarray, number: np.ndarray) -> Mesh:
         """These vertices; number: (N,) of each vertex among them."""
         faces = None if self.faces is None else np.where(self.faces < 0, -1, number[self.faces]).astype(np.int32)
         return Mesh(np.ascontiguousarray(self.positions[:, vertices]), faces, self.time)
@@ -88,7 +88,7 @@ class Mesh:
 
     def shuffled(self) -> Mesh:
         order = np.random.default_rng(SEED).permutation(self.positions.shape[1])
-        return self.taken(order, np.argsort(order))
+        return self.with_vertices(order, np.argsort(order))
 
 
 def places_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +141,7 @@ def _rows(mesh: Mesh, rel_error: float) -> Iterator[dict[str, Any]]:
     for order, split in (("own", mesh), ("shuffled", mesh.shuffled())):
         first, place = places_of(split)
         count = len(place)
-        welded = split.taken(first, place)
+        welded = split.with_vertices(first, place)
         files = [athcodec.encode(one.encoded(), rel_error=rel_error, ladder="none") for one in (split, welded)]
         share = np.bincount(place) / count
         entropy = -float((share * np.log2(share)).sum()) * count / 8
@@ -179,8 +179,8 @@ def _decoded(split: bytes, welded: bytes, place: np.ndarray) -> tuple[bool, floa
         gathered = np.take(one(welded), place, axis=1)
         times.append((middle - start, time.process_time() - middle))
         same = same and whole.tobytes() == gathered.tobytes()
-    ours, theirs = (median(column) for column in zip(*times))
-    return same, ours / theirs, ours
+    split_seconds, welded_seconds = (median(column) for column in zip(*times))
+    return same, split_seconds / welded_seconds, split_seconds
 
 
 def _finding(vertices: int, places: int) -> dict[str, Any]:
@@ -202,12 +202,12 @@ def _find(vertices: int, places: int) -> dict[str, Any]:
 
     clip = MotionClip(Frames(read, FRAMES, vertices, np.float32), np.arange(FRAMES) / 30)
     before, begun = peak_bytes(), time.process_time()
-    found = find_places(clip)
+    merged = find_places(clip)
     seconds, peak = time.process_time() - begun, peak_bytes()
     begun = time.process_time()
     for _ in clip.blocks():
         pass
-    figures = {"vertices": vertices, "frames": FRAMES, "places": int(found.count), "seconds": seconds}
+    figures = {"vertices": vertices, "frames": FRAMES, "places": int(merged.count), "seconds": seconds}
     return figures | {"of which reading": time.process_time() - begun, "memory": (peak - before) / 1e6}
 
 

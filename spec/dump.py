@@ -50,7 +50,7 @@ def parts(data: bytes) -> Iterator[Part]:
     at = rules.u32(data, 16)
     for chunk in table:
         content = data[at : at + chunk[3]]
-        yield from said(file, chunk, content) if content else []
+        yield from described(file, chunk, content) if content else []
         at += chunk[3]
 
 
@@ -70,7 +70,7 @@ def front(header, table: list) -> str:
     )
 
 
-def said(file, chunk: tuple, content: bytes) -> Iterator[Part]:
+def described(file, chunk: tuple, content: bytes) -> Iterator[Part]:
     kind, level, segment, length = chunk
     title = name(*chunk)
     if kind == rules.HIERARCHY:

@@ -81,11 +81,11 @@ def tree(seed: int = 3) -> Growing:
         heading = 2.4 * limb
         joint = np.array([0.1 * (0.4 + 0.12 * limb), 0.0, 3.0 * (0.4 + 0.12 * limb)])
         end = joint + np.array([np.cos(heading), np.sin(heading), 0.5]) * (1.4 - 0.15 * limb)
-        own = plant.tube(trunk, joint, end, 9, 0.03)
+        twig_base = plant.tube(trunk, joint, end, 9, 0.03)
         for k in range(1):
             start = joint + (end - joint) * (0.5 + 0.5 * k)
             steps = 0.08 * (np.array([np.cos(heading), np.sin(heading), 0.2]) + random.normal(size=(8, 3)) * 0.3)
-            twig = plant.add(own, start, start + steps.cumsum(axis=0))
+            twig = plant.add(twig_base, start, start + steps.cumsum(axis=0))
             for i in range(5):
                 at = plant.points[twig][1 + i]
                 plant.leaf(twig, at, 0.12 + 0.03 * random.random(), bool(i % 2))
@@ -107,17 +107,17 @@ def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float,
     positions = []
     for b, (points, parent, joint) in enumerate(zip(plant.points, plant.parents, plant.joints)):
         matrix, shift = (np.eye(3)[None], np.zeros((1, 3))) if parent < 0 else turned[parent]
-        own = matrix @ rotations(b, time, wind * (0.3 if parent < 0 else 1.0), turns, len(points) == LEAF)
-        shift = shift + (matrix @ joint) - (own @ joint)
-        turned.append((own, shift))
+        turn = matrix @ rotations(b, time, wind * (0.3 if parent < 0 else 1.0), turns, len(points) == LEAF)
+        shift = shift + (matrix @ joint) - (turn @ joint)
+        turned.append((turn, shift))
         x = points - joint
         if len(points) > LEAF:
             x = x + 0.1 * plant.random.normal(size=3)
         bend = (wind * 0.1 * np.sin(2 * np.pi * (turns * time + 0.1 * b)) + gusts + 0.2)[:, None] * (x**2).sum(axis=1)
         x = x + bend[:, :, None] * np.array([1.0, 0.4, -0.1])
-        positions.append((own @ joint + shift)[:, None, :] + x @ own.transpose(0, 2, 1))
-    found = np.concatenate(positions, axis=1)
-    return found + noise * plant.random.normal(size=found.shape)
+        positions.append((turn @ joint + shift)[:, None, :] + x @ turn.transpose(0, 2, 1))
+    noiseless = np.concatenate(positions, axis=1)
+    return noiseless + noise * plant.random.normal(size=noiseless.shape)
 
 
 def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: bool) -> np.ndarray:
@@ -237,4 +237,4 @@ def features(data: bytes) -> set[str]:
         "places": header.place_count < header.vertex_count,
     }
     kinds = {KIND_NAMES[kind] for kind, _, _ in file.chunks} | ({"ATTRIBUTE"} if file.attributes else set())
-    return {what for what, there in shown.items() if there} | kinds
+    return {feature for feature, there in shown.items() if there} | kinds

@@ -104,7 +104,7 @@ def find(
         Where an input does not exist.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(given, f'["{pattern}"]') for pattern, given in (patterns or {}).items()}
+    patterns = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
@@ -138,37 +138,37 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
-    for given, called in each_once(map(os.fspath, inputs)):
-        pairs = list(_remote(given) if is_url(given) else _local(given, called))
+    for text, called in each_once(map(os.fspath, inputs)):
+        pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
         if not pairs:
             raise ClipError(
-                f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits some"
+                f"{text}: got no clips, expected a file, a directory with clips or a pattern that fits some"
             )
 
 
-def _local(given: str, called: str) -> Iterator[tuple[str, str]]:
+def _local(text: str, called: str) -> Iterator[tuple[str, str]]:
     """called: the name of a plain file without its suffix."""
-    if os.path.isdir(given):
+    if os.path.isdir(text):
         yield from _below(
-            given,
+            text,
             (
                 os.path.join(folder, name)
-                for folder, folders, names in os.walk(given)
+                for folder, folders, names in os.walk(text)
                 for _ in [folders.sort()]
                 for name in sorted(names)
                 if _is_clip(name)
             ),
         )
-    elif os.path.exists(given) or is_pattern(given):
-        yield called + Path(given).suffix, os.path.abspath(given)
-    elif glob.has_magic(given):
+    elif os.path.exists(text) or is_pattern(text):
+        yield called + Path(text).suffix, os.path.abspath(text)
+    elif glob.has_magic(text):
         yield from _below(
-            _fixed_part(given, os.sep),
-            (path for path in sorted(glob.glob(given, recursive=True)) if os.path.isfile(path)),
+            _fixed_part(text, os.sep),
+            (path for path in sorted(glob.glob(text, recursive=True)) if os.path.isfile(path)),
         )
     else:
-        raise FileNotFoundError(f"{given}: No such file or directory")
+        raise FileNotFoundError(f"{text}: No such file or directory")
 
 
 def _below(folder: str, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -206,11 +206,11 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
         raise ClipError(f"{shown}: got a pattern in a chain of file systems, expected a single file")
     system, path = file_system(url)
     try:
-        found = system.find(path) if is_folder else system.glob(path)
+        paths = system.find(path) if is_folder else system.glob(path)
     except Exception as error:  # each file system has errors of its own
         raise RemoteError(f"{shown}: {type(error).__name__}: {_one_line(error)}") from None
     base = path.rstrip("/") if is_folder else _fixed_part(path, "/")
-    for found_path in sorted(found):
+    for found_path in sorted(paths):
         if not is_folder or _is_clip(posixpath.basename(found_path)):
             yield posixpath.relpath(found_path, base) if base else found_path, system.unstrip_protocol(found_path)
 

@@ -121,9 +121,9 @@ def check_settings(settings: Mapping[str, Any], where: str = "settings", folder:
             raise ClipError(f"{where}: {name}: got {value!r}: {error}") from None
         if name == "mesh" or name == "hierarchy" and value not in ("auto", *METHODS):
             checked[name] = os.path.abspath(os.path.join(folder, checked[name]))
-    given = [name for name in BOUNDS if name in checked]
-    if len(given) > 1:
-        raise ClipError(f"{where}: got {' and '.join(given)}, expected one of them")
+    bounds = [name for name in BOUNDS if name in checked]
+    if len(bounds) > 1:
+        raise ClipError(f"{where}: got {' and '.join(bounds)}, expected one of them")
     return checked
 
 

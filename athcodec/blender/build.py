@@ -60,12 +60,12 @@ def _of_athcodec(wheels: Sequence[Path]) -> list[Path]:
 def pack(output: Path, wheels: Sequence[Path]) -> None:
     """Write the extension with these wheels. Raises ValueError as `check` does, OSError."""
     check(wheels)
-    own = _of_athcodec(wheels)
-    platforms = sorted({platform(wheel) for wheel in own})
+    built = _of_athcodec(wheels)
+    platforms = sorted({platform(wheel) for wheel in built})
     names = sorted({wheel.name: wheel for wheel in wheels})
     manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
     for before, after in (
-        ('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
+        ('version = "0.0.0"', f'version = "{built[0].name.split("-")[1]}"'),
         ("platforms = []", f"platforms = {_toml(platforms)}"),
         ("wheels = []", f"wheels = {_toml([f'./wheels/{name}' for name in names])}"),
     ):

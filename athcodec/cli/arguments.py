@@ -47,10 +47,10 @@ class _Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
         """The arguments; of those that a verb does not know, it is the verb whose usage is shown."""
-        found, unknown = super().parse_known_args(args, namespace)
+        known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
+        return known, unknown
 
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(shown(message), file)
@@ -680,9 +680,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
         help="a plant for the forest's floor, so many around each tree (default: 4); may be given again",
     )
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    what = verb.add_mutually_exclusive_group()
-    what.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
-    what.add_argument(
+    subject = verb.add_mutually_exclusive_group()
+    subject.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
+    subject.add_argument(
         "--export",
         metavar="PAGE.html",
         help="write one page with the file and the viewer inside, in place of an older HTML page alone, and serve "

@@ -98,10 +98,10 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
 
 def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:
     """Strength and heading of each clip; empty where none is given. ClipError where they do not fit the clips."""
-    given = {"--strength": args.strength, "--heading": args.heading}
+    winds = {"--strength": args.strength, "--heading": args.heading}
     if args.strength is None and args.heading is not None:
         raise ClipError("--heading: got no strengths, expected some with --strength")
-    for option, numbers in given.items():
+    for option, numbers in winds.items():
         if numbers is not None and len(numbers) != clip_count:
             raise ClipError(f"{option}: got {len(numbers)}, expected {clip_count}, one for each clip")
     if args.strength is None:
@@ -240,9 +240,9 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
     """The clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is missing."""
     if hierarchy is None:
         return clip
-    found = find_or_load(clip, hierarchy)
-    say("hierarchy", str(found))
-    return clip_with_branches(clip, found)
+    branches = find_or_load(clip, hierarchy)
+    say("hierarchy", str(branches))
+    return clip_with_branches(clip, branches)
 
 
 def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:

@@ -48,7 +48,7 @@ def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None
     for start, frames in portions(motion, motion.vertex_count) if fits else ():
         for fit in fits.values():
             fit.add(start, frames)
-    return {number: fit.found for number, fit in fits.items() if fit.found.max_error <= allowed}
+    return {number: fit.copies for number, fit in fits.items() if fit.copies.max_error <= allowed}
 
 
 def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
@@ -90,15 +90,15 @@ class _Fit:
         room = (motion.frame_count, obj.copies)
         values = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
         still, _ = self._placed(rest.reshape(obj.copies, count, 3))
-        self.found = Copies(shape, *values, tuple(part.astype(np.float32) for part in still), 0.0, part.axes[0])
+        self.copies = Copies(shape, *values, tuple(part.astype(np.float32) for part in still), 0.0, part.axes[0])
 
     def add(self, start: int, frames: np.ndarray) -> None:
         """Fits the next frames."""
-        found = self.found
-        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), found.places.shape[1], -1, 3)
-        for frame, own in enumerate(points, start):
-            (found.places[frame], found.turns[frame], found.scales[frame]), error = self._placed(own)
-            found.max_error = max(found.max_error, error)
+        copies = self.copies
+        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), copies.places.shape[1], -1, 3)
+        for frame, placed in enumerate(points, start):
+            (copies.places[frame], copies.turns[frame], copies.scales[frame]), error = self._placed(placed)
+            copies.max_error = max(copies.max_error, error)
 
     def _placed(self, points: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
         """Places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""

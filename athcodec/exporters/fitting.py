@@ -105,10 +105,10 @@ class Placed:
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
         rotation, scale = self.nearest(cross)
-        found = quaternions(rotation)
-        found *= np.where((found * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-        self._before = found
-        return rotation * scale[:, None, :], (found, scale)
+        turn = quaternions(rotation)
+        turn *= np.where((turn * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        self._before = turn
+        return rotation * scale[:, None, :], (turn, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         scale = self._scale  # The scale of the frame before is a close first guess.
@@ -205,8 +205,8 @@ def _fitted(
     """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
     that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
-    starts, own = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
-    local = np.einsum("nij,ni->nj", parts.axes[own], rest[rows] - parts.middle[own])
+    starts, part = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
+    local = np.einsum("nij,ni->nj", parts.axes[part], rest[rows] - parts.middle[part])
     places = np.empty((motion.frame_count, len(parts), 3))
     values = [np.empty((motion.frame_count, len(parts), width)) for width in solver.widths]
     error = np.zeros(len(parts))
@@ -216,17 +216,17 @@ def _fitted(
             continue
         points = frames[numbers - start][:, rows].astype(np.float64)
         middle = np.add.reduceat(points, starts, axis=1) / parts.count[:, None]
-        points -= middle[:, own]
+        points -= middle[:, part]
         places[numbers] = middle
         cross = np.empty((len(numbers), len(parts), 3, 3))
         for i in range(3):
             for j in range(3):
                 cross[:, :, i, j] = np.add.reduceat(points[:, :, i] * local[:, j], starts, axis=1) / parts.count
         for i, number in enumerate(numbers):
-            linear, found = solver(cross[i])
-            for kept, value in zip(values, found):
+            linear, fit = solver(cross[i])
+            for kept, value in zip(values, fit):
                 kept[number] = value
-            points[i] -= np.einsum("nij,nj->ni", linear[own], local)
+            points[i] -= np.einsum("nij,nj->ni", linear[part], local)
         square = np.einsum("tni,tni->tn", points, points).max(axis=0)
         error = np.maximum(error, np.sqrt(np.maximum.reduceat(square, starts)))
     return places, values, error

@@ -194,9 +194,19 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
         place = np.full(len(source), -1)
         place[rows] = np.arange(len(rows))
         attributes = {key: array[rows] for key, array in values.items()}
-        own = np.flatnonzero((corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop))
-        if len(own):
-            made.append(GltfMesh(part_name, source[rows], place[corner_place[triangles[own]]], labels[own], attributes))
+        rows_of_part = np.flatnonzero(
+            (corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)
+        )
+        if len(rows_of_part):
+            made.append(
+                GltfMesh(
+                    part_name,
+                    source[rows],
+                    place[corner_place[triangles[rows_of_part]]],
+                    labels[rows_of_part],
+                    attributes,
+                )
+            )
             continue
         if has_made_normals:
             del attributes[NORMAL]
@@ -234,8 +244,8 @@ def add_mesh(
 
 def by_material(corners: np.ndarray, labels: np.ndarray) -> list[tuple[int, np.ndarray]]:
     """Return the materials of rows of corners, (n, k), and the rows that have each; that of the first row first."""
-    found, first = np.unique(labels, return_index=True)
-    return [(int(label), corners[labels == label]) for label in found[np.argsort(first)]]
+    used, first = np.unique(labels, return_index=True)
+    return [(int(label), corners[labels == label]) for label in used[np.argsort(first)]]
 
 
 def add_materials(glb: Glb, meshes: GltfMeshes) -> None:
@@ -284,8 +294,8 @@ class Take:
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """Return the keys of values (T, ...), one per frame of the motion."""
-        own = values[self.start : self.stop]
-        return np.concatenate([own, own[:1]]) if self.is_loop else own
+        rows = values[self.start : self.stop]
+        return np.concatenate([rows, rows[:1]]) if self.is_loop else rows
 
 
 def takes(motion: Motion) -> list[Take]:
@@ -316,8 +326,8 @@ def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
 
 def clock(motion: Motion) -> dict[str, Any]:
     """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
-    said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
-    return said if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
+    scene = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
+    return scene if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | scene
 
 
 def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
@@ -355,11 +365,11 @@ def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, l
             continue
         domain = domains.get(name, "vertex" if array.ndim and len(array) == motion.vertex_count else "")
         where = {"vertex": (per_vertex, motion.vertex_count), "corner": (per_corner, corner_count)}.get(domain)
-        found = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
-        if found is None or found[0] in where[0]:
+        entry = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
+        if entry is None or entry[0] in where[0]:
             left_out.append(name)
         else:
-            where[0][found[0]] = found[1]
+            where[0][entry[0]] = entry[1]
     return per_vertex, per_corner, left_out
 
 

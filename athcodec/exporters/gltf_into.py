@@ -131,8 +131,8 @@ class Into:
             animations = self._json["animations"]
             self._replace_motion(binary)
             motion = self._motion(binary.add(ath), ath, animations)
-            said = self._json.setdefault("extensions", {}).setdefault(EXTENSION, {})
-            said.setdefault("motions", []).append(motion)
+            extension = self._json.setdefault("extensions", {}).setdefault(EXTENSION, {})
+            extension.setdefault("motions", []).append(motion)
             if EXTENSION not in self._json.setdefault("extensionsUsed", []):
                 self._json["extensionsUsed"].append(EXTENSION)
             if _knows_references(self._json):
@@ -147,11 +147,11 @@ class Into:
 
     def _motion(self, view: int, ath: bytes, animations: list[dict]) -> dict[str, Any]:
         """Clips begin when their animations' first keys do, and keep what these say in extras."""
-        said = {animation.get("name"): animation.get("extras") for animation in animations}
+        extras = {animation.get("name"): animation.get("extras") for animation in animations}
         clips = []
         with AthFile(io.BytesIO(ath)) as file:
             for clip, name, start in zip(file.clips, split(self.clip), self._placement.starts):
-                more = {"start": start, "extras": said.get(name)}
+                more = {"start": start, "extras": extras.get(name)}
                 clips.append({"name": clip.name} | {key: value for key, value in more.items() if value})
         clips = [clip for clip in clips if len(clip) > 1]
         named = {} if self._name is None else {"name": self._name}
@@ -195,7 +195,7 @@ class Into:
             primitives = [
                 mesh["primitives"][number]
                 for number, one in enumerate(originals)
-                if any(one is own for own in primitives)
+                if any(one is reached for reached in primitives)
             ]
         faces = [self._faces(part, primitive) for primitive in primitives]
         attributes = self._attributes(part, binary)
@@ -216,10 +216,10 @@ class Into:
             primitive["attributes"] = kept | {
                 key: value for key, value in attributes.items() if key in kept or key == VERTEX_ATTRIBUTE
             }
-            said = {"motion": self._number} | (
+            content = {"motion": self._number} | (
                 {"firstVertex": part.first} if part.first and self._vertex is None else {}
             )
-            primitive.setdefault("extensions", {})[EXTENSION] = said
+            primitive.setdefault("extensions", {})[EXTENSION] = content
         shown = self._json["meshes"][part.mesh] if mesh is None else mesh
         self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
 
@@ -253,9 +253,9 @@ class Into:
             groups = by_material(rows, looks.labels[first - len(rows) : first])
             further = [copy.deepcopy(primitive) for _ in groups[1:]]
             siblings += further  # at the end, so that the others keep their places
-            for each, (label, own) in zip([primitive, *further], groups):
+            for each, (label, material) in zip([primitive, *further], groups):
                 each["material"] = self._material(looks.materials[label], has_colours)
-                each |= _drawn(binary, own) if further else {}
+                each |= _drawn(binary, material) if further else {}
 
     def _material(self, look: Look, has_colours: bool) -> int:
         """The number of a material, which is added where the file has not got it."""
@@ -268,21 +268,21 @@ class Into:
 
     def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
         """The attributes of a part that change, as new accessors."""
-        found = {}
+        accessors = {}
         rest = self.clip.source_rest[self._vertices(part)]
         positions = part.attributes["POSITION"]
         stored = self._file.array(positions)
         if stored.dtype != np.float32 or not np.array_equal(stored.view("<u4"), rest.view("<u4")):
-            found["POSITION"] = binary.attribute(rest, bounds=True)
+            accessors["POSITION"] = binary.attribute(rest, bounds=True)
             for key in ("NORMAL", "TANGENT"):
                 if key in part.attributes:
                     values = self._file.floats(part.attributes[key]).astype(np.float32)
                     values[:, :3] = self._placement.turned(part, values[:, :3], key == "NORMAL")
-                    found[key] = binary.attribute(values)
+                    accessors[key] = binary.attribute(values)
         if self._vertex is not None:
             dtype = np.uint16 if self.clip.vertex_count <= 1 << 16 else np.float32
-            found[VERTEX_ATTRIBUTE] = binary.attribute(self._vertices(part)[:, None].astype(dtype))
-        return found
+            accessors[VERTEX_ATTRIBUTE] = binary.attribute(self._vertices(part)[:, None].astype(dtype))
+        return accessors
 
     def _vertices(self, part: GltfNode) -> np.ndarray:
         return np.arange(part.first, part.first + part.count) if self._vertex is None else self._vertex[part.vertices]
@@ -293,10 +293,10 @@ class Into:
         matrix = self._placement.space
         if not self._placement.is_always_shown(index):
             self.lost.setdefault("visibility in time", []).append(node.get("name") or f"node {index}")
-        own = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
+        child = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
         if not np.array_equal(matrix, np.eye(4)):
-            own["matrix"] = matrix.T.ravel().tolist()
-        gltf["nodes"].append(own)
+            child["matrix"] = matrix.T.ravel().tolist()
+        gltf["nodes"].append(child)
         scene = gltf["scenes"][gltf.get("scene", 0)] if gltf.get("scenes") else None
         if scene is not None:
             scene.setdefault("nodes", []).append(len(gltf["nodes"]) - 1)
@@ -328,9 +328,9 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
         for view, places in zip(views, places_of_views):
             check_morphs(view, sum(len(vertices) * (1 + _has_normals(primitive)) for primitive, vertices in places))
         for number, view, places in zip(numbers, views, places_of_views):
-            said = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
+            clips = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
             _add_targets(file, binary, places, view)
-            needless |= _morph_nodes(gltf, binary, places, view, said)
+            needless |= _morph_nodes(gltf, binary, places, view, clips)
             for primitive, _ in places:
                 _pop_extension(primitive)
         _remove_motions(gltf, set(numbers))
@@ -343,19 +343,19 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
 
 def _remove_motions(gltf: dict, numbers: set[int]) -> None:
     """Motions of the file, and with the last of them the extension; primitives that others move name these anew."""
-    said = gltf["extensions"][EXTENSION]
-    kept = [number for number in range(len(said["motions"])) if number not in numbers]
+    extension = gltf["extensions"][EXTENSION]
+    kept = [number for number in range(len(extension["motions"])) if number not in numbers]
     if not kept:
         _pop_extension(gltf)
         gltf["extensionsUsed"].remove(EXTENSION)
         if not gltf["extensionsUsed"]:
             del gltf["extensionsUsed"]
         return
-    said["motions"] = [said["motions"][number] for number in kept]
+    extension["motions"] = [extension["motions"][number] for number in kept]
     for primitive in (primitive for mesh in gltf["meshes"] for primitive in mesh["primitives"]):
-        own = extension_of(primitive)
-        if own is not None:
-            own["motion"] = kept.index(own["motion"])
+        reference = extension_of(primitive)
+        if reference is not None:
+            reference["motion"] = kept.index(reference["motion"])
 
 
 def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
@@ -413,7 +413,7 @@ def _add_targets(file: GltfFile, binary: _Binary, places: list[GltfPlace], motio
 
 
 def _morph_nodes(
-    gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView, said: dict[str, dict]
+    gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, dict]
 ) -> set[int]:
     """Animates the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
     them before goes. Returns the nodes that nothing needs any more."""
@@ -430,22 +430,22 @@ def _morph_nodes(
     _drop_channels(gltf, moving, {gltf["nodes"][index]["mesh"] for index in moving}, needless)
     weights = np.eye(motion.frame_count, dtype=np.float32)
     for take, clip_range in zip(takes(motion), motion.clip_ranges):
-        mine = said.get(clip_range.name, {})
-        times = (take.times + mine.get("start", 0.0)).astype(np.float32)
+        entry = stated.get(clip_range.name, {})
+        times = (take.times + entry.get("start", 0.0)).astype(np.float32)
         sampler = {"input": binary.array(times[:, None]), "output": binary.array(take.of(weights).reshape(-1, 1))}
-        _animate(gltf, take.name, take.extras | mine.get("extras", {}), sampler, sorted(moving))
+        _animate(gltf, take.name, take.extras | entry.get("extras", {}), sampler, sorted(moving))
     return needless
 
 
 def _animate(gltf: dict, name: str, extras: dict[str, Any], sampler: dict[str, int], nodes: list[int]) -> None:
     every = gltf.setdefault("animations", [])
-    found = next((one for one in every if one.get("name") == name), None)
-    if found is None:
-        found = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
-        every.append(found)
-    found["samplers"].append(sampler)
-    number = len(found["samplers"]) - 1
-    found["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
+    animation = next((one for one in every if one.get("name") == name), None)
+    if animation is None:
+        animation = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
+        every.append(animation)
+    animation["samplers"].append(sampler)
+    number = len(animation["samplers"]) - 1
+    animation["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
 
 
 def _pop_extension(holder: dict) -> None:
@@ -564,11 +564,11 @@ def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
 
 
 def _above(index: int, parent: dict[int, int]) -> list[int]:
-    found = []
+    nodes = []
     while index in parent:
         index = parent[index]
-        found.append(index)
-    return found
+        nodes.append(index)
+    return nodes
 
 
 # ---- what is needed no more ----
@@ -628,10 +628,10 @@ def _each(kind: str, holder: dict, key: str) -> Iterator[Reference]:
 
 def _used(gltf: dict) -> dict[str, set[int]]:
     """Return which entries of each array are referred to."""
-    found: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
+    numbers: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
     for kind, holder, key in _references(gltf):
-        found[kind].add(holder[key])
-    return found
+        numbers[kind].add(holder[key])
+    return numbers
 
 
 def _prune(gltf: dict, before: dict[str, set[int]], needless: set[int]) -> None:
@@ -720,11 +720,11 @@ class _Binary:
         edges = np.flatnonzero(np.diff(needless, prepend=False)).reshape(-1, 2)
         starts, stops = edges[:, 0] + -edges[:, 0] % ALIGNMENT, edges[:, 1] // ALIGNMENT * ALIGNMENT
         gaps = [(start, stop) for start, stop in zip(starts.tolist(), stops.tolist()) if stop > start]
-        ends, gone = np.array([stop for _, stop in gaps]), np.cumsum([0] + [stop - start for start, stop in gaps])
+        ends, removed = np.array([stop for _, stop in gaps]), np.cumsum([0] + [stop - start for start, stop in gaps])
         for holder in kept:
             offset = holder.get("byteOffset", 0)
             if offset or gaps:
-                holder["byteOffset"] = int(offset - gone[np.searchsorted(ends, offset, "right")])
+                holder["byteOffset"] = int(offset - removed[np.searchsorted(ends, offset, "right")])
         pieces = zip([0] + [stop for _, stop in gaps], [start for start, _ in gaps] + [len(data)])
         return b"".join(data[start:stop] for start, stop in pieces)
 

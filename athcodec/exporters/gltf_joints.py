@@ -40,12 +40,12 @@ class Joints:
 
     def pose(self, rest: np.ndarray, frame: int) -> np.ndarray:
         """(N, 3) float64: where an engine puts vertices whose rest pose (N, 3) is that of the file."""
-        own = self.vertex_joint
-        bind = self.bind.astype(np.float64)[own]
+        joint = self.vertex_joint
+        bind = self.bind.astype(np.float64)[joint]
         local = np.einsum("nij,nj->ni", bind[:, :3, :3], rest) + bind[:, :3, 3]
         translation, rotation, scale = (pose[frame].astype(np.float64) for pose in self.poses)
         matrices = rotation_matrices(rotation) * scale[:, None, :]
-        return np.einsum("nij,nj->ni", matrices[own], local) + translation[own]
+        return np.einsum("nij,nj->ni", matrices[joint], local) + translation[joint]
 
 
 def fit_joints(

@@ -278,9 +278,9 @@ class Sink:
 
 
 def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:
-    taken = RESERVED_NAMES.intersection(attributes or {})
-    if taken:
-        raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    clashing = RESERVED_NAMES.intersection(attributes or {})
+    if clashing:
+        raise ClipError(f"attributes: got the name {min(clashing)!r}, expected one that the schema does not use")
     return dict(attributes or {})
 
 

@@ -104,7 +104,7 @@ def line_look(name: str) -> Look:
 
 def kind_of(name: str) -> str | None:
     """Return the kind that a name means by its last telling word, which is the noun: "flower_stalk", "leafy_tree"."""
-    words = [str(found.lastgroup) for found in WORDS.finditer(name)]
+    words = [str(match.lastgroup) for match in WORDS.finditer(name)]
     return words[-1] if words and words[-1] in COLOURS else None
 
 

@@ -35,9 +35,9 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 def domain_of(motion: Motion, name: str) -> str:
     """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
     domains = motion.metadata.get("domains")
-    said = domains.get(name) if isinstance(domains, dict) else None
+    domain = domains.get(name) if isinstance(domains, dict) else None
     values = motion.attributes[name]
-    return said or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
+    return domain or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
 
 
 def has_mesh(motion: Motion) -> bool:
@@ -131,11 +131,11 @@ def _obj_tail(motion: Motion) -> list[str]:
         return [*lines, *faces, *edges]
     for number, (name, start, stop) in enumerate(spans):
         lines.append(f"o {name}\n")
-        mine = [
+        elements = [
             *(faces[slice(*np.searchsorted(face_parts, [number, number + 1]))]),
             *(edges[slice(*np.searchsorted(edge_parts, [number, number + 1]))]),
         ]
-        lines += mine or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
+        lines += elements or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
     return lines
 
 
@@ -199,7 +199,7 @@ class PlyWriter:
         lines = [
             "ply",
             "format binary_little_endian 1.0",
-            f"comment {OWN} {json.dumps(_ply_said(motion))}",
+            f"comment {OWN} {json.dumps(_ply_scene(motion))}",
             f"element vertex {motion.vertex_count}",
             *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
             *face_header,
@@ -235,14 +235,14 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
     return columns
 
 
-def _ply_said(motion: Motion) -> dict[str, Any]:
+def _ply_scene(motion: Motion) -> dict[str, Any]:
     """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
-    said = names_and_scene(motion)
+    scene = names_and_scene(motion)
     if face_materials(motion) is not None:
         labels = motion.attributes[FACE_MATERIAL]
         starts = np.flatnonzero(np.diff(labels, prepend=labels[:1] - 1))
-        said[FACE_MATERIAL] = np.stack([labels[starts], np.diff(starts, append=len(labels))], axis=1).tolist()
-    return said
+        scene[FACE_MATERIAL] = np.stack([labels[starts], np.diff(starts, append=len(labels))], axis=1).tolist()
+    return scene
 
 
 def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:

@@ -91,10 +91,10 @@ def _mesh_to_write(motion: Motion, target: Path) -> str:
     mesh_path = target.with_suffix(".obj")
     if not mesh_path.exists():
         return mesh_path.name
-    mine = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
+    topology = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
     different = "got no OBJ mesh"
     with suppress(ClipError):
-        different = mine.same_topology(read_mesh(mesh_path, Budget()))
+        different = topology.same_topology(read_mesh(mesh_path, Budget()))
     if different:
         raise ClipError(
             f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "

@@ -129,9 +129,9 @@ def _along(points: np.ndarray) -> np.ndarray:
     way = np.gradient(middle, axis=0) if bins > 1 else np.zeros((1, 3))
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-30)
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1)))
-    found = length[of] + ((points - middle[of]) * way[of]).sum(axis=1)
-    low, high = found.min(), found.max()
-    return (found - low) / (high - low) if high > low else np.zeros(len(points))
+    along = length[of] + ((points - middle[of]) * way[of]).sum(axis=1)
+    low, high = along.min(), along.max()
+    return (along - low) / (high - low) if high > low else np.zeros(len(points))
 
 
 class _Bones:
@@ -189,11 +189,11 @@ class _Bones:
 
     def parents(self) -> np.ndarray:
         """(J,) the joint that each hangs on, -1 for the root."""
-        found = np.arange(self.count) - 1
+        parent = np.arange(self.count) - 1
         attach = self._attach
         strongest = self.bone[np.arange(len(self.bone)), self.weight.argmax(axis=1)]
-        found[self.first] = np.where(attach >= 0, strongest[attach], -1)
-        return found
+        parent[self.first] = np.where(attach >= 0, strongest[attach], -1)
+        return parent
 
     def fitted(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that they
@@ -230,9 +230,9 @@ class _Bones:
         products = wanted[:, :, :, None] * local[:, None, :]
         cross = np.add.reduceat(products, starts, axis=1)
         held = HELD * np.add.reduceat((local**2).sum(axis=1), starts)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
-        found = nearest_rotations(cross + held)
-        turn[:, bones] = found
-        shift[:, bones] = aim - np.einsum("tkij,kj->tki", found, middle)
+        rotations = nearest_rotations(cross + held)
+        turn[:, bones] = rotations
+        shift[:, bones] = aim - np.einsum("tkij,kj->tki", rotations, middle)
 
 
 def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
@@ -292,8 +292,8 @@ def _off(
     shift = at[:, 1:] - np.einsum("tkij,kj->tki", local[:, 1:], places)
     weight = bones.weight.astype(np.float32).astype(np.float64)
     moved = sum(
-        (np.einsum("tnij,nj->tni", local[:, 1:][:, bone], bones.rest) + shift[:, bone]) * own[:, None]
-        for bone, own in zip(bones.bone.T, weight.T)
+        (np.einsum("tnij,nj->tni", local[:, 1:][:, bone], bones.rest) + shift[:, bone]) * share[:, None]
+        for bone, share in zip(bones.bone.T, weight.T)
     )
     return float(np.sqrt(((moved - target) ** 2).sum(axis=2).max()))
 

@@ -34,15 +34,16 @@ class Surface:
     def is_open(self) -> np.ndarray:
         """(F,) bool: whether the piece of a face encloses nothing, or its faces do not all show the same side."""
         piece, sides = self._pieces, self._rims
-        own = piece[self._face[sides]]
+        piece_of_side = piece[self._face[sides]]
         start, end = self._ends(self._places, sides)
         # A rim is a part of the border that hangs together, and its hole as large as the sum of vectors along it says.
         nodes, ends = np.unique(
-            np.concatenate([own, own]) * len(self._rest) + np.concatenate([start, end]), return_inverse=True
+            np.concatenate([piece_of_side, piece_of_side]) * len(self._rest) + np.concatenate([start, end]),
+            return_inverse=True,
         )
         ends = ends.reshape(2, -1).T
         rim = first_joined(ends, len(nodes))[ends[:, 0]]
-        origin = self._rest[self._corners[self._first[own]]]
+        origin = self._rest[self._corners[self._first[piece_of_side]]]
         vectors = _sums(np.cross(self._rest[start] - origin, self._rest[end] - origin) / 2, rim, len(nodes))
         holes = np.bincount(nodes // len(self._rest), np.linalg.norm(vectors, axis=1), self._face_count)
         area = np.bincount(piece, np.linalg.norm(self._face_vectors(self._rest), axis=1), self._face_count)
@@ -65,9 +66,9 @@ class Surface:
     @cached_property
     def neighbours(self) -> np.ndarray:
         """(N,): for each vertex another one of a face of it; itself where it has no face."""
-        found = np.arange(len(self._rest))
-        found[self._corners] = self._corners[self._next]
-        return found
+        neighbour = np.arange(len(self._rest))
+        neighbour[self._corners] = self._corners[self._next]
+        return neighbour
 
     def _face_vectors(self, positions: np.ndarray) -> np.ndarray:
         """(F, 3): normals of the faces, as long as these are large."""

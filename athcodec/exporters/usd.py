@@ -201,10 +201,10 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
     normals = looks.surface.unit_normals(motion.rest)
     for obj in objects:
         _set_normals(obj, motion, normals[obj.vertices])
-        own = rest[obj.vertices]
-        obj.target.GetPointsAttr().Set(_vec3(own))
-        if len(own):
-            obj.target.GetExtentAttr().Set(_vec3([own.min(axis=0), own.max(axis=0)]))
+        points = rest[obj.vertices]
+        obj.target.GetPointsAttr().Set(_vec3(points))
+        if len(points):
+            obj.target.GetExtentAttr().Set(_vec3([points.min(axis=0), points.max(axis=0)]))
 
 
 def _write_assembly(
@@ -305,8 +305,8 @@ def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
     colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
     if obj.kind == "mesh":
         labels = looks.labels[obj.face_rows].reshape(obj.copies, -1)[0]
-        found, of_face = np.unique(labels, return_inverse=True)
-        colours = [looks.materials[label].colour for label in found]
+        used, of_face = np.unique(labels, return_inverse=True)
+        colours = [looks.materials[label].colour for label in used]
         if not is_double_sided(obj.details) and looks.surface.is_open[obj.face_rows].any():
             _mark_guess(obj.target.CreateDoubleSidedAttr(True))
     if "colors" in motion.attributes or not colours:
@@ -336,13 +336,13 @@ def _mark_guess(attribute: Usd.Attribute) -> None:
     attribute.SetCustomDataByKey(f"{OWN}:{GUESSED}", True)
 
 
-def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], taken: Iterable[str]) -> None:
+def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], names_used: Iterable[str]) -> None:
     """The materials by their names, without contents, and the faces that have them."""
-    found = face_materials(motion)
-    if found is None or not found[1]:
+    labels_and_names = face_materials(motion)
+    if labels_and_names is None or not labels_and_names[1]:
         return
-    labels, names = found
-    scope = UsdGeom.Scope.Define(stage, f"/clip/{distinct([*taken, MATERIALS])[-1]}").GetPath()
+    labels, names = labels_and_names
+    scope = UsdGeom.Scope.Define(stage, f"/clip/{distinct([*names_used, MATERIALS])[-1]}").GetPath()
     materials = []
     for name, identifier in zip(names, distinct(map(_identifier, names))):
         material = UsdShade.Material.Define(stage, scope.AppendChild(identifier))
@@ -350,10 +350,10 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
             material.GetPrim().SetDisplayName(name)
         materials.append(material)
     for obj in objects:
-        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
-        runs = [] if own is None or obj.kind != "mesh" else material_runs(own, names)
+        face_labels = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        runs = [] if face_labels is None or obj.kind != "mesh" else material_runs(face_labels, names)
         prim = obj.target.GetPrim()
-        if len(runs) == 1 and len(runs[0][1]) == len(own):
+        if len(runs) == 1 and len(runs[0][1]) == len(face_labels):
             UsdShade.MaterialBindingAPI.Apply(prim).Bind(materials[runs[0][0]])
             continue
         for label, faces in runs:
@@ -448,7 +448,7 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
         return False
     type_name = _type_name(name, kind, row if row in shapes else ())
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(found is None for found in placed):
+    if any(place is None for place in placed):
         return False
     for target, rows in placed:
         if not len(rows):  # An object that has no faces or corners has no values for them.
@@ -481,7 +481,7 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
     """As widths of curves and points; of meshes as a primvar."""
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
+    if any(place is None or place[0] is not obj.target for place, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
         if obj.kind == "mesh":
@@ -559,7 +559,7 @@ def _whole(obj: SceneObject) -> Any:
 
 def _write_extents(layer: Sdf.Layer, extents: list, positions: np.ndarray, code: float) -> None:
     for obj, path in extents:
-        own = positions[obj.vertices]
-        if len(own):
+        points = positions[obj.vertices]
+        if len(points):
             half = np.float32(obj.width / 2)
-            layer.SetTimeSample(path, code, _vec3([own.min(axis=0) - half, own.max(axis=0) + half]))
+            layer.SetTimeSample(path, code, _vec3([points.min(axis=0) - half, points.max(axis=0) + half]))

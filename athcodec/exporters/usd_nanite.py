@@ -45,14 +45,14 @@ def parts_of(motion: Motion, objects: list[SceneObject], joints: Joints) -> dict
     """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
-    found = {
+    parts = {
         number: Part(copies, _joint_of_copies(objects[number], joints))
         for number, copies in fit_copies(still, objects, allowed_error(motion)).items()
         if objects[number].kind == "mesh"
     }
-    if not any(obj.kind == "mesh" for number, obj in enumerate(objects) if number not in found):
+    if not any(obj.kind == "mesh" for number, obj in enumerate(objects) if number not in parts):
         raise ClipError("nanite: got no mesh beside the copies, expected one as the base of the assembly")
-    return found
+    return parts
 
 
 def _joint_of_copies(obj: SceneObject, joints: Joints) -> np.ndarray:
@@ -164,10 +164,10 @@ def wind_of(motion: Motion, joints: Joints) -> str:
     strongest = joints.vertex_joint[np.arange(len(order)), joints.weights.argmax(axis=1)]
     np.minimum.at(groups, strongest, order)
     groups[0] = 0
-    said = [{"JointName": name, "SimulationGroupIndex": group} for name, group in zip(joints.names, groups.tolist())]
+    entries = [{"JointName": name, "SimulationGroupIndex": group} for name, group in zip(joints.names, groups.tolist())]
     influence = [
         {"bUseDualInfluence": False, "Influence": 1.0, "bIsTrunkGroup": group == 0}
         for group in range(int(groups.max()) + 1)
     ]
-    wind = {"Joints": said, "SimulationGroups": influence, "bIsGroundCover": False, "GustAttenuation": 0.0}
+    wind = {"Joints": entries, "SimulationGroups": influence, "bIsGroundCover": False, "GustAttenuation": 0.0}
     return json.dumps(wind, indent=1) + "\n"

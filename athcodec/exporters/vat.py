@@ -112,10 +112,10 @@ class _Grid:
     def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
         """(what the JSON says of it, (height, width, 4)) each; texels without a node are 0."""
         for number, start in enumerate(range(0, len(rows), self.frames)):
-            mine = rows[start : start + self.frames]
+            frames = rows[start : start + self.frames]
             texels = np.zeros((self.frames, self.rows_per_frame * self.per_row, 3, 4), rows.dtype)
-            texels[: len(mine), : rows.shape[1]] = mine
-            facts = {"file": f"{name}_matrices_{number}.exr", "first_frame": start, "frames": len(mine)}
+            texels[: len(frames), : rows.shape[1]] = frames
+            facts = {"file": f"{name}_matrices_{number}.exr", "first_frame": start, "frames": len(frames)}
             yield facts, texels.reshape(self.height, self.width, 4)
 
     def pivots(self, pivots: np.ndarray) -> np.ndarray:

@@ -89,7 +89,7 @@ class Spread:
         """The value that this fraction of all do not exceed, at most 0.4 % too large; 0 of no values."""
         if not self.count:
             return 0.0
-        found = np.searchsorted(np.cumsum(self._bins), np.ceil(real("fraction", fraction) * self.count))
+        place = np.searchsorted(np.cumsum(self._bins), np.ceil(real("fraction", fraction) * self.count))
         infinite = np.float32(np.inf).view(np.uint32) >> _SHIFT
-        end = found if found in (0, infinite) else found + 1
+        end = place if place in (0, infinite) else place + 1
         return float(np.array(end << _SHIFT, np.uint32).view(np.float32))

@@ -51,7 +51,7 @@ def presence_of_parts(
 ) -> dict[int, np.ndarray]:
     """By the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those that
     show each of its copies, (T, copies)."""
-    found: dict[int, np.ndarray] = {}
+    presence: dict[int, np.ndarray] = {}
     stated = stated_presence(metadata)
     places = {name: number for number, name in enumerate(names)} if stated else {}
     for key, runs in stated.items():
@@ -63,10 +63,10 @@ def presence_of_parts(
         for first, stop in runs:
             shown[first:stop] = True
         if copy:
-            found.setdefault(part, np.ones((frame_count, copies[part]), bool))[:, int(copy)] = shown
+            presence.setdefault(part, np.ones((frame_count, copies[part]), bool))[:, int(copy)] = shown
         else:
-            found[part] = shown[:, None]
-    return found
+            presence[part] = shown[:, None]
+    return presence
 
 
 def parts_hidden_far_away(clip: Any) -> list[str]:
@@ -76,14 +76,14 @@ def parts_hidden_far_away(clip: Any) -> list[str]:
     if not stated_presence(clip.metadata) or counts is None or np.shape(counts) != np.shape(names):
         return []
     copies = clip.attributes.get("part_copies", np.ones_like(counts))
-    found = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
+    presence = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
     starts = np.cumsum(counts) - counts
     # The last row is what is shown.
     low, high = np.full((2, len(names) + 1, 3), np.inf) * np.array([1, -1])[:, None, None]
     for start, block in clip.blocks():
         for frame, positions in enumerate(block, start):
             is_shown = np.ones(len(positions), bool)
-            for part, shown in found.items():
+            for part, shown in presence.items():
                 rows = slice(starts[part], starts[part] + counts[part])
                 is_shown[rows] = np.repeat(shown[frame], counts[part] // shown.shape[1])
                 hidden = positions[rows][~is_shown[rows]]
@@ -93,4 +93,4 @@ def parts_hidden_far_away(clip: Any) -> list[str]:
             high[-1] = np.maximum(high[-1], positions[is_shown].max(axis=0, initial=-np.inf))
     with np.errstate(invalid="ignore"):  # inf - inf where nothing is shown or hidden
         diagonals = np.linalg.norm(np.maximum(high, high[-1]) - np.minimum(low, low[-1]), axis=1)
-        return [names[part] for part in found if diagonals[part] > FAR * diagonals[-1]]
+        return [names[part] for part in presence if diagonals[part] > FAR * diagonals[-1]]

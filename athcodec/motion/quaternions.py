@@ -52,5 +52,5 @@ def quaternions(rotations: np.ndarray) -> np.ndarray:
         -2,
     )
     best = squares.argmax(axis=-1)
-    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+    unscaled = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    return unscaled / np.linalg.norm(unscaled, axis=-1, keepdims=True)

@@ -534,7 +534,7 @@ def sample_path(name: str = "tree") -> Path:
     ValueError
         For another name.
     """
-    files = {own: f"{own}_1k_120f.h5" for own in SAMPLES} | {
+    files = {name_of_sample: f"{name_of_sample}_1k_120f.h5" for name_of_sample in SAMPLES} | {
         "leafed": "leafed_tree.ath",
         "fern": "fern.ath",
         "grass": "grass.ath",

@@ -205,7 +205,7 @@ class _Object(SceneObject):
 def _clip(archive: Any, options: ReadOptions) -> MotionClip:
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
-    own, kept = _kept(archive)
+    metadata, kept = _kept(archive)
     not_read: dict[str, list[str]] = {}
     objects = _together(_find(archive, options.only, not_read))
     times, rate = _times(archive, objects, options.fps)
@@ -242,7 +242,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         objects,
         frames_of_objects(objects, len(times), sample),
         times - times[0],
-        own_metadata(own) | _metadata(archive, times, rate),
+        own_metadata(metadata) | _metadata(archive, times, rate),
         kept,
         options,
         not_read=not_read,
@@ -273,10 +273,11 @@ def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> 
             children.append((child, below, source))
         waiting += reversed(children)
     if not objects:
-        what = f" named like {', '.join(only)}" if only else ""
+        filtered = f" named like {', '.join(only)}" if only else ""
         names = f", or {', '.join(refused[:LISTED])}" if refused else ""
         raise ClipError(
-            f"objects: got none with points{what}, expected a visible mesh, curves or points{names}{besides(not_read)}"
+            f"objects: got none with points{filtered}, expected a visible mesh, curves or points"
+            f"{names}{besides(not_read)}"
         )
     return objects
 
@@ -297,17 +298,17 @@ def _is_named(child: Any, patterns: Sequence[str]) -> bool:
 def _together(objects: list[_Object]) -> list[_Object]:
     """Instances of one object, whose shape stays as it is, as copies at the place of the first."""
     by_source: dict[str, _Object] = {}
-    found = []
+    remaining = []
     for obj in objects:
         first = by_source.get(obj.source)
         if first is None:
             by_source[obj.source] = obj
-            found.append(obj)
+            remaining.append(obj)
         elif len(obj.track.times) > 1:
-            found.append(obj)
+            remaining.append(obj)
         else:
             first.places += obj.places
-    return found
+    return remaining
 
 
 def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]) -> _Place:
@@ -317,15 +318,15 @@ def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_rea
         not_read.setdefault("attribute", []).extend(f"{child.getFullName()}.{each}" for each in unread)
     if name.startswith("AbcGeom_Xform"):
         return replace(place, xforms=_above(child, place.xforms))
-    found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
+    kinds = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     if name.startswith("AbcGeom_FaceSet"):
         return place  # A mesh is read together with its face sets.
-    if found is None and name:
+    if kinds is None and name:
         kind = name.partition("_")[2].rpartition("_")[0] or name  # For example NuPatch of AbcGeom_NuPatch_v2.
         not_read.setdefault(kind, []).append(child.getFullName())
-    if found is None:
+    if kinds is None:
         return place
-    kind, wrap = found
+    kind, wrap = kinds
     schema = wrap(child, EXISTING).getSchema()
     points = schema.getPositionsProperty()
     if not points.getNumSamples():
@@ -361,8 +362,8 @@ def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
     count = schema.getNumSamples()
     if not count or _is_own(schema):
         return above
-    own = _Xform(schema, _Track(schema.getTimeSampling(), 1 if schema.isConstant() else count))
-    return [own, *above]
+    transform = _Xform(schema, _Track(schema.getTimeSampling(), 1 if schema.isConstant() else count))
+    return [transform, *above]
 
 
 def _track(samples: Any) -> _Track:
@@ -413,9 +414,9 @@ def _topology(obj: _Object) -> None:
 def _name_unread(obj: _Object) -> None:
     """Names the properties of an object that hold something and are not read."""
     for name in UNREAD:
-        found = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
-        if found.valid() and found.getNumSamples():
-            values = np.array(found.getValue())
+        prop = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
+        if prop.valid() and prop.getNumSamples():
+            values = np.array(prop.getValue())
             obj.left_out += [name] * bool(values.size if values.ndim else values)
     further = obj.schema.getUserProperties()
     obj.left_out += ["userProperties"] * bool(further.valid() and further.getNumProperties())
@@ -431,16 +432,16 @@ def _bind_materials(obj: _Object) -> None:
             obj.bind(str(name), faces)
 
 
-def _fixed(obj: _Object, found: Any) -> np.ndarray:
+def _fixed(obj: _Object, values: Any) -> np.ndarray:
     """Integers that are the same in every frame; ClipError where they change."""
-    first = np.array(found.getValue(), np.int32)
-    if found.isConstant():
+    first = np.array(values.getValue(), np.int32)
+    if values.isConstant():
         return first
-    track = _Track(found.getTimeSampling(), found.getNumSamples())
+    track = _Track(values.getTimeSampling(), values.getNumSamples())
     for i in range(1, len(track.times)):
-        if not np.array_equal(np.array(found.getValue(track.sample(i)), np.int32), first):
+        if not np.array_equal(np.array(values.getValue(track.sample(i)), np.int32), first):
             raise ClipError(
-                f"{obj.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
+                f"{obj.path}: {values.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
                 "the same vertices and faces in all"
             )
     return first
@@ -468,8 +469,8 @@ def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.
 
 def _rate(archive: Any, step: float, times: np.ndarray) -> float:
     """The rate of the samples; where their steps differ, the one that the archive states for the tool that made it."""
-    said = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
-    rate = 1 / step if step > 0 else float(said) or 1 / float(np.median(np.diff(times)))
+    stated = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
+    rate = 1 / step if step > 0 else float(stated) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
     for exact in (float(round(rate)), nice, (round(rate * 1001 / 1000) * 1000) / 1001):
         if exact > 0 and math.isclose(rate, exact, rel_tol=1e-12 if step > 0 else 1e-6):
@@ -571,23 +572,23 @@ def _kept(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]
 def _descriptor(text: str) -> ArrayDescriptor:
     """Return the object of a JSON text; an empty one if it cannot be parsed."""
     try:
-        found = ArrayDescriptor(**json.loads(text))
+        descriptor = ArrayDescriptor(**json.loads(text))
     except (ValueError, TypeError, RecursionError):
         return ArrayDescriptor()
-    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
+    return descriptor if all(isinstance(value, str) for value in descriptor) else ArrayDescriptor()
 
 
 # ---- positions ----
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
-    found = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
-    counts = {len(points) for points, _ in found}
+    samples = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
+    counts = {len(points) for points, _ in samples}
     if len(counts) != 1:
         raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")
-    if len(found) == 1:
-        return found[0][0]
-    return sum(points.astype(np.float64) * weight for points, weight in found).astype(np.float32)
+    if len(samples) == 1:
+        return samples[0][0]
+    return sum(points.astype(np.float64) * weight for points, weight in samples).astype(np.float32)
 
 
 def _sample(obj: _Object, number: int) -> np.ndarray:

@@ -263,8 +263,8 @@ def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[
         sides = np.concatenate(sides)
         faces = _faces_of_size(counts, corners, size)
         keys = np.sort(np.concatenate([sides, faces]), axis=1)
-        _, which, often = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-        alone = sides[often[which.reshape(-1)[: len(sides)]] == 1]
+        _, number, often = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        alone = sides[often[number.reshape(-1)[: len(sides)]] == 1]
         found_counts.append(np.full(len(alone), size))
         found_corners.append(alone.reshape(-1))
     none = np.zeros(0, np.int64)

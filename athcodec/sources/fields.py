@@ -20,7 +20,7 @@ from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Part, Topology
 from athcodec.sources.mesh import kind_of
-from athcodec.sources.scene_objects import scene_said
+from athcodec.sources.scene_objects import scene_fields
 
 AMBIGUOUS = "u"  # Name of the displacement in some programs and of the velocity in others.
 DISPLACEMENTS = ("displacement", "displacements", "disp", "displ", AMBIGUOUS)
@@ -106,11 +106,11 @@ def clip_of_steps(
     names = {key: new for key, new in names.items() if new not in RESERVED_NAMES and new not in topology.attributes}
     attributes = topology.attributes | {new: static[key] for key, new in names.items()}
     attributes = {key: values for key, values in attributes.items() if key not in options.skip}
-    metadata, numbers = scene_said(metadata, count)
+    metadata, numbers = scene_fields(metadata, count)
     parts = parts or (Part("", count),)
     attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
     domains |= dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
-    said = {
+    facts = {
         "part_names": [part.name or name for part in parts],
         "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
         "domains": {key: domain for key, domain in domains.items() if key in attributes},
@@ -129,7 +129,7 @@ def clip_of_steps(
         rest=rest,
         rest_pose="mean" if options.rest == "mean" else "first",
         attributes=attributes,
-        metadata=said | metadata,
+        metadata=facts | metadata,
         resource=resource,
         unchanged=unchanged,
         not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
@@ -171,17 +171,17 @@ def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptio
         return options.field
     if not fixed:
         return None
-    found = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
-    if len(found) > 1:
-        raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
-    if not found and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
+    matching = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
+    if len(matching) > 1:
+        raise ClipError(f"field: got {_listed(matching)}, expected one displacement; name it with --field")
+    if not matching and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
         vectors = [name for name in names if _is_vector(steps.field(0, name))]
         if vectors:
             advice = f"name one of {'them' if len(vectors) == len(names) else _listed(vectors)} with --field"
         else:
             advice = f"write the displacement with {'two or three numbers' if names else 'one value'} per point"
         raise ClipError(f"field: got points that do not move and no displacement, only {listed}; {advice}")
-    return found[0] if found else None
+    return matching[0] if matching else None
 
 
 def _is_vector(values: np.ndarray) -> bool:

@@ -155,14 +155,14 @@ class Series:
                 metadata["start_frame"] = int(numbers[0])
         return time, metadata
 
-    def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], who: str, then: str) -> None:
+    def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], subject: str, then: str) -> None:
         """Warn where files state another time than `times`."""
         for time, statement, frame in zip(times.tolist(), stated, self.frames):
             if statement is None or statement.kind is not Kind.TIME:
                 continue
             if abs(statement.seconds - time) > SAME * max(abs(time), abs(statement.seconds)):
                 self._warn(
-                    f"{who} {time:.10g} for {frame[0].name}, {then}; the file has {statement.seconds:.10g} in "
+                    f"{subject} {time:.10g} for {frame[0].name}, {then}; the file has {statement.seconds:.10g} in "
                     f"{statement.place}"
                 )
                 return

@@ -217,10 +217,10 @@ def _clip(
         node.mirrored, node.is_flipped = facing.mirrored, facing.changes
     faces, edges, face_material = _connections(file, nodes)
     names = _names(scene, nodes)
-    said: dict[str, Any] = {}
+    stated: dict[str, Any] = {}
     if face_material is not None and FACE_MATERIAL not in options.skip:
         attributes[FACE_MATERIAL] = face_material
-        said = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
+        stated = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
     rest = _rest_pose(motion, nodes) if options.rest == "auto" else None
     unread = not_read(list(scenes.values()), nodes, keeps_normals or are_guessed) | (
         {} if _chooses(options) else _other_animations(scene)
@@ -242,7 +242,7 @@ def _clip(
             | timing.clock
             | names
             | presence_metadata(names["part_names"], _shown(scenes[name], nodes, timing.times))
-            | said
+            | stated
             | ({} if options.takes else _played(scene, nodes)),
             unchanged=file.unchanged,
             not_read=unread,
@@ -329,16 +329,16 @@ def _number(nodes: Sequence[GltfNode]) -> int:
     return first
 
 
-def _animations(scene: Scene, patterns: Sequence[str], what: str) -> dict[str, int]:
+def _animations(scene: Scene, patterns: Sequence[str], subject: str) -> dict[str, int]:
     """Return the animations that any of the patterns names and that move something, in the file's order."""
     every, wanted = _animation_numbers(scene.file), set()
     numbers = {name: index for name, index in every.items() if scene.targets(index)}
     for pattern in patterns:
-        found = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
-        if not found:
+        matching = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
+        if not matching:
             unmoving = ", which moves no node of the scene" if pattern in every else ""
-            raise ClipError(f"{what}{pattern}{unmoving}, expected one of {brief(list(numbers))}")
-        wanted |= found
+            raise ClipError(f"{subject}{pattern}{unmoving}, expected one of {brief(list(numbers))}")
+        wanted |= matching
     return {name: index for name, index in numbers.items() if name in wanted}
 
 
@@ -387,10 +387,10 @@ def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
         kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
         node.kind = max(node.kind, kind, key=KINDS.index)
         node.primitives.append(primitive)
-    found = list(nodes.values())
-    for number, node in enumerate(found[1:], 1):
+    in_order = list(nodes.values())
+    for number, node in enumerate(in_order[1:], 1):
         node.name = f"{name}.{number}"
-    return found
+    return in_order
 
 
 def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
@@ -401,10 +401,14 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
         return None, _own_extras(scene, index)
     if scene.nodes[index].get("skin") is not None:
         raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
-    own = entry(instancing, "attributes")
-    for name in own:
-        scene.file.budget.take(INSTANCE_BYTES * scene.file.count(integer(own, name)), f"node {index}")
-    parts = {name: scene.file.floats(integer(own, name)).astype(np.float64) for name in INSTANCE_PARTS if name in own}
+    accessors = entry(instancing, "attributes")
+    for name in accessors:
+        scene.file.budget.take(INSTANCE_BYTES * scene.file.count(integer(accessors, name)), f"node {index}")
+    parts = {
+        name: scene.file.floats(integer(accessors, name)).astype(np.float64)
+        for name in INSTANCE_PARTS
+        if name in accessors
+    }
     counts = {len(values) for values in parts.values()}
     widths = all(values.shape[1] == INSTANCE_PARTS[name] for name, values in parts.items())
     if len(counts) != 1 or not widths:
@@ -412,20 +416,20 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
             f"node {index}: got {INSTANCING} of {sorted(counts)} instances, expected TRANSLATION, ROTATION "
             "or SCALE of as many"
         )
-    found = np.tile(np.eye(4), (counts.pop(), 1, 1))
+    matrices = np.tile(np.eye(4), (counts.pop(), 1, 1))
     if "ROTATION" in parts:
-        found[:, :3, :3] = rotation_matrices(parts["ROTATION"])
+        matrices[:, :3, :3] = rotation_matrices(parts["ROTATION"])
     if "SCALE" in parts:
-        found[:, :3, :3] *= parts["SCALE"][:, None, :]
+        matrices[:, :3, :3] *= parts["SCALE"][:, None, :]
     if "TRANSLATION" in parts:
-        found[:, :3, 3] = parts["TRANSLATION"]
-    of_copies = {name: scene.file.attribute(integer(own, name)) for name in own if name.startswith("_")}
+        matrices[:, :3, 3] = parts["TRANSLATION"]
+    of_copies = {name: scene.file.attribute(integer(accessors, name)) for name in accessors if name.startswith("_")}
     for name, values in of_copies.items():
-        if len(values) != len(found):
+        if len(values) != len(matrices):
             raise ClipError(
-                f"node {index}: got {len(values)} entries of {name}, expected {len(found)}, one an instance"
+                f"node {index}: got {len(values)} entries of {name}, expected {len(matrices)}, one an instance"
             )
-    return found, of_copies
+    return matrices, of_copies
 
 
 def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
@@ -433,12 +437,12 @@ def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
     extras = scene.nodes[index].get("extras")
     if scene.says_copies(int(scene.parent[index])) is None or not isinstance(extras, dict):
         return {}
-    found = {}
+    attributes = {}
     for key, value in extras.items():
         row = value if isinstance(value, list) else [value]
         if 1 <= len(row) <= 4 and all(_is_number(number) for number in row):
-            found[f"_{key}"] = np.array([row], np.int64 if all(type(n) is int for n in row) else np.float32)
-    return found
+            attributes[f"_{key}"] = np.array([row], np.int64 if all(type(n) is int for n in row) else np.float32)
+    return attributes
 
 
 def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
@@ -467,10 +471,10 @@ def _load(node: GltfNode, scene: Scene) -> None:
     _load_influences(node, file)
 
 
-def _triples(file: GltfFile, index: int, count: int, what: str) -> np.ndarray:
+def _triples(file: GltfFile, index: int, count: int, subject: str) -> np.ndarray:
     values = file.floats(index)
     if values.shape != (count, 3):
-        raise ClipError(f"{what}: got shape {values.shape}, expected ({count}, 3)")
+        raise ClipError(f"{subject}: got shape {values.shape}, expected ({count}, 3)")
     return values
 
 
@@ -617,9 +621,9 @@ class _Motion:
         matrices = self.scene.matrices(self.ancestors, None)
         linear = np.eye(3) if self._from_world is None else self._from_world[:3, :3]
 
-        def moved(matrix: np.ndarray, given: np.ndarray) -> np.ndarray:
+        def moved(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
             matrix = linear @ matrix[:3, :3]
-            return given @ (np.linalg.pinv(matrix) if is_normal else matrix.T)
+            return vectors @ (np.linalg.pinv(matrix) if is_normal else matrix.T)
 
         if node.skin is None:
             turned = moved(matrices[node.index][0], directions)
@@ -658,8 +662,8 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     scene, keys = motion.scene, motion.scene.keys
     if not len(keys):
         return Sampling(DEFAULT_FPS, np.zeros(1), {})
-    said = _stated_extras(scene)
-    fps = wanted or _said_rate(said, keys) or key_rate(keys)
+    extras = _stated_extras(scene)
+    fps = wanted or _stated_rate(extras, keys) or key_rate(keys)
     if fps is None:
         fps = DEFAULT_FPS
         warn_of_missed(keys, off_grid(keys, fps), fps, scene.file.path)
@@ -667,14 +671,14 @@ def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
     if not count < MOST_FRAMES:
         raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")
     scene.file.budget.take(32 * int(count), "animations")
-    is_loop = said.get("loop") is True
+    is_loop = extras.get("loop") is True
     frames = int(count + 0.02) + 1
     if is_loop and frames > 1 and _returns(motion, keys):
         frames = round(count)
         if abs(count - frames) > 0.02:  # the time of all frames is that of the loop
             fps *= frames / count
     times = keys[0] + np.arange(frames) / fps
-    first = float(keys[0] * fps) + (said["start_frame"] if _is_number(said.get("start_frame")) else 0)
+    first = float(keys[0] * fps) + (extras["start_frame"] if _is_number(extras.get("start_frame")) else 0)
     whole = round(first)
     clock = {"fps": float(fps), "start_frame": whole if abs(first - whole) < 1e-3 else first}
     return Sampling(float(fps), _on_keys(times, keys, fps), clock, is_loop)
@@ -696,9 +700,9 @@ def _returns(motion: _Motion, keys: np.ndarray) -> bool:
     return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 
 
-def _said_rate(said: dict, keys: np.ndarray) -> float | None:
+def _stated_rate(extras: dict, keys: np.ndarray) -> float | None:
     """Return the frame rate that the file states, if its keys agree."""
-    fps = said.get("fps")
+    fps = extras.get("fps")
     return float(fps) if _is_number(fps) and 0 < fps < 1e6 and not off_grid(keys, fps).any() else None
 
 
@@ -728,7 +732,7 @@ def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode
             parts[-1][2].append(node)
         else:
             parts.append((above, scene.name(above) or node.name, [node]))
-    return [(name if len(own) > 1 else own[0].name, own) for _, name, own in parts]
+    return [(name if len(members) > 1 else members[0].name, members) for _, name, members in parts]
 
 
 def _is_alike(node: GltfNode, other: GltfNode) -> bool:
@@ -739,9 +743,10 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
 def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     parts = _parts(scene, nodes)
     details = [
-        {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in own) else {} for _, own in parts
+        {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in members) else {}
+        for _, members in parts
     ]
-    return {"part_names": [name for name, _ in parts], "part_kinds": [own[0].kind for _, own in parts]} | (
+    return {"part_names": [name for name, _ in parts], "part_kinds": [members[0].kind for _, members in parts]} | (
         {"part_usd": details} if any(details) else {}
     )
 
@@ -754,8 +759,8 @@ def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
 
 def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
     """The frames that show each object, or each of its copies."""
-    parts = [own for _, own in _parts(scene, nodes)]
-    return [np.stack([scene.shown(node.index, times) for node in own], axis=1) for own in parts]
+    parts = [part for _, part in _parts(scene, nodes)]
+    return [np.stack([scene.shown(node.index, times) for node in part], axis=1) for part in parts]
 
 
 def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
@@ -778,10 +783,10 @@ def _connections(
     file: GltfFile, nodes: list[GltfNode]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
     """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
-    found: dict[int, list[np.ndarray]] = {2: [], 3: []}
+    indices: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials, numbers = [], _material_numbers(file)
     for node in nodes:
-        own: dict[int, list[np.ndarray]] = {2: [], 3: []}
+        indices_of_node: dict[int, list[np.ndarray]] = {2: [], 3: []}
         labels = []
         for primitive in node.primitives:
             mode = integer(primitive, "mode", 4)
@@ -790,21 +795,21 @@ def _connections(
             count = node.shape_count if primitive.get("indices") is None else file.count(primitive["indices"])
             file.budget.take(CORNER_BYTES * count * (node.count // max(node.shape_count, 1)), f"mesh {node.name!r}")
             rows = rows_of(corners(file, primitive, node.shape_count, f"mesh {node.name!r}"), mode)
-            own[rows.shape[1]].append(rows)
+            indices_of_node[rows.shape[1]].append(rows)
             if rows.shape[1] == 3:
                 label = integer(primitive, "material", -1, low=-1, stop=len(file.items("materials")))
                 labels.append(np.full(len(rows), label if label < 0 else numbers[label], np.int32))
         starts = np.arange(node.first, node.first + node.count, max(node.shape_count, 1))
-        for size, parts in own.items():
+        for size, parts in indices_of_node.items():
             if parts:
                 rows = np.concatenate(parts)
                 rows = rows + starts[:, None, None]
                 if size == 3:
                     rows = np.where(node.mirrored[:, None, None], rows[..., ::-1], rows)
-                found[size].append(rows.reshape(-1, size).astype(np.int32))
+                indices[size].append(rows.reshape(-1, size).astype(np.int32))
         if labels:
             materials.append(np.tile(np.concatenate(labels), len(starts)))
-    faces, edges = (np.concatenate(found[size]) if found[size] else None for size in (3, 2))
+    faces, edges = (np.concatenate(indices[size]) if indices[size] else None for size in (3, 2))
     face_material = np.concatenate(materials) if materials else np.empty(0, np.int32)
     return faces, edges, face_material if (face_material >= 0).any() else None
 
@@ -832,21 +837,21 @@ def _attributes(
         for key in (*node.attributes, *node.of_copies)
         if key.startswith("_") or key in ("TEXCOORD_0", "COLOR_0") or keeps_normals and key == "NORMAL"
     )
-    found: dict[str, np.ndarray] = {}
+    attributes: dict[str, np.ndarray] = {}
     for key in keys:
         name = NAMES.get(key) or (key[1:].lower() if key.isupper() else key[1:]) or key
-        name += "_" * (name in found)
+        name += "_" * (name in attributes)
         if name not in skip:
-            found[name] = _attribute(file, nodes, key, name, motion)
-    branches = _branches(file, found)
-    for name in RESERVED_NAMES & found.keys():
-        found[f"{name}_"] = found.pop(name)
-    parts = [own for _, own in _parts(scene, nodes)]
-    found["part_vertex_counts"] = np.array([sum(node.count for node in own) for own in parts], np.int32)
-    copies = [_rigid_copies(own) for own in parts]
+            attributes[name] = _attribute(file, nodes, key, name, motion)
+    branches = _branches(file, attributes)
+    for name in RESERVED_NAMES & attributes.keys():
+        attributes[f"{name}_"] = attributes.pop(name)
+    parts = [part for _, part in _parts(scene, nodes)]
+    attributes["part_vertex_counts"] = np.array([sum(node.count for node in part) for part in parts], np.int32)
+    copies = [_rigid_copies(part) for part in parts]
     if any(count > 1 for count in copies) or any(node.copies is not None for node in nodes):
-        found["part_copies"] = np.array(copies, np.int32)
-    return found, branches
+        attributes["part_copies"] = np.array(copies, np.int32)
+    return attributes, branches
 
 
 def _rigid_copies(part: list[GltfNode]) -> int:
@@ -878,15 +883,19 @@ def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motio
     return out[:, 0] if width == 1 else out
 
 
-def _branches(file: GltfFile, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
     extras = file.json["asset"].get("extras")
-    ours = extras.get("athcodec") if isinstance(extras, dict) else None
-    parent = ours.get("branch_parent") if isinstance(ours, dict) and "vertex_branch" in found else None
+    entry_of_athcodec = extras.get("athcodec") if isinstance(extras, dict) else None
+    parent = (
+        entry_of_athcodec.get("branch_parent")
+        if isinstance(entry_of_athcodec, dict) and "vertex_branch" in attributes
+        else None
+    )
     if not isinstance(parent, list) or any(type(number) is not int for number in parent):
         return {}
-    names = [name for name in ("vertex_branch", "stem_index") if name in found]
-    found_branches = {name: found.pop(name).astype(np.int64) for name in names}
+    names = [name for name in ("vertex_branch", "stem_index") if name in attributes]
+    found_branches = {name: attributes.pop(name).astype(np.int64) for name in names}
     return found_branches | {"branch_parent": np.array(parent, np.int64)}
 
 
@@ -912,10 +921,10 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
             vertex_joint[rows] = np.array([place[joint] for joint in node.joints])[node.strongest]
     parents, names = [_above(scene, joint, place) for joint in order], [scene.name(joint) for joint in order]
     for node in copied:  # each copy hangs on a joint of its own, below the node
-        own = len(parents) + np.arange(len(node.copies))
-        vertex_joint[node.vertices] = np.repeat(own, node.shape_count)
-        parents += [place[node.index]] * len(own)
-        names += [node.name] * len(own)
+        joints = len(parents) + np.arange(len(node.copies))
+        vertex_joint[node.vertices] = np.repeat(joints, node.shape_count)
+        parents += [place[node.index]] * len(joints)
+        names += [node.name] * len(joints)
     return Skin(np.array(parents, np.int32), vertex_joint, tuple(names))
 
 

@@ -61,16 +61,16 @@ class Channel(NamedTuple):
 def target_of(channel: dict) -> Target | str:
     """What a channel animates; where that is nothing that is played, its pointer or a name for it. Raises ClipError."""
     target = entry(channel, "target")
-    said = extension(target, POINTER)
-    if said is None:
+    pointed = extension(target, POINTER)
+    if pointed is None:
         node, path = target.get("node"), target.get("path")
         if node is None or path not in PLAYED[:-1]:
             return f"{brief(path).strip(QUOTES)} of node {brief(node)}"
         return Target("nodes", integer(target, "node"), path)
-    pointer = said.get("pointer")
+    pointer = pointed.get("pointer")
     for pattern in POINTED if isinstance(pointer, str) else ():
-        if found := pattern.fullmatch(pointer):
-            index, path, *weight = found.groups()
+        if match := pattern.fullmatch(pointer):
+            index, path, *weight = match.groups()
             return Target(pointer.split("/")[1], int(index), path, int(weight[0]) if any(weight) else -1)
     return brief(pointer).strip(QUOTES)
 
@@ -147,8 +147,8 @@ class Scene:
     def says_copies(self, node: int) -> bool | None:
         """What a node states by COPIES about those below it: whether they are one object; None for nothing."""
         extras = self.nodes[node].get("extras") if node >= 0 else None
-        said = extras.get(COPIES) if isinstance(extras, dict) else None
-        return said if isinstance(said, bool) else None
+        stated = extras.get(COPIES) if isinstance(extras, dict) else None
+        return stated if isinstance(stated, bool) else None
 
     # ---- structure ----
 
@@ -227,9 +227,9 @@ class Scene:
                     f"animation {index}: got entry {target.index} of {target.holder}, expected one below {count}"
                 )
             moved = [target.index] if target.holder == "nodes" else self._showing.get(target.index, [])
-            found = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
-            played += found
-            if not found:
+            channels = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
+            played += channels
+            if not channels:
                 others.append(str(target))
         self._channels_of[index] = played, others
         return played, others
@@ -346,27 +346,27 @@ class Scene:
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
         """(k, targets) of a node's mesh; times None: without animation, k = 1."""
         tracks = () if times is None else self._weights.get(node, ())
-        found = np.repeat(default[None], len(times) if tracks else 1, axis=0)
+        weights = np.repeat(default[None], len(times) if tracks else 1, axis=0)
         for target, track in tracks:
             values = track.at(times)
             if target.weight >= len(default) or target.weight < 0 and values.shape[1] != len(default):
                 got = f"weight {target.weight}" if target.weight >= 0 else f"{values.shape[1]} weights"
                 raise ClipError(f"node {node}: got {got} animated, expected those of its {len(default)} morph targets")
-            found[:, slice(None) if target.weight < 0 else [target.weight]] = values
-        return found
+            weights[:, slice(None) if target.weight < 0 else [target.weight]] = values
+        return weights
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
         """(k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k = 1."""
         place = {node: i for i, node in enumerate(nodes)}
-        found = self._locals(place, times)
+        matrices = self._locals(place, times)
         above = np.array([place.get(int(self.parent[node]), -1) for node in nodes])
         level = np.zeros(len(nodes), np.int64)
         for i in np.flatnonzero(above >= 0):  # parents stand first
             level[i] = level[above[i]] + 1
         for depth in range(1, int(level.max(initial=0)) + 1):
-            mine = np.flatnonzero(level == depth)
-            found[:, mine] = found[:, above[mine]] @ found[:, mine]
-        return {node: found[:, i] for node, i in place.items()}
+            places = np.flatnonzero(level == depth)
+            matrices[:, places] = matrices[:, above[places]] @ matrices[:, places]
+        return {node: matrices[:, i] for node, i in place.items()}
 
     def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
         """(k, nodes, 4, 4): from each node to its parent."""
@@ -378,14 +378,14 @@ class Scene:
         for path, nodes, track in self._groups if times is not None else ():
             inside = [i for i, node in enumerate(nodes) if node in place]
             parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]
-        found = np.zeros((frames, len(place), 4, 4))
-        found[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
-        found[..., :3, 3] = parts["translation"]
-        found[..., 3, 3] = 1.0
+        matrices = np.zeros((frames, len(place), 4, 4))
+        matrices[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
+        matrices[..., :3, 3] = parts["translation"]
+        matrices[..., 3, 3] = 1.0
         for node, i in place.items():
             if "matrix" in self.nodes[node]:
-                found[:, i] = vector(self.nodes[node], "matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
-        return found
+                matrices[:, i] = vector(self.nodes[node], "matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
+        return matrices
 
 
 def key_rate(keys: np.ndarray) -> float | None:

@@ -275,10 +275,10 @@ def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
         link = file.get("/".join(parts[:end]), getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise ClipError(f"{name[:80]}: got a link to {link.filename[:80]!r}, {_OWN}")
-    found = file.get(name) if parts else None
-    if found is not None and found.file.filename != file.filename:
-        raise ClipError(f"{name[:80]}: got a link to {found.file.filename[:80]!r}, {_OWN}")
-    if isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+    item = file.get(name) if parts else None
+    if item is not None and item.file.filename != file.filename:
+        raise ClipError(f"{name[:80]}: got a link to {item.file.filename[:80]!r}, {_OWN}")
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
         raise ClipError(f"{name[:80]}: got a dataset whose numbers are in other files, {_OWN}")
 
 
@@ -321,14 +321,14 @@ def may_explode(file: h5py.File, limit: int) -> bool:
     """Whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit` bytes
     whatever shape they have."""
     size = os.fstat(file.id.get_vfd_handle()).st_size
-    found: list[bool] = [_texts_are_more(file, size, limit)]
+    verdicts: list[bool] = [_texts_are_more(file, size, limit)]
 
     def visit(_: str, item: Any) -> None:
         is_more = isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)
-        found.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
+        verdicts.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
 
     file.visititems(visit)
-    return any(found)
+    return any(verdicts)
 
 
 def _texts_are_more(item: Any, size: int, limit: int) -> bool:

@@ -69,8 +69,8 @@ class Index:
 
     def agrees(self, other: Index) -> bool:
         """Whether another index has the same files at the same times."""
-        mine, theirs = ([list(map(os.path.abspath, frame)) for frame in index.frames] for index in (self, other))
-        return mine == theirs and np.array_equal(self.times, other.times)
+        paths, other_paths = ([list(map(os.path.abspath, frame)) for frame in index.frames] for index in (self, other))
+        return paths == other_paths and np.array_equal(self.times, other.times)
 
 
 def is_index(path: Path) -> bool:

@@ -21,7 +21,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, read_plain
 from athcodec.motion.clip import RESERVED_NAMES, polygons
-from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_fields, scene_of_json
 
 FLOAT32_DIGITS = 9
 WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # Bytes that a word of text and the value made of it take.
@@ -77,11 +77,11 @@ class Mesh:
         """ "" where both have as many vertices and the same faces and edges, else what is different."""
         if len(self.points) != len(other.points):
             return f"got {len(other.points)} vertices, expected {len(self.points)}"
-        for what, mine, theirs in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
-            if (mine is None) != (theirs is None):
-                return f"got {'no' if theirs is None else 'further'} {what}"
-            if mine is not None and not all(map(np.array_equal, mine, theirs)):
-                return f"got other {what}"
+        for elements, first, second in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
+            if (first is None) != (second is None):
+                return f"got {'no' if second is None else 'further'} {elements}"
+            if first is not None and not all(map(np.array_equal, first, second)):
+                return f"got other {elements}"
         return ""
 
     def changed(self, other: Mesh) -> set[str]:
@@ -140,11 +140,11 @@ def with_polygons(counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray |
     return None, {"face_vertex_counts": counts, "face_vertex_indices": corners}
 
 
-def _checked(what: str, indices: np.ndarray, count: int) -> np.ndarray:
+def _checked(subject: str, indices: np.ndarray, count: int) -> np.ndarray:
     """int32 indices; ClipError for any outside of 0 to count - 1."""
     bad = np.flatnonzero((indices < 0) | (indices >= count))
     if bad.size:
-        raise ClipError(f"{what}: got the number {indices[bad[0]]}, counted from 0, expected below {count}")
+        raise ClipError(f"{subject}: got the number {indices[bad[0]]}, counted from 0, expected below {count}")
     return indices.astype(np.int32)
 
 
@@ -312,16 +312,16 @@ def _add_face_rows(mesh: Mesh) -> None:
 
 
 def _add_obj_uv(mesh: Mesh, file: _Obj) -> None:
-    which = np.array(file.corner_uvs, np.int64)
-    if not file.uvs or not (which >= 0).any():
+    uv_rows = np.array(file.corner_uvs, np.int64)
+    if not file.uvs or not (uv_rows >= 0).any():
         file.not_read |= {b"vt": None} if file.uvs else {}
         return
-    _checked("texture coordinates", which[which >= 0], len(file.uvs))
+    _checked("texture coordinates", uv_rows[uv_rows >= 0], len(file.uvs))
     table = np.array([[float(word) for word in (*row[:2], b"0", b"0")[:2]] for row in file.uvs], np.float32)
     if any(len(row) > 2 and float(row[2]) != 0 for row in file.uvs):
         file.not_read[b"w of vt"] = None
-    uv = table[which]
-    uv[which < 0] = 0
+    uv = table[uv_rows]
+    uv[uv_rows < 0] = 0
     mesh.attributes["uv"] = uv
     mesh.metadata["domains"]["uv"] = "corner"
 
@@ -388,8 +388,8 @@ def comments(data: bytes) -> list[str]:
     head, is_ply = data[:COMMENT_BYTES], data.startswith((b"ply\n", b"ply\r"))
     marks = (b"comment", b"obj_info") if is_ply else (b"#",)
     lines = (line.strip() for line in (head.partition(b"end_header")[0] if is_ply else head).splitlines())
-    found = [line[len(mark) :].decode("latin-1").strip() for line in lines for mark in marks if line.startswith(mark)]
-    return [line for line in found if not line.startswith(OWN)]
+    texts = [line[len(mark) :].decode("latin-1").strip() for line in lines for mark in marks if line.startswith(mark)]
+    return [line for line in texts if not line.startswith(OWN)]
 
 
 # ---- PLY ----
@@ -426,7 +426,7 @@ class PlyHeader:
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
-    said: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
+    scene: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
 
 
 def ply_header(data: bytes) -> PlyHeader:
@@ -446,7 +446,7 @@ def ply_header(data: bytes) -> PlyHeader:
         elif words[:1] == ["property"] and header.elements:
             header.elements[-1].properties.append(_ply_property(words[1:]))
         elif words[:2] == ["comment", OWN]:
-            header.said = scene_of_json(line.split(OWN, 1)[1])
+            header.scene = scene_of_json(line.split(OWN, 1)[1])
         elif words and words[0] not in ("comment", "obj_info"):
             raise ClipError(f"header: got {line[:60]!r}, expected an element or a property of PLY")
     for element in header.elements:
@@ -588,12 +588,12 @@ def parse_ply(data: bytes) -> Mesh:
     vertices = values.get("vertex", {})
     if not {"x", "y", "z"} <= vertices.keys():
         raise ClipError("got no vertices with x, y and z, expected a PLY file with some")
-    metadata, attributes = scene_said(header.said, len(vertices["x"]))
+    metadata, attributes = scene_fields(header.scene, len(vertices["x"]))
     mesh = Mesh(ply_points(vertices), metadata={"domains": dict.fromkeys(attributes, "constant")} | metadata)
     mesh.attributes |= attributes
     _add_ply_vertex_values(mesh, vertices)
     _add_ply_faces(mesh, values.get("face", {}))
-    _add_ply_materials(mesh, header.said.get(FACE_MATERIAL))
+    _add_ply_materials(mesh, header.scene.get(FACE_MATERIAL))
     edges = values.get("edge", {})
     if {"vertex1", "vertex2"} <= edges.keys():
         ends = np.stack([edges.pop("vertex1"), edges.pop("vertex2")], axis=1).astype(np.int64)
@@ -627,19 +627,19 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
-    taken = set(POSITION_COLUMNS)
+    columns_used = set(POSITION_COLUMNS)
     if not {"nx", "ny", "nz"}.isdisjoint(vertices):
         _leave_out(mesh, "normals")
     colors = [name for name in _PLY_COLORS if name in vertices]
     if set(_PLY_COLORS[:3]) <= set(colors):
         mesh.attributes["colors"] = _native(np.stack([vertices[name] for name in colors], axis=1))
-        taken |= set(colors)
+        columns_used |= set(colors)
     for pair in _UV_NAMES:
         if "uv" not in mesh.attributes and set(pair) <= vertices.keys():
             mesh.attributes["uv"] = _native(np.stack([vertices[name] for name in pair], axis=1))
-            taken |= set(pair)
+            columns_used |= set(pair)
     for name, column in vertices.items():
-        if name not in taken:
+        if name not in columns_used:
             _add_attribute(mesh, name, column)
 
 

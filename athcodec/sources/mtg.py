@@ -154,8 +154,8 @@ class _Plants:
         if not self.entities:
             raise ClipError("got no entities, expected a code behind MTG:")
 
-    def _fail(self, what: str) -> ClipError:
-        return ClipError(f"line {self._line}: {what}")
+    def _fail(self, problem: str) -> ClipError:
+        return ClipError(f"line {self._line}: {problem}")
 
     def _header(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
         """The rows of the code, once the sections before it are read."""
@@ -165,10 +165,10 @@ class _Plants:
             cells = [cell.strip() for cell in line.split("\t")]
             if not any(cells):
                 continue
-            found = _SECTION.match(" ".join(cells))
-            if found and (section != "CLASSES" or ":" in line or cells[0].rstrip(": ") in ("DESCRIPTION", "FEATURES")):
-                section = found[1]
-                form = found[2] if section == "CODE" else form
+            match = _SECTION.match(" ".join(cells))
+            if match and (section != "CLASSES" or ":" in line or cells[0].rstrip(": ") in ("DESCRIPTION", "FEATURES")):
+                section = match[1]
+                form = match[2] if section == "CODE" else form
                 if section == "MTG":
                     break
             elif section == "CLASSES":
@@ -403,10 +403,10 @@ def _roots_first(parent: np.ndarray) -> list[int]:
 
 def _chains(parent: np.ndarray, follows: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """(V,) and (B,): branches numbered by their first part in the file. Only one part goes on the branch of another."""
-    begins, taken = np.ones(len(parent), bool), set()
+    begins, continued = np.ones(len(parent), bool), set()
     for row in range(len(parent)):
-        if follows[row] and int(parent[row]) not in taken:
-            taken.add(int(parent[row]))
+        if follows[row] and int(parent[row]) not in continued:
+            continued.add(int(parent[row]))
             begins[row] = False
     number = np.cumsum(begins) - 1
     branch, branch_parent = np.zeros(len(parent), np.int32), np.full(int(begins.sum()), -1, np.int32)

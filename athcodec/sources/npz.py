@@ -142,12 +142,12 @@ def _parsed(values: np.ndarray) -> dict[str, Any]:
     """The metadata in an array of JSON text."""
     try:
         text = values.reshape(()).item()
-        found = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
+        content = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
     except (ValueError, TypeError) as error:
         raise ClipError(f"{METADATA}: got no JSON text, expected one: {error}") from None
-    if not isinstance(found, dict):
-        raise ClipError(f"{METADATA}: got a {type(found).__name__}, expected a JSON object")
-    return found
+    if not isinstance(content, dict):
+        raise ClipError(f"{METADATA}: got a {type(content).__name__}, expected a JSON object")
+    return content
 
 
 class _UnpackedRows:

@@ -266,10 +266,10 @@ def files_to_read(path: FilePath) -> NumberedFiles:
     files, path = numbered_files(path), Path(path)
     if is_pattern(path):
         return files
-    taken = {file.name for file in files.paths}
+    names_read = {file.name for file in files.paths}
     form = _PLACES.sub("#", path.stem)
-    others = _of_form(path, _PLACES, taken) if "#" in form else []
-    is_alone = len(taken) == 1 and not path.stem[-1:].isdigit()
+    others = _of_form(path, _PLACES, names_read) if "#" in form else []
+    is_alone = len(names_read) == 1 and not path.stem[-1:].isdigit()
     pattern, similar = _pattern_of(path) if is_alone else ("", [])
     if similar and set(others) <= set(similar):
         warnings.warn(
@@ -280,8 +280,8 @@ def files_to_read(path: FilePath) -> NumberedFiles:
         )
     elif others:
         warnings.warn(
-            f"{path}: read as {len(taken)} of {len(taken) + len(others)} files, without {some(others)}; frames differ "
-            f"in the last number alone, written with as many zeros: to read all as one motion, call them "
+            f"{path}: read as {len(names_read)} of {len(names_read) + len(others)} files, without {some(others)}; "
+            f"frames differ in the last number alone, written with as many zeros: to read all as one motion, call them "
             f"NAME_0001{path.suffix}, NAME_0002{path.suffix} ... in the order of time",
             GuessWarning,
             stacklevel=2,
@@ -289,12 +289,12 @@ def files_to_read(path: FilePath) -> NumberedFiles:
     return files
 
 
-def _of_form(path: Path, places: re.Pattern[str], taken: Iterable[str]) -> list[str]:
+def _of_form(path: Path, places: re.Pattern[str], names_read: Iterable[str]) -> list[str]:
     """Names of files that are as that of `path` but for these places."""
     form = places.sub("#", path.stem)
     return sorted(
         name
-        for name in set(os.listdir(path.parent)).difference(taken)
+        for name in set(os.listdir(path.parent)).difference(names_read)
         if name.endswith(path.suffix) and places.sub("#", name.removesuffix(path.suffix)) == form
     )
 
@@ -302,13 +302,16 @@ def _of_form(path: Path, places: re.Pattern[str], taken: Iterable[str]) -> list[
 def _pattern_of(path: Path) -> tuple[str, list[str]]:
     """A pattern for files that differ from `path` in one number, wherever it stands, and their names."""
     similar = [name for name in _of_form(path, _TOKENS, [path.name]) if "#" not in name and "%" not in name]
-    mine = _TOKENS.findall(path.stem)
+    parts = _TOKENS.findall(path.stem)
     for place, match in enumerate(_TOKENS.finditer(path.stem)):
         numbers = {}
         for name in similar:
-            theirs = _TOKENS.findall(name.removesuffix(path.suffix))
-            if theirs[place] != mine[place] and [*theirs[:place], mine[place], *theirs[place + 1 :]] == mine:
-                numbers[name] = theirs[place]
+            other_parts = _TOKENS.findall(name.removesuffix(path.suffix))
+            if (
+                other_parts[place] != parts[place]
+                and [*other_parts[:place], parts[place], *other_parts[place + 1 :]] == parts
+            ):
+                numbers[name] = other_parts[place]
         if numbers:
             widths = {len(number) if number.isdigit() else 1 for number in (match[0], *numbers.values())}
             marks = "#" * (widths.pop() if len(widths) == 1 else 1)

@@ -64,10 +64,10 @@ class JoinedSteps:
         for part in parts:
             self.elsewhere |= {**part.elsewhere, **dict.fromkeys(part.names(CELL), CELL)}
         self.left_out = self._add_cell_data()
-        self._said: set[str] = set()
+        self._warned: set[str] = set()
 
     def objects(self) -> dict[str, Any]:
-        """Return what scene_objects.scene_said takes: names, numbers of vertices and kinds of the parts."""
+        """Return what scene_objects.scene_fields takes: names, numbers of vertices and kinds of the parts."""
         return {
             "names": [part.name for part in self._parts],
             "vertices": self._counts,
@@ -95,8 +95,8 @@ class JoinedSteps:
         if not having:
             raise ClipError(f"frame {step}: got no field {name!r} per point, expected one as in the first")
         still = [part.name for part in self._parts if part not in having]
-        if still and name not in self._said:
-            self._said.add(name)
+        if still and name not in self._warned:
+            self._warned.add(name)
             text = f"{self._warn_as}: {', '.join(still)} has no {name}, and stays where it is"
             warnings.warn(text, GuessWarning, stacklevel=2)
         rows = [part.values(step, name, NODE) if part in having else None for part in self._parts]
@@ -127,12 +127,12 @@ class JoinedSteps:
         names = [name for part in self._parts for name in (*part.names(CELL), *part.elsewhere)]
         return [name for name in dict.fromkeys(names) if name and name not in kept]
 
-    def _joined(self, rows: Sequence[np.ndarray], what: str) -> np.ndarray:
+    def _joined(self, rows: Sequence[np.ndarray], subject: str) -> np.ndarray:
         if len(rows) == 1:
             return rows[0]
         if len({each.shape[1:] for each in rows}) > 1:
             shapes = ", ".join(f"{part.name} {each.shape}" for part, each in zip(self._parts, rows))
-            raise ClipError(f"{what}: got {shapes}, expected as many numbers for each in all of them")
+            raise ClipError(f"{subject}: got {shapes}, expected as many numbers for each in all of them")
         return np.concatenate(rows)
 
 

@@ -90,12 +90,12 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
         )
 
 
-def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
+def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
     """The mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
 
     OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in
     other units or axes."""
-    if found is None:
+    if mesh_path is None:
         metadata = {
             "part_names": [Path(path).stem],
             "part_kinds": ["points"],
@@ -103,16 +103,16 @@ def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, ve
         }
         attributes = {"part_vertex_counts": np.array([vertex_count], np.int32)}
         return Mesh(np.empty((vertex_count, 3)), attributes=attributes, metadata=metadata)
-    if Path(found).suffix.lower() in MESH_SUFFIXES:
-        mesh = read_mesh(found, Budget(options.max_memory))
+    if Path(mesh_path).suffix.lower() in MESH_SUFFIXES:
+        mesh = read_mesh(mesh_path, Budget(options.max_memory))
     else:
-        with read(found, only=options.only, max_memory=options.max_memory) as clip:
+        with read(mesh_path, only=options.only, max_memory=options.max_memory) as clip:
             metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
             not_read = {kind: list(names) for kind, names in clip.not_read.items()}
             mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata, not_read)
     if len(mesh.points) != vertex_count:
         raise ClipError(
-            f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
+            f"mesh {fspath(mesh_path)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
         )
     mesh.attributes = {
         name: values for name, values in mesh.attributes.items() if name not in options.skip and name != "normals"

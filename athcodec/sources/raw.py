@@ -58,9 +58,9 @@ def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int,
     return Frames(lambda start, stop: rows[start:stop], frame_count, vertex_count, rows.dtype)
 
 
-def read_exactly(file: BinaryIO, size: int, what: str) -> bytes:
+def read_exactly(file: BinaryIO, size: int, subject: str) -> bytes:
     """The next `size` bytes of a file. Raises ClipError where it ends before."""
     data = file.read(size)
     if len(data) < size:
-        raise ClipError(f"{what}: got {len(data)} bytes, expected {size}")
+        raise ClipError(f"{subject}: got {len(data)} bytes, expected {size}")
     return data

@@ -92,7 +92,7 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest
-    said: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "shape": (clip.frame_count, clip.vertex_count, 3),
         "dtype": clip.dtype.str,
         "rest_given": clip.rest_given,
@@ -103,8 +103,8 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
     }
     if clip.skin is not None:
         arrays |= {"joint_parent": clip.skin.joint_parent, "vertex_joint": clip.skin.vertex_joint}
-        said["joint_names"] = list(clip.skin.names)
-    arrays["said"] = np.frombuffer(json.dumps(said).encode(), np.uint8)
+        facts["joint_names"] = list(clip.skin.names)
+    arrays["said"] = np.frombuffer(json.dumps(facts).encode(), np.uint8)
     out = io.BytesIO()
     np.savez(out, **arrays)
     return out.getvalue()

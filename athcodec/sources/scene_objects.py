@@ -419,24 +419,24 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
 
 def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
     """An object that lacks the array has zeros; None where the objects' arrays do not go together."""
-    found = [obj.statics[name] for obj in objects if name in obj.statics]
-    shapes = {static.values.shape[1:] for static in found}
+    statics = [obj.statics[name] for obj in objects if name in obj.statics]
+    shapes = {static.values.shape[1:] for static in statics}
     if len(shapes) != 1:
         return None
-    domain = _common_domain(found, len(objects))
-    dtypes = {static.values.dtype for static in found}
+    domain = _common_domain(statics, len(objects))
+    dtypes = {static.values.dtype for static in statics}
     dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
     if domain == "constant":
-        return Static(domain, found[0].values.astype(dtype, copy=False))
+        return Static(domain, statics[0].values.astype(dtype, copy=False))
     rows = [_spread(obj, obj.statics.get(name), domain, next(iter(shapes))) for obj in objects]
     return Static(domain, np.concatenate(rows).astype(dtype, copy=False))
 
 
-def _common_domain(found: list[Static], object_count: int) -> str:
-    domains = {static.domain for static in found}
+def _common_domain(statics: list[Static], object_count: int) -> str:
+    domains = {static.domain for static in statics}
     if domains == {"constant"}:
-        same = all(np.array_equal(static.values, found[0].values) for static in found)
-        return "constant" if same and len(found) == object_count else "vertex"
+        same = all(np.array_equal(static.values, statics[0].values) for static in statics)
+        return "constant" if same and len(statics) == object_count else "vertex"
     domains.discard("constant")
     return domains.pop() if len(domains) == 1 else "corner"
 
@@ -456,26 +456,28 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
 def scene_of_json(text: str | bytes) -> dict[str, Any]:
     """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
-        said = json.loads(text)
-        if isinstance(said, dict):
-            return {key: said[key] for key in (*SCENE_KEYS, MATERIAL_NAMES, FACE_MATERIAL, "objects") if key in said}
+        entries = json.loads(text)
+        if isinstance(entries, dict):
+            return {
+                key: entries[key] for key in (*SCENE_KEYS, MATERIAL_NAMES, FACE_MATERIAL, "objects") if key in entries
+            }
     return {}
 
 
-def scene_said(said: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """(metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where they are
     some."""
-    metadata = {key: value for key, value in said.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
+    metadata = {key: value for key, value in entries.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
     metadata = {key: value for key, value in metadata.items() if isinstance(value, SCENE_KEYS.get(key, object))}
-    if _are_names(said.get(MATERIAL_NAMES)):
-        metadata[MATERIAL_NAMES] = said[MATERIAL_NAMES]
-    objects, numbers = _objects_said(said.get("objects"), count)
+    if _are_names(entries.get(MATERIAL_NAMES)):
+        metadata[MATERIAL_NAMES] = entries[MATERIAL_NAMES]
+    objects, numbers = _object_fields(entries.get("objects"), count)
     return metadata | objects, numbers
 
 
-def _objects_said(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    said = said if isinstance(said, dict) else {}
-    names, numbers = said.get("names"), {key: said.get(key) for key in ("vertices", "copies") if key in said}
+def _object_fields(entries: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    entries = entries if isinstance(entries, dict) else {}
+    names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(
         isinstance(each, list) and all(type(n) is int and 0 <= n <= count for n in each) for each in numbers.values()
     )
@@ -483,14 +485,14 @@ def _objects_said(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.n
         return {}, {}
     if {len(each) for each in numbers.values()} != {len(names)}:
         return {}, {}
-    kinds = said.get("kinds")
+    kinds = entries.get("kinds")
     metadata = {"part_names": names} | ({"part_kinds": kinds} if _are_names(kinds) and len(kinds) == len(names) else {})
     keys = {"vertices": "part_vertex_counts", "copies": "part_copies"}
     return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
 
 
-def _are_names(said: Any) -> bool:
-    return isinstance(said, list) and all(isinstance(name, str) for name in said)
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _join_materials(
@@ -504,14 +506,14 @@ def _join_materials(
     Names come in the order that the file was written from, where it says one."""
     if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
         return {}
-    said = metadata.get(MATERIAL_NAMES)
-    said = said if isinstance(said, list) and all(isinstance(name, str) for name in said) else []
-    names = list(dict.fromkeys([*said, *(name for obj in objects for name in obj.materials)]))
+    stated = metadata.get(MATERIAL_NAMES)
+    stated = stated if isinstance(stated, list) and all(isinstance(name, str) for name in stated) else []
+    names = list(dict.fromkeys([*stated, *(name for obj in objects for name in obj.materials)]))
     rows = []
     for obj in objects:
         place = np.array([*(names.index(name) for name in obj.materials), -1], np.int32)
-        own = np.full(len(obj.face_counts), -1) if obj.face_materials is None else obj.face_materials
-        rows.append(place[own])
+        labels_of_object = np.full(len(obj.face_counts), -1) if obj.face_materials is None else obj.face_materials
+        rows.append(place[labels_of_object])
     attributes[FACE_MATERIAL], domains[FACE_MATERIAL] = np.concatenate(rows), "face"
     return {MATERIAL_NAMES: names}
 
@@ -530,7 +532,7 @@ def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.
 
 def _edges(objects: list[SceneObject]) -> np.ndarray | None:
     """Return the edges between neighbours on each curve, closed if it is periodic."""
-    found = []
+    edges = []
     for obj in objects:
         if obj.curve_counts is None or not obj.count:
             continue
@@ -544,30 +546,30 @@ def _edges(objects: list[SceneObject]) -> np.ndarray | None:
             keep[ends - 1] = counts > 2
         else:
             keep[ends - 1] = False
-        found.append(np.stack([vertices, following], axis=1)[keep] + obj.first)
-    return np.concatenate(found).astype(np.int32) if found else None
+        edges.append(np.stack([vertices, following], axis=1)[keep] + obj.first)
+    return np.concatenate(edges).astype(np.int32) if edges else None
 
 
 def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
     """Takes what a MotionClip has members for out of the attributes; others of these names are renamed."""
-    found = {}
+    fields = {}
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     rest, edges = attributes.get("rest"), attributes.get("edges")
     if rest is not None and rest.shape == (vertices, 3) and rest.dtype.kind == "f" and "rest" not in domains:
-        found["rest"] = attributes.pop("rest")
+        fields["rest"] = attributes.pop("rest")
     if edges is not None and edges.ndim == 2 and edges.shape[1] == 2 and edges.dtype.kind in "iu":
-        found["edges"] = attributes.pop("edges")
+        fields["edges"] = attributes.pop("edges")
     if "vertex_branch" in attributes and "branch_parent" in attributes:
         for name in ("vertex_branch", "branch_parent", "stem_index"):
             if name in attributes:
-                found[name] = attributes.pop(name)
+                fields[name] = attributes.pop(name)
     for name in [name for name in attributes if name in RESERVED_NAMES]:
         attributes[f"{name}_primvar"] = attributes.pop(name)
         if name in domains:
             domains[f"{name}_primvar"] = domains.pop(name)
-    for name in found:
+    for name in fields:
         domains.pop(name, None)
-    return found
+    return fields
 
 
 def own_metadata(text: Any) -> dict[str, Any]:
@@ -575,11 +577,11 @@ def own_metadata(text: Any) -> dict[str, Any]:
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}
     try:
-        found = json.loads(text)
+        metadata = json.loads(text)
     except (ValueError, RecursionError):
         return {}
-    found = found if isinstance(found, dict) else {}
-    return {name: value for name, value in found.items() if name not in KNOWN_METADATA}
+    metadata = metadata if isinstance(metadata, dict) else {}
+    return {name: value for name, value in metadata.items() if name not in KNOWN_METADATA}
 
 
 def turned_corners(counts: np.ndarray) -> np.ndarray:

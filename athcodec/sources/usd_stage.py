@@ -142,17 +142,17 @@ def _check_layers(path: str, allow_outside: bool) -> None:
         name = waiting.pop()
         layer = Sdf.Layer.FindOrOpen(name)
         for named in layer.GetCompositionAssetDependencies() if layer else ():
-            found = layer.ComputeAbsolutePath(named)
-            file = Ar.SplitPackageRelativePathOuter(found)[0]
+            identifier = layer.ComputeAbsolutePath(named)
+            file = Ar.SplitPackageRelativePathOuter(identifier)[0]
             if not os.path.isabs(file):  # Names that are searched for: USD says which it does not find.
                 file = str(Ar.GetResolver().Resolve(file))
-            if not file or found in seen:
+            if not file or identifier in seen:
                 continue
-            seen.add(found)
+            seen.add(identifier)
             check_inside(folder, file, allow_outside)
             if os.path.exists(file):
                 open_plain(file).close()
-            waiting.append(found)
+            waiting.append(identifier)
 
 
 @dataclass
@@ -232,10 +232,10 @@ def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, lis
             prims.PruneChildren()
     _add_all(not_read, left_out_of_stage(stage, prototypes))
     if not objects:
-        what = f" named like {', '.join(only)}" if only else ""
+        filtered = f" named like {', '.join(only)}" if only else ""
         names = f", or {', '.join(choice.refused[:LISTED])}" if choice.refused else ""
         raise ClipError(
-            f"prims: got none with points{what}, expected a visible Mesh, BasisCurves, NurbsCurves or Points{names}"
+            f"prims: got none with points{filtered}, expected a visible Mesh, BasisCurves, NurbsCurves or Points{names}"
             f"{besides(not_read)}"
         )
     return objects
@@ -296,8 +296,8 @@ def _instanced(
         text = f"{path} (protoIndices are {min(used)} to {max(used)}, of {len(targets)} prototypes)"
         not_read.setdefault("PointInstancer", []).append(text)
         return []
-    gone = [f"prototype {targets[number]} of {path}" for number in sorted(used) if not prototypes[number]]
-    _add_all(not_read, {"missing": gone} if gone else {})
+    missing = [f"prototype {targets[number]} of {path}" for number in sorted(used) if not prototypes[number]]
+    _add_all(not_read, {"missing": missing} if missing else {})
     read = {number: prototype for number, prototype in prototypes.items() if number in used and prototype}
     shown.update(prototype.GetPath() for prototype in read.values())
     for other in _unshown(prim, shown):
@@ -364,8 +364,10 @@ class _Copies:
             [_array(attribute.Get(time), np.int64) for time in times]
             for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr())
         )
-        self.follows_ids = any(not np.array_equal(own, ids[0]) for own in ids)
-        self.follows_ids &= all(len(own) == len(of) == len(np.unique(own)) for own, of in zip(ids, protos))
+        self.follows_ids = any(not np.array_equal(ids_of_frame, ids[0]) for ids_of_frame in ids)
+        self.follows_ids &= all(
+            len(ids_of_frame) == len(of) == len(np.unique(ids_of_frame)) for ids_of_frame, of in zip(ids, protos)
+        )
         self.names = np.unique(np.concatenate(ids)) if self.follows_ids else np.arange(len(protos[0]))
         self.protos = np.full(len(self.names), -1)
         self._rows = np.empty((len(times), len(self.names)), np.int32)
@@ -404,28 +406,28 @@ class _Copies:
         self._places = np.zeros((len(self._held), 4, 4))
         frames, copies = np.divmod(self._held, max(len(self.names), 1))
         for frame in np.unique(frames):
-            own = frames == frame
-            self._places[own] = self._placed(frame)[self._rows[self._states[frame], copies[own]]]
+            is_frame = frames == frame
+            self._places[is_frame] = self._placed(frame)[self._rows[self._states[frame], copies[is_frame]]]
 
     def places(self, frame: int) -> np.ndarray:
         """(copies, 4, 4) from the prototype to the instancer."""
         state = self._states[frame]
         rows, absent = self._rows[state], np.flatnonzero(self._rows[state] < 0)
-        found = self._placed(frame)
+        matrices = self._placed(frame)
         if not len(absent):
-            return found[rows]
+            return matrices[rows]
         out = np.empty((len(rows), 4, 4))
-        out[rows >= 0] = found[rows[rows >= 0]]
+        out[rows >= 0] = matrices[rows[rows >= 0]]
         out[absent] = self._places[np.searchsorted(self._held, self._sources[state, absent])]
         return out
 
     def _placed(self, frame: int) -> np.ndarray:
         """(rows, 4, 4) as the arrays have them."""
         code = _code_of_order(self.instancer.GetIdsAttr(), float(self._codes[frame]))
-        found = self.instancer.ComputeInstanceTransformsAtTime(
+        matrices = self.instancer.ComputeInstanceTransformsAtTime(
             code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
         )
-        placed, expected = np.array(found).reshape(-1, 4, 4), self._rows[self._states[frame]].max(initial=-1) + 1
+        placed, expected = np.array(matrices).reshape(-1, 4, 4), self._rows[self._states[frame]].max(initial=-1) + 1
         if len(placed) < expected:
             raise ClipError(
                 f"{self.instancer.GetPath()}: got {len(placed)} positions at time code {code:g}, expected {expected}"
@@ -443,10 +445,10 @@ class _Instances:
     def choose(self, codes: np.ndarray) -> tuple[np.ndarray, list[str]]:
         """The frames that show each copy, (T, copies); and the names of copies that none shows, which are left out."""
         self.all.follow(codes)
-        own, seen = self.all.protos == self.number, self.all.shown.any(axis=0)
-        self.rows = np.flatnonzero(own & seen)
+        is_of_prototype, seen = self.all.protos == self.number, self.all.shown.any(axis=0)
+        self.rows = np.flatnonzero(is_of_prototype & seen)
         return self.all.shown[:, self.rows], [
-            f"{self.instancer.GetPath()}:{name}" for name in self.all.names[own & ~seen]
+            f"{self.instancer.GetPath()}:{name}" for name in self.all.names[is_of_prototype & ~seen]
         ]
 
     def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, frame: int) -> np.ndarray:
@@ -685,9 +687,9 @@ def _time_codes(
     stage: Usd.Stage, objects: list[_Prim], fps: float | None, irregular: bool, not_read: dict[str, list[str]]
 ) -> tuple[np.ndarray, float]:
     """Time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
-    own = stage.GetTimeCodesPerSecond()
-    if not 0 < own < math.inf:
-        raise ClipError(f"timeCodesPerSecond: got {own}, expected a positive number")
+    codes_per_second = stage.GetTimeCodesPerSecond()
+    if not 0 < codes_per_second < math.inf:
+        raise ClipError(f"timeCodesPerSecond: got {codes_per_second}, expected a positive number")
     keys = _keys(objects)
     start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
     if _has_range(stage) and not irregular:
@@ -703,11 +705,11 @@ def _time_codes(
     if not (math.isfinite(start) and math.isfinite(end)):
         raise ClipError(f"time codes: got {start} to {end}, expected finite numbers")
     rate = fps or _rate(stage, keys, start, not_read)
-    step = own / rate
+    step = codes_per_second / rate
     if not fps:
         times = keys.times[(keys.times >= start) & (keys.times <= end)]
         missed = _off_grid(times, start, step)
-        warn_of_missed(times / own, missed, rate, stage.GetRootLayer().realPath, start / own)
+        warn_of_missed(times / codes_per_second, missed, rate, stage.GetRootLayer().realPath, start / codes_per_second)
     count = math.floor((end - start) / step + 1e-6) + 1
     if count > MAX_FRAMES:
         raise ClipError(f"time codes: got {start:g} to {end:g}, expected at most {MAX_FRAMES} frames")
@@ -728,25 +730,29 @@ def _off_grid(times: np.ndarray, start: float, step: float) -> np.ndarray:
 def _rate(stage: Usd.Stage, keys: _Keys, start: float, not_read: dict[str, list[str]]) -> float:
     """Frames per second: a frame for each time code, unless framesPerSecond has frames at keys that these miss, or more
     frames of splines; where it is another rate and is not taken, it is added to not_read."""
-    own, stated = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
-    if not stage.HasAuthoredMetadata("framesPerSecond") or not 0 < stated < math.inf or math.isclose(stated, own):
-        return own
-    misses = [bool(_off_grid(keys.times, start, step).any()) for step in (1.0, own / stated)]
-    if misses == [True, False] or keys.has_splines and stated > own and not misses[1]:
+    codes_per_second, stated = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
+    if (
+        not stage.HasAuthoredMetadata("framesPerSecond")
+        or not 0 < stated < math.inf
+        or math.isclose(stated, codes_per_second)
+    ):
+        return codes_per_second
+    misses = [bool(_off_grid(keys.times, start, step).any()) for step in (1.0, codes_per_second / stated)]
+    if misses == [True, False] or keys.has_splines and stated > codes_per_second and not misses[1]:
         return stated
-    not_read["framesPerSecond"] = [f"{stated:g} (frames are time codes, {own:g} per second)"]
-    return own
+    not_read["framesPerSecond"] = [f"{stated:g} (frames are time codes, {codes_per_second:g} per second)"]
+    return codes_per_second
 
 
 def _name_keys_outside(times: np.ndarray, start: float, end: float, not_read: dict[str, list[str]]) -> None:
     outside = times[(times < start - 1e-6) | (times > end + 1e-6)]
     if len(outside):
-        what = f"time codes {outside[0]:g} to {outside[-1]:g} ({len(outside)} keys; the range is {start:g} to {end:g})"
-        not_read["keys outside of the stage's range"] = [what]
+        text = f"time codes {outside[0]:g} to {outside[-1]:g} ({len(outside)} keys; the range is {start:g} to {end:g})"
+        not_read["keys outside of the stage's range"] = [text]
 
 
 def _keys(objects: list[_Prim]) -> _Keys:
-    found: set[float] = set()
+    times: set[float] = set()
     splines: dict[str, Any] = {}
     seen: set[Sdf.Path] = set()
 
@@ -754,11 +760,11 @@ def _keys(objects: list[_Prim]) -> _Keys:
         if attribute.GetPath() in seen:
             return
         seen.add(attribute.GetPath())
-        found.update(attribute.GetTimeSamples())
+        times.update(attribute.GetTimeSamples())
         if attribute.HasSpline():
             splines[str(attribute.GetPath())] = spline = attribute.GetSpline()
             with quietly():  # USD says each time that inner loops are deprecated; not every version bakes them.
-                found.update(getattr(spline, "GetKnotsWithInnerLoopsBaked", spline.GetKnots)().keys())
+                times.update(getattr(spline, "GetKnotsWithInnerLoopsBaked", spline.GetKnots)().keys())
 
     for obj in objects:
         prims = [*_all_above(obj), *(() if obj.skeleton is None else _lineage(obj.skeleton.query.GetPrim()))]
@@ -771,10 +777,10 @@ def _keys(objects: list[_Prim]) -> _Keys:
         for attribute in attributes:
             add(attribute)
         if obj.skeleton is not None and obj.skeleton.animation:
-            found.update(obj.skeleton.animation.GetJointTransformTimeSamples())
-            found.update(obj.skeleton.animation.GetBlendShapeWeightTimeSamples())
+            times.update(obj.skeleton.animation.GetJointTransformTimeSamples())
+            times.update(obj.skeleton.animation.GetBlendShapeWeightTimeSamples())
     endless = [path for path, spline in splines.items() if _goes_on(spline)]
-    return _Keys(np.array(sorted(filter(math.isfinite, found)), np.float64), bool(splines), endless)
+    return _Keys(np.array(sorted(filter(math.isfinite, times)), np.float64), bool(splines), endless)
 
 
 def _goes_on(spline: Ts.Spline) -> bool:
@@ -883,9 +889,9 @@ def _keep(obj: _Prim, name: str, values: Any, interpolation: str, primvar: UsdGe
     if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
         values = values[..., 0] if values.shape[2:] == (1,) else values
-    said = None if primvar is None else _custom_text(primvar.GetAttr(), "dtype")
-    if values is not None and said in WRITTEN_DTYPES:  # exporters/usd.py chose one that USD has
-        values = values.astype(said)
+    dtype = None if primvar is None else _custom_text(primvar.GetAttr(), "dtype")
+    if values is not None and dtype in WRITTEN_DTYPES:  # exporters/usd.py chose one that USD has
+        values = values.astype(dtype)
     obj.keep(name, DOMAINS.get(interpolation), values)
 
 
@@ -908,8 +914,8 @@ def _is_guessed(attribute: Usd.Attribute) -> bool:
 
 def _custom_text(attribute: Usd.Attribute, key: str) -> str | None:
     """Return the text that athcodec's writer has kept with an attribute under a key, or None."""
-    found = attribute.GetCustomDataByKey(f"{OWN}:{key}")
-    return found if isinstance(found, str) else None
+    text = attribute.GetCustomDataByKey(f"{OWN}:{key}")
+    return text if isinstance(text, str) else None
 
 
 WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8", ">u8", ">f2", ">f4", ">f8", "<f2")
@@ -962,8 +968,10 @@ class _Skeleton:
             return
         if self._mapper is not None:
             weights = self._mapper.Remap(weights, elementSize=1)
-        found = self._shapes.ComputeSubShapeWeights(weights)
-        if found is None or not self._shapes.ComputeDeformedPoints(*found, self._indices, self._offsets, points):
+        sub_shapes = self._shapes.ComputeSubShapeWeights(weights)
+        if sub_shapes is None or not self._shapes.ComputeDeformedPoints(
+            *sub_shapes, self._indices, self._offsets, points
+        ):
             raise ClipError(f"{self.target.GetPrim().GetPath()}: its blend shapes cannot be evaluated at {code:g}")
 
     @property
@@ -982,17 +990,17 @@ class _Skeleton:
 
     def largest(self, count: int) -> np.ndarray:
         """(count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
-        found = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
-        if not found or count == 0:
+        influences = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
+        if not influences or count == 0:
             return np.full(count, -1, np.int32)
-        joints, weights = (np.array(values).reshape(count, -1) for values in found)
+        joints, weights = (np.array(values).reshape(count, -1) for values in influences)
         rows = np.arange(count), weights.argmax(axis=1)
         chosen = joints[rows]
         order = self.target.GetJointOrder()
         if order:
             places = {str(name): i for i, name in enumerate(self.query.GetJointOrder())}
-            own = np.array([places.get(str(name), -1) for name in order])
-            chosen = own[np.clip(chosen, 0, len(own) - 1)]
+            place = np.array([places.get(str(name), -1) for name in order])
+            chosen = place[np.clip(chosen, 0, len(place) - 1)]
         return np.where(weights[rows] > 0, chosen, -1).astype(np.int32)
 
 
@@ -1054,17 +1062,17 @@ def _skin(objects: list[_Prim], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]
         if path in first:
             continue
         first[path] = sum(map(len, parents))
-        own = np.array(query.GetTopology().GetParentIndices(), np.int32)
-        parents.append(np.where(own < 0, -1, own + first[path]))
+        joints_of_object = np.array(query.GetTopology().GetParentIndices(), np.int32)
+        parents.append(np.where(joints_of_object < 0, -1, joints_of_object + first[path]))
         names += [str(name) for name in query.GetJointOrder()]
     if not names or not any(obj.skeleton is not None and obj.skeleton.skins for obj in objects):
         return None
     joints = np.full(sum(obj.count for obj in objects), -1, np.int32)
     for obj in objects:
         if obj.skeleton is not None:
-            own = obj.skeleton.largest(obj.count)
+            joints_of_object = obj.skeleton.largest(obj.count)
             offset = first[obj.skeleton.query.GetPrim().GetPath()]
-            joints[obj.first : obj.first + obj.count] = np.where(own < 0, -1, own + offset)
+            joints[obj.first : obj.first + obj.count] = np.where(joints_of_object < 0, -1, joints_of_object + offset)
     return Skin(np.concatenate(parents).astype(np.int32), joints, names)
 
 

@@ -184,11 +184,11 @@ def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:
 
 def _common(data: Sequence[dict[str, np.ndarray]], left_out: list[str]) -> dict[str, np.ndarray]:
     """The arrays that all have in one form, joined; names of the others are added to left_out."""
-    found = {}
+    shared = {}
     for name in dict.fromkeys(name for arrays in data for name in arrays):
         values = [arrays[name] for arrays in data if name in arrays]
         if len(values) == len(data) and len({(array.shape[1:], array.dtype.kind) for array in values}) == 1:
-            found[name] = np.concatenate(values)
+            shared[name] = np.concatenate(values)
         else:
             left_out.append(name)
-    return found
+    return shared

@@ -57,8 +57,8 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
         time, metadata = times_in_seconds(stored, options.fps)
     steps = JoinedSteps(parts, budget, fspath(path))
     steps.left_out += [name for part in parts for name in part.left_out]
-    said = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}
-    clip = clip_of_steps(steps, time, said, name, options, steps.static(), **watched)
+    facts = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}
+    clip = clip_of_steps(steps, time, facts, name, options, steps.static(), **watched)
     others = [each for each in file if each != ROOT]
     clip.not_read = {
         **clip.not_read,
@@ -231,12 +231,12 @@ class _Part:
         kinds = SURFACE_CELLS if self._is_surface else {"": ({}, 0)}
         pieces = self._pieces(step)
         points = np.cumsum([0, *self._counts("NumberOfPoints", pieces)])
-        found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        cells: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         for piece in range(len(pieces)):
             for column, (prefix, numbers) in enumerate(kinds.items()):
                 types, sizes, nodes = self._cells_of(step, prefix, column, pieces, piece, numbers)
-                found.append((types, sizes, nodes + points[piece]))
-        types, sizes, nodes = (np.concatenate(each) for each in zip(*found))
+                cells.append((types, sizes, nodes + points[piece]))
+        types, sizes, nodes = (np.concatenate(each) for each in zip(*cells))
         stops = np.cumsum(sizes)
         return types, stops - sizes, stops, nodes
 

@@ -147,12 +147,12 @@ class _Scene:
 
     def __init__(self, items: Items, shown_path: str, options: ReadOptions):
         self._items, self._documents, self._path, self._options = items, items.documents, shown_path, options
-        self._grid_count, self._said_once = 0, set[str]()
+        self._grid_count, self._warned = 0, set[str]()
         self.not_read: dict[str, list[str]] = {"series": [], "mesh": [], "element": []}
         self.other_fields: list[str] = []
         root = self._documents.root
         self._domains = self._documents.children(root, "Domain")
-        self._said = self._information()
+        self._facts = self._information()
         grids = [grid for domain in self._domains for grid in self._documents.children(domain, "Grid")]
         if not grids:
             raise ClipError("got no Grid, expected some in a Domain")
@@ -204,10 +204,12 @@ class _Scene:
             {track.name for track in step} == set(first) for step in steps
         )
         tracks = []
-        for place, own in enumerate(first):
-            row = [next(t for t in step if t.name == own) if by_name else step[place] for step in steps]
+        for place, name_of_part in enumerate(first):
+            row = [next(t for t in step if t.name == name_of_part) if by_name else step[place] for step in steps]
             times = self._series_times(collection, [track.times for track in row], grids)
-            joined = Track(own if len(first) > 1 else name or own, [t.steps[0] for t in row], times, True)
+            joined = Track(
+                name_of_part if len(first) > 1 else name or name_of_part, [t.steps[0] for t in row], times, True
+            )
             tracks.append(_in_order(joined))
         return tracks
 
@@ -273,8 +275,8 @@ class _Scene:
 
     def times(self, track: Track) -> tuple[np.ndarray, dict[str, Any]]:
         """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
-        said, stored, count = self._said, track.times, len(track.steps)
-        fps = said.get("fps") if self._options.fps is None else self._options.fps
+        information, stored, count = self._facts, track.times, len(track.steps)
+        fps = information.get("fps") if self._options.fps is None else self._options.fps
         if stored is None or not track.is_series:
             stored = np.arange(count) / frame_rate({} if fps is None else {"fps": fps})
             if count > 1 and fps is None:
@@ -283,10 +285,10 @@ class _Scene:
                 )
         with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
             time, metadata = times_in_seconds(stored, fps)
-            if "start_frame" in said:
-                start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
+            if "start_frame" in information:
+                start = float(information["start_frame"]) + stored[0] * frame_rate(metadata)
                 metadata["start_frame"] = whole(round(start, 6))
-        return time, said | metadata
+        return time, information | metadata
 
     # ---- which tracks ----
 
@@ -302,9 +304,9 @@ class _Scene:
         if not series:
             return self._still(tracks)
         groups = self._groups(series)
-        found = groups if len(groups) == 1 else self._moving(groups)
-        self._name_others(found, [track for track in groups if track not in found])
-        return found
+        chosen = groups if len(groups) == 1 else self._moving(groups)
+        self._name_others(chosen, [track for track in groups if track not in chosen])
+        return chosen
 
     def _still(self, tracks: Sequence[Track]) -> list[Track]:
         """The meshes of a file without a series: they are one frame."""
@@ -322,16 +324,16 @@ class _Scene:
 
     def _groups(self, series: Sequence[Track]) -> list[Track]:
         """The series, those of one mesh at the same times in one: that has all their data."""
-        found: list[Track] = []
+        groups: list[Track] = []
         for track in series:
-            group = next((each for each in found if self._belong_together(each, track)), None)
+            group = next((each for each in groups if self._belong_together(each, track)), None)
             if group is None:
-                found.append(replace(track, steps=[list(step) for step in track.steps]))
+                groups.append(replace(track, steps=[list(step) for step in track.steps]))
             else:
                 for step, more in zip(group.steps, track.steps):
                     step += more
                 group.families |= track.families
-        return found
+        return groups
 
     def _belong_together(self, one: Track, other: Track) -> bool:
         """Whether two series are of one mesh, of different grids at the top, at the same times."""
@@ -366,14 +368,14 @@ class _Scene:
         else:
             moving = [track for track in groups if self._moves(track)] or list(groups)
         families = frozenset[int]().union(*(track.families for track in moving))
-        found = [track for track in groups if track.families & families]
-        times = {None if track.times is None else track.times.tobytes() for track in found}
+        tracks = [track for track in groups if track.families & families]
+        times = {None if track.times is None else track.times.tobytes() for track in tracks}
         if len(times) > 1:
             raise ClipError(
-                f"got {len(found)} series at different times, {self._listed(found)}; expected one: --only (only=) "
+                f"got {len(tracks)} series at different times, {self._listed(tracks)}; expected one: --only (only=) "
                 "names it"
             )
-        return found
+        return tracks
 
     def _moves(self, track: Track) -> bool:
         names = [name.lower() for name in self._fields(track)]
@@ -423,13 +425,13 @@ class _Scene:
         return meshes[0].steps[0][0]
 
     def _element(self, track: Track, tag: str) -> Element | None:
-        found = (self._documents.child(grid, tag) for grid in track.steps[0])
-        return next((element for element in found if element is not None), None)
+        elements = (self._documents.child(grid, tag) for grid in track.steps[0])
+        return next((element for element in elements if element is not None), None)
 
     def _information(self) -> dict[str, Any]:
         """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
         materials that our writer adds as JSON."""
-        said: dict[str, Any] = {}
+        information: dict[str, Any] = {}
         self._name_unknown(self._documents.root, ("Domain", "Information"))
         for domain in (self._documents.root, *self._domains):
             if domain is not self._documents.root:
@@ -437,16 +439,16 @@ class _Scene:
             for element in self._documents.children(domain, "Information"):
                 name, value = element.get("Name", ""), element.get("Value", "")
                 if name in ("unit", "up_axis"):
-                    said[name] = value
+                    information[name] = value
                 elif name in ("fps", "start_frame"):
-                    said[name] = whole(float(value)) if name == "start_frame" else float(value)
+                    information[name] = whole(float(value)) if name == "start_frame" else float(value)
                 elif name in ("objects", MATERIAL_NAMES):
                     with suppress(ValueError, RecursionError):  # Another program may have written something else here.
-                        said[name] = json.loads(value)
+                        information[name] = json.loads(value)
                 else:
                     self._add_not_read("element", f"Information {name}")
-        frame_rate(said)
-        return said
+        frame_rate(information)
+        return information
 
     def _name_unknown(self, parent: Element, known: Sequence[str]) -> None:
         """Name the children of an element that are not looked at."""
@@ -459,8 +461,8 @@ class _Scene:
             self.not_read[kind].append(name)
 
     def _say_once(self, text: str) -> None:
-        if text not in self._said_once:
-            self._said_once.add(text)
+        if text not in self._warned:
+            self._warned.add(text)
             self._warn(text)
 
     def _warn(self, text: str) -> None:
@@ -557,17 +559,19 @@ class _Part:
     def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
         """The attributes of a step by name and center. Those of a name that several grids have, as collections that
         were joined may, are called by their grid as well."""
-        found: dict[tuple[str, str], Element] = {}
+        elements: dict[tuple[str, str], Element] = {}
         for number, grid in enumerate(grids):
             for element in self._documents.children(grid, "Attribute"):
                 name, center = element.get("Name") or "unnamed", element.get("Center", "Node").lower()
                 if element.get("ItemType", "").lower() == "finiteelementfunction":
                     center = FUNCTION_SPACE
                 key = (
-                    (name, center) if (name, center) not in found else (f"{grid.get('Name') or number}/{name}", center)
+                    (name, center)
+                    if (name, center) not in elements
+                    else (f"{grid.get('Name') or number}/{name}", center)
                 )
-                found[key] = element
-        return found
+                elements[key] = element
+        return elements
 
     # ---- cells ----
 

@@ -38,7 +38,7 @@ def modules() -> Path:
     """A folder with the packages of package-lock.json, installed where it is not there yet."""
     lock = (VIEWER / "package-lock.json").read_bytes()
     cache = Path(os.environ.get(CACHE_VARIABLE) or DEFAULT_CACHE).expanduser() / hashlib.sha256(lock).hexdigest()[:16]
-    found = cache / "node_modules"
+    folder = cache / "node_modules"
     if not (cache / "complete").exists():
         npm = shutil.which("npm")
         if npm is None:
@@ -48,7 +48,7 @@ def modules() -> Path:
             shutil.copy(VIEWER / name, cache)
         _run([npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=cache)
         (cache / "complete").touch()
-    return found
+    return folder
 
 
 def build(folder: Path) -> None:

@@ -46,15 +46,15 @@ class Source:
         """About so many vertices: some runs of branches, evenly spaced, with all that carries them."""
         hierarchy, count = self.hierarchy, self.positions.shape[1]
         run = max(1, vertices // RUNS)
-        taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
-        taken[0] = True
-        for branch in range(len(taken) - 1, 0, -1):
-            if taken[branch] and hierarchy.branch_parent[branch] >= 0:
-                taken[hierarchy.branch_parent[branch]] = True
-        number = np.cumsum(taken) - 1
-        parent = hierarchy.branch_parent[taken]
+        is_taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
+        is_taken[0] = True
+        for branch in range(len(is_taken) - 1, 0, -1):
+            if is_taken[branch] and hierarchy.branch_parent[branch] >= 0:
+                is_taken[hierarchy.branch_parent[branch]] = True
+        number = np.cumsum(is_taken) - 1
+        parent = hierarchy.branch_parent[is_taken]
         of_vertex = hierarchy.vertex_branch()
-        kept = taken[of_vertex]
+        kept = is_taken[of_vertex]
         source = hierarchy.vertex_source[kept]
         clip = athcodec.MotionClip(
             np.ascontiguousarray(self.positions[:, source]),

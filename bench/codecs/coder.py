@@ -50,8 +50,8 @@ class DamagedStream(Exception):
 
 def compiler() -> list[str] | None:
     """The C compiler and its first options, from CC or the usual names."""
-    found = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
-    return found.split() if found else None
+    command = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
+    return command.split() if command else None
 
 
 def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
@@ -260,11 +260,11 @@ class Writer:
     def pose(self, branches: np.ndarray, lags: Sequence[np.ndarray], step: float, pose: np.ndarray) -> np.ndarray:
         """(N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
         coded = []
-        for own in lags:
-            branches["lag"] = own
+        for lag in lags:
+            branches["lag"] = lag
             rest = streams.encode_rest(branches, step, pose)
             table = Writer()
-            table.table(own[None])
+            table.table(lag[None])
             coded.append((table.data(), rest))
         head, rest = min(coded, key=lambda some: len(some[0]) + len(some[1].stream))
         return self._add(head + varint(len(rest.stream)) + rest.stream, rest.decoded)
@@ -368,19 +368,19 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
     while factor > 1e-3:
         step = quantise.single(quantise.CORRECTION_STEP * limit * factor)
         parts = [np.ascontiguousarray(positions[:, :, at : at + SEGMENT_FRAMES]) for at in starts]
-        found = [
+        coded = [
             streams.find_corrections(
                 part, np.ascontiguousarray(wanted[:, :, at : at + SEGMENT_FRAMES]), np.zeros(3), limit, step
             )
             for at, part in zip(starts, parts, strict=True)
         ]
-        if all(rows is not None for rows in found):
+        if all(rows is not None for rows in coded):
             break
         factor *= 0.5
     else:
         raise ValueError(f"corrections: got a limit of {limit:.3g}; expected one that float32 positions can keep")
     result = struct.pack("<f", step)
-    for at, part, rows in zip(starts, parts, found, strict=True):
+    for at, part, rows in zip(starts, parts, coded, strict=True):
         positions[:, :, at : at + SEGMENT_FRAMES] = part
         stream = streams.encode_corrections(rows, len(part), part.shape[2]) if len(rows) else b""
         result += varint(len(stream)) + stream

@@ -53,9 +53,9 @@ GRID: dict[str, Ladder | Choice] = {
 }
 
 
-def grid_of(names: str, **own: Ladder | Choice) -> dict[str, Ladder | Choice]:
+def grid_of(names: str, **parameters: Ladder | Choice) -> dict[str, Ladder | Choice]:
     """Settings by name, in the order of the search: those of GRID, and the codec's own."""
-    return {name: own.get(name) or GRID[name] for name in names.split()}
+    return {name: parameters.get(name) or GRID[name] for name in names.split()}
 
 
 # ---- trajectories and bases ----

@@ -272,10 +272,10 @@ class Case:
         length = min(frames, SAMPLE_FRAMES)
         width = min(vertices, max(64, values // (3 * length)))
         first, start = (vertices - width) // 2, (frames - length) // 2
-        taken = slice(first, first + width)
-        positions = np.ascontiguousarray(self.positions[start : start + length, taken])
-        order = None if self.order is None else self.order[taken]
-        return Case(positions, self.rest[taken], self.exact, order)
+        columns = slice(first, first + width)
+        positions = np.ascontiguousarray(self.positions[start : start + length, columns])
+        order = None if self.order is None else self.order[columns]
+        return Case(positions, self.rest[columns], self.exact, order)
 
 
 def cases_of(source: Source, exact: bool) -> dict[str, Case]:
@@ -413,11 +413,11 @@ class Program:
         pose, step = poses[-1]
         heads = [Setup(form, order, pose, step)]
         for _ in range(2):
-            own = [
+            candidates = [
                 replace(heads[0], predictor=predictor, choice=choice)
                 for predictor, choice in product(predictors, range(len(self.choices(form))))
             ]
-            heads = sorted(own, key=size)[:BEAM]
+            heads = sorted(candidates, key=size)[:BEAM]
             heads = sorted(
                 (replace(head, pose=pose, pose_step=step) for head, (pose, step) in product(heads, poses)), key=size
             )

@@ -59,8 +59,8 @@ class Bones:
         positions = np.empty((len(turns), len(self.parent), 3))
         frames = np.empty((len(self.parent), len(turns), 3, 3))
         for node, (below, branch) in enumerate(zip(self.parent.tolist(), self.branch.tolist(), strict=True)):
-            own = rotations(share[node] * turns[:, branch])
-            frames[node] = own if below < 0 else frames[below] @ own
+            turn = rotations(share[node] * turns[:, branch])
+            frames[node] = turn if below < 0 else frames[below] @ turn
             step = frames[node] @ self.element[node]
             if length is not None:
                 step *= length[:, branch, None]
@@ -74,11 +74,13 @@ def gusty(time: np.ndarray, branches: int, amount: float, lean: float, rng: np.r
     seen = time[:, None] - rng.uniform(0.0, LATEST, branches)  # each stem's own time in the gusts
     phase = rng.uniform(0, 2 * np.pi, GUSTS)
     gust = np.sin(2 * np.pi * rng.uniform(*GUST_HERTZ, GUSTS) * seen[..., None] + phase).mean(axis=-1)
-    own = np.sin(2 * np.pi * rng.uniform(*STEM_HERTZ, branches) * time[:, None] + rng.uniform(0, 2 * np.pi, branches))
+    along_own_axis = np.sin(
+        2 * np.pi * rng.uniform(*STEM_HERTZ, branches) * time[:, None] + rng.uniform(0, 2 * np.pi, branches)
+    )
     axes = rng.normal(size=(branches, 3))
     strength = rng.uniform(0.5, 1.5, branches)
     along = (lean * strength + 2.0 * amount * strength * gust)[..., None] * across
-    return along + 0.3 * amount * own[..., None] * axes
+    return along + 0.3 * amount * along_own_axis[..., None] * axes
 
 
 def swaying(

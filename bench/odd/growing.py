@@ -121,12 +121,12 @@ def _leaves(feet: np.ndarray, open_share: np.ndarray, rng: np.random.Generator) 
     side = np.arange(WIDE) - WIDE // 2
     across = (width * np.cos(fold))[..., None] * [0.0, 1.0, 0.0]
     lift = (width * np.sin(fold))[..., None] * upwards
-    own = midrib[..., None, :] + side[:, None] * across[..., None, :] + np.abs(side)[:, None] * lift[..., None, :]
-    own *= 0.15 * rng.uniform(0.8, 1.2, count)[:, None, None, None] * (0.3 + 0.7 * open_share[..., None, None, None])
+    blade = midrib[..., None, :] + side[:, None] * across[..., None, :] + np.abs(side)[:, None] * lift[..., None, :]
+    blade *= 0.15 * rng.uniform(0.8, 1.2, count)[:, None, None, None] * (0.3 + 0.7 * open_share[..., None, None, None])
     azimuth = 2.4 * np.arange(count)
     along = sideways(np.tile([0.0, 1.0, 0.0], (count, 1)), azimuth, np.radians(60.0))
     beside = np.cross([0.0, 1.0, 0.0], along)
     beside /= np.linalg.norm(beside, axis=1, keepdims=True)
     axes = np.stack([along, beside, np.cross(along, beside)], axis=1)
     droop = rotations((0.6 * closed) * beside)  # a closed leaf stands upright
-    return feet[:, None, None] + np.einsum("tlrwa,lak,tljk->tlrwj", own, axes, droop)
+    return feet[:, None, None] + np.einsum("tlrwa,lak,tljk->tlrwj", blade, axes, droop)

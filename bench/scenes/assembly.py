@@ -36,8 +36,8 @@ class Scene:
         number[kept] = np.arange(len(kept))
         faces = self.clip.faces
         if faces is not None:
-            mine = number[faces]
-            faces = mine[(mine >= 0).any(axis=1)]  # Corners that are not there stay -1.
+            corners = number[faces]
+            faces = corners[(corners >= 0).any(axis=1)]  # Corners that are not there stay -1.
             faces = faces if len(faces) else None
         return MotionClip(
             self.clip.positions[:, kept],

@@ -38,7 +38,7 @@ def _on(
     foot, base = stems.feet(stem, point)
     heading = _outwards(rng, stems, stem, angle)
     lengths = length * rng.uniform(0.6, 1.4, len(stem))
-    moved = swayed(rng, _time(len(foot)), foot[0], bend, own=1.0)
+    moved = swayed(rng, _time(len(foot)), foot[0], bend, flutter=1.0)
     return bent(foot, heading, lengths, points, moved, base), stem
 
 

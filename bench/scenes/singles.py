@@ -24,7 +24,7 @@ def willow(seed: int, leaves: int) -> Scene:
     nodes = swaying(Bones.of(plant), FRAMES, rng, 0.2)
     node = np.sort(rng.choice(np.flatnonzero(plant.foliage > 0), leaves))
     heading = headings(rng, leaves, 0.4) * [1, -1, 1]
-    flutter = swayed(rng, time, nodes[0, node], 0.3, lean=0.3, own=0.8)
+    flutter = swayed(rng, time, nodes[0, node], 0.3, lean=0.3, flutter=0.8)
     base = rotations(swayed(rng, time, nodes[0, node], 0.3, lean=0.0))
     blades = bent(nodes[:, node], heading, rng.uniform(0.15, 0.25, leaves), 10, flutter, base)
     width = 0.012 * np.sin(np.linspace(0.2, np.pi - 0.1, 10))
@@ -203,7 +203,7 @@ def _cards(scene: Assembly, rng: np.random.Generator, stems: Stems, branch: np.n
     time = np.arange(FRAMES) / FPS
     heading = sideways(stems.heading[stem], rng.uniform(0, 6.3, len(stem)), 1.2)
     moved = bent(
-        foot, heading, size * rng.uniform(0.6, 1.4, len(stem)), 3, swayed(rng, time, foot[0], 0.3, own=1.0), base
+        foot, heading, size * rng.uniform(0.6, 1.4, len(stem)), 3, swayed(rng, time, foot[0], 0.3, flutter=1.0), base
     )
     width = size * np.array([0.05, 0.4, 0.05])
     scene.add(*covers.ribbons(moved, rng.uniform(0, 6.3, len(stem)), width), branch[stem])

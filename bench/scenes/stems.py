@@ -83,7 +83,12 @@ def gusts(
 
 
 def swayed(
-    rng: np.random.Generator, time: np.ndarray, place: np.ndarray, amount: float, lean: float = 0.2, own: float = 0.25
+    rng: np.random.Generator,
+    time: np.ndarray,
+    place: np.ndarray,
+    amount: float,
+    lean: float = 0.2,
+    flutter: float = 0.25,
 ) -> np.ndarray:
     """(T, S, 3) bends of stems that stand at places: a lean of each, the wind, and an oscillation of each."""
     count = len(place)
@@ -91,7 +96,7 @@ def swayed(
     still = rng.normal(0, lean, (count, 3)) * [1, 0, 1]
     push = (limp * (amount + gusts(rng, time, place) * amount))[..., None] * [0.0, 0.0, -1.0]
     waves = np.sin(2 * np.pi * rng.uniform(0.8, 2.5, count) * time[:, None] + rng.uniform(0, 2 * np.pi, count))
-    strength = rng.uniform(0.5, 1.5, count) * own * amount
+    strength = rng.uniform(0.5, 1.5, count) * flutter * amount
     return still + push + (waves * strength)[..., None] * rng.normal(size=(count, 3)) * [1, 0.3, 1]
 
 

@@ -198,8 +198,8 @@ class Equations:
         load, moved = load.copy(), np.zeros_like(load)
         for nodes, below, _, passed, _ in self._groups:
             load[:, below] -= reduce(add, (passed * load[:, nodes]).transpose(1, 0, 2))
-        for nodes, below, inverse, _, taken in reversed(self._groups):
-            held = reduce(add, (taken * moved[:, below]).transpose(1, 0, 2))
+        for nodes, below, inverse, _, factors in reversed(self._groups):
+            held = reduce(add, (factors * moved[:, below]).transpose(1, 0, 2))
             moved[:, nodes] = reduce(add, (inverse * load[:, nodes]).transpose(1, 0, 2)) - held
         return moved
 

@@ -73,15 +73,15 @@ def _distance(points: np.ndarray, skeleton: Skeleton) -> np.ndarray:
     """The distance of points (n, 3) from the nearest stem's bark, below 0 inside."""
     child = np.flatnonzero(skeleton.parent >= 0)
     start, radius = skeleton.parent[child], skeleton.radius.astype(np.float64)
-    found = np.full(len(points), np.inf)
+    distance = np.full(len(points), np.inf)
     for a, b in zip(start.tolist(), child.tolist()):
         low, chord = skeleton.rest[a], skeleton.rest[b] - skeleton.rest[a]
         # A side stem is as thick at its foot as at its first node.
         thick = radius[a] if skeleton.branch[a] == skeleton.branch[b] else radius[b]
         share = np.clip((points - low) @ chord / (chord @ chord), 0.0, 1.0)
         away = np.linalg.norm(points - low - share[:, None] * chord, axis=1)
-        found = np.minimum(found, away - (thick + share * (radius[b] - thick)))
-    return found
+        distance = np.minimum(distance, away - (thick + share * (radius[b] - thick)))
+    return distance
 
 
 def _skin(skeleton: Skeleton, cell: float, random: np.random.Generator) -> Scan:
@@ -175,9 +175,9 @@ class _Membrane:
         self._across = rows[:, self._held]
 
     def of(self, displacement: np.ndarray) -> np.ndarray:
-        found = displacement.copy()
-        found[self._free] = self._solved.solve(-(self._across @ displacement[self._held]))
-        return found
+        moved = displacement.copy()
+        moved[self._free] = self._solved.solve(-(self._across @ displacement[self._held]))
+        return moved
 
 
 def _nearest_on(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

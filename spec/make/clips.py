@@ -221,8 +221,8 @@ invalid(
 )
 for code in (0x00, 0x01, 0x0A, 0x1F, 0x7F):
     clips(f"name-control-{code:02x}: U+{code:04X} in a Name", CALM_ENTRY, clip_entry(4, 2, f"st{chr(code)}rm"))
-for what, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
-    clips(f"seam-{what}: the last of Seam_Errors is {value}", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
+for word, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
+    clips(f"seam-{word}: the last of Seam_Errors is {value}", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
 clips("seams-missing: a Loop without Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", flags=1))
 clips("seams-cut: ends inside Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0, 1.0))[:-1])
 clips("seams-less: Seam_Errors of two levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0)))

@@ -113,14 +113,14 @@ invalid(
     "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
     lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
 )
-for what, content in (
+for word, content in (
     ("broken", lambda: polygons(FACES_3) + b"\0"),
     ("derived", lambda: derived("<i4")),
     ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
     ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
 ):
     invalid(
-        f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
+        f"rest-connected-{word}-faces: a rest pose by faces that do not serve it: {word}",
         lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
             Entry(FACES, content())
         ),

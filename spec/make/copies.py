@@ -72,10 +72,10 @@ def copies_of_lengths() -> Plant:
     """Shapes, copies and branches that are neither: whether one is, is expected of others of its length up to 16."""
     counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
     shapes: list[int] = []
-    for b, (count, what) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
-        script += [[0] if what < 2 and count in shapes else []]
-        script += [copied(0), by_chance(1, 180 + b)] if what == 2 else [[what, *by_chance(count, 180 + b)]]
-        shapes += [count] if what == 1 else []
+    for b, (count, kind) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
+        script += [[0] if kind < 2 and count in shapes else []]
+        script += [copied(0), by_chance(1, 180 + b)] if kind == 2 else [[kind, *by_chance(count, 180 + b)]]
+        shapes += [count] if kind == 1 else []
     return with_copies(counts, *script)
 
 

@@ -118,14 +118,14 @@ hierarchy(
 hierarchy(
     "vertex-negative: a vertex with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=[-1, 0, 1, 2, 3]
 )
-for what, vertex_source in (
+for word, vertex_source in (
     ("along-beyond", [0, 3, 6, 1, 2]),
     ("along-negative", [4, 1, -2, 0, 3]),
     ("beside-beyond", [1, 3, 0, 4, 6]),
     ("beside-negative", [3, 1, 4, 0, -2]),
 ):
     hierarchy(
-        f"vertex-{what}: a number out of range, as expected", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=vertex_source
+        f"vertex-{word}: a number out of range, as expected", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=vertex_source
     )
 invalid(
     "hierarchy-depth-limit LIMIT_EXCEEDED: 4097 branches, each on the one before",

@@ -84,9 +84,9 @@ for name, value in (("nan", NAN), ("infinite", -INFINITY)):
         0,
         INFINITE_MESH,
     )
-for at, which in ((17, "first"), (21, "second")):
+for at, word in ((17, "first"), (21, "second")):
     invalid(
-        f"host-mesh-{which}-checksum: a mesh that differs by the {which} checksum alone",
+        f"host-mesh-{word}-checksum: a mesh that differs by the {word} checksum alone",
         lambda at=at: hosted().change(REST, content=flipped(host_rest_chunk(MESH), at)),
         "WRONG_HOST_MESH",
         0,

@@ -311,10 +311,10 @@ scripted_refinement((SHAPES, 3, 0), "refined-shapes-modes: a refined shape has n
 scripted_refinement((SHAPES, 3, 0), "refined-shapes-all-zero: a shape that the layer before lacks is all 0", 3, 0, 0, 0)
 scripted_refinement((SHAPES, 3, 0), "refined-shapes-cancelled: differences make a shape all 0", 2, 0, *[1, 0, 0, 4, 1])
 refinement(REFINED_REST, "short: 3 bytes", bytes(3))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     refinement(
         REFINED_REST,
-        f"step-{what}: Rest_Step of a refinement is {value}",
+        f"step-{word}: Rest_Step of a refinement is {value}",
         lambda content, value=value: refined_rest_chunk(content[4:], value),
     )
 refinement(

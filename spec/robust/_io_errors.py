@@ -106,11 +106,11 @@ def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
         _in_child(start, place, verb, target, n, lasts)
     os.close(start)
     with os.fdopen(ends, "rb") as pipe:
-        said = pipe.read()
+        answer = pipe.read()
     _, status = os.waitpid(child, 0)
-    if not said:
+    if not answer:
         return {"kind": "crash", "note": f"ended by {status}"}
-    result = json.loads(said)
+    result = json.loads(answer)
     kept = target.read_bytes() == OLDER[target.suffix]
     refused = result["code"] == 1 and ONE_LINE.fullmatch(result["err"]) and str(place.source.parent) in result["err"]
     fine = (refused or result["code"] == 0 and not kept) and (kept or is_whole(target))
@@ -136,8 +136,8 @@ def _in_child(start: int, place: Place, verb: str, target: Path, n: int, lasts: 
             finally:
                 calls, fired = library.faulty_calls(), library.faulty_fired()
                 library.faulty_arm(b"", ctypes.c_long(0), 0, 0)
-        said = {"code": code, "calls": calls, "fired": bool(fired), "err": err.getvalue()}
-        os.write(start, json.dumps(said).encode())
+        answer = {"code": code, "calls": calls, "fired": bool(fired), "err": err.getvalue()}
+        os.write(start, json.dumps(answer).encode())
     finally:
         os._exit(0)
 
@@ -152,14 +152,14 @@ def _next_run(place: Place, target: Path) -> None:
 
 def rows(budget: float) -> list[Row]:
     """All calls of all verbs, within about `budget` seconds."""
-    start, found = time.monotonic(), []
+    start, outcomes = time.monotonic(), []
     for number, (verb, lasts) in enumerate((verb, lasts) for verb in VERBS for lasts in (False, True)):
         with tempfile.TemporaryDirectory() as folder:
             until = start + 0.7 * budget * (number + 1) / (2 * len(VERBS))
-            found.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
+            outcomes.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
     with tempfile.TemporaryDirectory() as folder:
-        found.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
-    return found
+        outcomes.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
+    return outcomes
 
 
 def main() -> None:

@@ -55,9 +55,9 @@ class Place:
 
     def words(self, verb: str, target: Path) -> list[str]:
         """The command line of a verb that writes `target`."""
-        given = str(self.source if verb == "encode" else self.encoded)
+        source = str(self.source if verb == "encode" else self.encoded)
         more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--level", "1"]}
-        return [verb.split()[0], given, str(target), *more.get(verb, [])]
+        return [verb.split()[0], source, str(target), *more.get(verb, [])]
 
     def left_over(self, target: Path) -> list[str]:
         return [path.name for path in self.folder.iterdir() if path != target]

@@ -185,12 +185,12 @@ def seconds_and_bytes(data: bytes) -> tuple[float, int]:
     """Seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts determine."""
     start = time.perf_counter()
     decoder = athcodec.open(BytesIO(data))
-    given = sum(block.nbytes for _, block in decoder.blocks())
-    taken = time.perf_counter() - start
+    decoded = sum(block.nbytes for _, block in decoder.blocks())
+    seconds = time.perf_counter() - start
     work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.file.level_count - 1)
-    own = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
-    own += CHUNK_BYTES * decoder.file.tables.header.chunk_count
-    return taken, len(data) + given + decoder.file.rest.nbytes + own
+    memory = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
+    memory += CHUNK_BYTES * decoder.file.tables.header.chunk_count
+    return seconds, len(data) + decoded + decoder.file.rest.nbytes + memory
 
 
 @cache
@@ -204,8 +204,8 @@ def slow_file(_: bytes, name: str) -> int:
     least, fault = [float("inf")] * 2, ""
     for _ in range(8):
         for i, data in enumerate(files):
-            taken, size = seconds_and_bytes(data)
-            least[i] = min(least[i], taken)
+            seconds, size = seconds_and_bytes(data)
+            least[i] = min(least[i], seconds)
         fault = _too_slow(*least, size)
         if not fault:
             return 4 << 30
@@ -262,9 +262,9 @@ def figures() -> dict[str, str]:
     """The cost of slow files, measured again in this process."""
     lines = {}
     for name, make in hostile_files.SLOW.items():
-        taken, size = seconds_and_bytes(make(2))
+        seconds, size = seconds_and_bytes(make(2))
         lines[name] = (
-            f"{taken:.2f} s, {1e9 * taken / size:.1f} ns per byte of file, positions and memory, "
-            f"{taken / size / _sample_per_byte():.1f} times the sample's"
+            f"{seconds:.2f} s, {1e9 * seconds / size:.1f} ns per byte of file, positions and memory, "
+            f"{seconds / size / _sample_per_byte():.1f} times the sample's"
         )
     return lines

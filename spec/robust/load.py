@@ -58,10 +58,10 @@ def job(name: str, *words: object) -> tuple[int, dict]:
 
 def compilers() -> list[str]:
     """Compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
-    found = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
-    if not found:
+    commands = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
+    if not commands:
         raise RuntimeError("C compiler: found none of clang, gcc and cc; expected one, or its name in CC")
-    return found
+    return commands
 
 
 def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
@@ -117,12 +117,12 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
     def watch(seed: int) -> int:
         rng, wrong = random.Random(seed), 0
-        own = [athcodec.open(path) for path in files]
+        decoders = [athcodec.open(path) for path in files]
         for _ in range(looks):
-            which = rng.randrange(len(files))
-            decoder = rng.choice((shared, own))[which]
-            wrong += not _same(decoder, expected[which], rng)
-        for decoder in own:
+            number = rng.randrange(len(files))
+            decoder = rng.choice((shared, decoders))[number]
+            wrong += not _same(decoder, expected[number], rng)
+        for decoder in decoders:
             decoder.close()
         return wrong
 
@@ -273,7 +273,14 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         "positions": opened(lambda decoder: decoder.positions()),
         "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
-        "static": opened(lambda it: (it.file.attributes, it.metadata, it.file.edges, it.file.rest)),
+        "static": opened(
+            lambda opened_decoder: (
+                opened_decoder.file.attributes,
+                opened_decoder.metadata,
+                opened_decoder.file.edges,
+                opened_decoder.file.rest,
+            )
+        ),
         "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),
@@ -292,7 +299,7 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
         calls = _calls(path, str(out)) | {
             "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]
         }
-        for which, call in calls.items():
+        for call_name, call in calls.items():
             call()  # fills caches
             files, n, fired, error = _open_files(), 1, True, None
             while fired and time.monotonic() < until:
@@ -300,19 +307,19 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
                 memory.fail(n)
                 error = _error_of(call)
                 fired = memory.stop()
-                tried[which] = n - (not fired)
+                tried[call_name] = n - (not fired)
                 raised += error is not None
                 if not isinstance(error, (MemoryError, AthError, type(None))):
-                    wrong.append(f"{which}, array {n}: {type(error).__name__}: {error}"[:300])
+                    wrong.append(f"{call_name}, array {n}: {type(error).__name__}: {error}"[:300])
                 if error is not None and any(out.parent.iterdir()):
-                    wrong.append(f"{which}, array {n}: left a file")
+                    wrong.append(f"{call_name}, array {n}: left a file")
                 n += 1
             del error
             gc.collect()
             if _open_files() != files:
-                wrong.append(f"{which}: {_open_files() - files} files stay open")
+                wrong.append(f"{call_name}: {_open_files() - files} files stay open")
             if not np.array_equal(lasting.positions(), expected):
-                wrong.append(f"{which}: the open decoder returns other positions")
+                wrong.append(f"{call_name}: the open decoder returns other positions")
     return {"tried": tried, "raised": raised, "wrong": wrong}
 
 

@@ -88,10 +88,10 @@ class glTF2ExportUserExtension:
         [creator] = [cell.cell_contents for cell in position["set"].__closure__ or ()]
 
         def set_vertices(attribute, edges_points=False):
-            found = creator.attributes_edges_points if edges_points else creator.attributes
+            attributes = creator.attributes_edges_points if edges_points else creator.attributes
             # The numbers are exact in float32: meshes of more vertices have no export.
             data = np.asarray(creator.blender_idxs, np.float32)[:, None]
-            found[VERTEX] = {"data": data, "data_type": "SCALAR", "component_type": FLOAT}
+            attributes[VERTEX] = {"data": data, "data_type": "SCALAR", "component_type": FLOAT}
 
         kind = {"blender_data_type": "FLOAT", "blender_domain": "POINT", "len": 1, "type": np.float32}
         attributes.append({"gltf_attribute_name": VERTEX, "skip_getting_to_dots": True, "set": set_vertices} | kind)
@@ -108,8 +108,8 @@ class glTF2ExportUserExtension:
         motion = self._motion(recording, blender_object, primitives, export_settings)
         for primitive in primitives:
             reference = self._extensions.ChildOfRootExtension(["motions"], EXTENSION, motion, required=False)
-            said = {"motion": reference} | self._first.get(id(primitive), {})
-            extension = self._extensions.Extension(EXTENSION, said, required=False)
+            content = {"motion": reference} | self._first.get(id(primitive), {})
+            extension = self._extensions.Extension(EXTENSION, content, required=False)
             primitive.extensions = (primitive.extensions or {}) | {EXTENSION: extension}
 
     def gather_gltf_hook(self, active_scene, scenes, animations, export_settings):
@@ -132,13 +132,15 @@ class glTF2ExportUserExtension:
         rest = np.empty((len(used), 3), np.float32)
         rest[places.ravel()] = np.concatenate([self._values(each.attributes["POSITION"]) for each in primitives])
         stops = np.cumsum([len(each) for each in numbers])[:-1]
-        for primitive, own in zip(primitives, np.split(places.ravel(), stops)):
+        for primitive, numbers_of_primitive in zip(primitives, np.split(places.ravel(), stops)):
             view = primitive.attributes[VERTEX].buffer_view
-            if np.array_equal(own, own[0] + np.arange(len(own))):
+            if np.array_equal(numbers_of_primitive, numbers_of_primitive[0] + np.arange(len(numbers_of_primitive))):
                 del primitive.attributes[VERTEX]
-                self._first[id(primitive)] = {"firstVertex": int(own[0])} if own[0] else {}
+                self._first[id(primitive)] = (
+                    {"firstVertex": int(numbers_of_primitive[0])} if numbers_of_primitive[0] else {}
+                )
             else:
-                view = self._binary(own.astype(np.float32).tobytes(), view.bufferViewTarget)
+                view = self._binary(numbers_of_primitive.astype(np.float32).tobytes(), view.bufferViewTarget)
                 primitive.attributes[VERTEX].buffer_view = view
         ath = self._encoded(recording, used, rest, export_settings)
         scene, name = bpy.context.scene, bpy.context.scene.name

@@ -23,8 +23,8 @@ def decoder_of(path: str, clip: str = ""):
     athcodec's errors."""
     import athcodec
 
-    found = os.stat(path)
-    stamp = found.st_size, found.st_mtime_ns
+    status = os.stat(path)
+    stamp = status.st_size, status.st_mtime_ns
     known = _decoders.get(path)
     if known is None or known[0] != stamp:
         if known is not None:

@@ -151,13 +151,13 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
         if not len(end) or not len(lone):
             break
         step = frames[0, end] - frames[0, inner]
-        apart, which = cKDTree(frames[0, lone]).query(frames[0, end] + step)
+        apart, nearest = cKDTree(frames[0, lone]).query(frames[0, end] + step)
         fits = np.flatnonzero(apart <= OFF_LINE * np.linalg.norm(step, axis=1))
         fits = fits[np.argsort(apart[fits], kind="stable")]
-        used = fits[np.unique(which[fits], return_index=True)[1]]
+        used = fits[np.unique(nearest[fits], return_index=True)[1]]
         if not len(used):
             break
-        links = np.concatenate([links, np.stack([end[used], lone[which[used]]], axis=1)])
+        links = np.concatenate([links, np.stack([end[used], lone[nearest[used]]], axis=1)])
     return links
 
 
