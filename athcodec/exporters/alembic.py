@@ -57,15 +57,17 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
             process.wait()
             for pipe in (process.stdin, process.stdout):
                 with suppress(BrokenPipeError):
-                    pipe.close()
+                    if pipe is not None:
+                        pipe.close()
         if answer != b"done":
             reason = answer.decode("utf-8", "replace") or "Alembic's library has ended its process: is the disk full?"
             raise OSError(errno.EIO, f"cannot be written: {reason}", path)
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
-def _send(process: subprocess.Popen, head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
+def _send(process: subprocess.Popen[bytes], head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
     """Return the final answer of the process."""
+    assert process.stdin is not None and process.stdout is not None
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)
         for sample in samples:

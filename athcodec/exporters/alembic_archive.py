@@ -226,7 +226,7 @@ def _add(obj: SceneObject, values: list[np.ndarray], arrays: dict[str, tuple[np.
             _write_param(schema.getArbGeomParams(), name, values, domain)
 
 
-def _mesh_sample(obj: SceneObject, held: dict, arrays: dict) -> Any:
+def _mesh_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
     further = {}
     for name, row, array, keyword, kind in (
         ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
@@ -240,7 +240,7 @@ def _mesh_sample(obj: SceneObject, held: dict, arrays: dict) -> Any:
     return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
 
 
-def _curve_sample(obj: SceneObject, held: dict, arrays: dict) -> Any:
+def _curve_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
     is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
     bases = {name: each for each, name in BASES.items()}
@@ -253,11 +253,11 @@ def _curve_sample(obj: SceneObject, held: dict, arrays: dict) -> Any:
     )
 
 
-def _point_sample(obj: SceneObject, held: dict, arrays: dict) -> Any:
+def _point_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
     return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, arrays, "iWidths"))
 
 
-def _widths(held: dict, arrays: dict, name: str) -> dict:
+def _widths(held: dict[str, Any], arrays: dict[str, Any], name: str) -> dict[str, Any]:
     radius, domain = arrays.get("radius", (None, ""))
     if radius is None or radius.dtype != np.float32 or radius.ndim != 1:
         return {}

@@ -29,7 +29,10 @@ class Cells:
 
 def cells_of(motion: Motion) -> Cells:
     """The cells that a motion's attributes, faces and edges are."""
-    kinds, counts, nodes, domains = [], [], [], []
+    kinds: list[np.ndarray] = []
+    counts: list[np.ndarray] = []
+    nodes: list[np.ndarray] = []
+    domains: list[str] = []
     volumes = {
         name.removeprefix("cells_"): values
         for name, values in motion.attributes.items()
@@ -51,11 +54,15 @@ def cells_of(motion: Motion) -> Cells:
     domains += ["cell"] * bool(volumes)
     if not kinds:
         _add(kinds, counts, nodes, "vertex", np.arange(motion.vertex_count)[:, None])
-    types, counts, nodes = (np.concatenate(parts).astype(np.int64) for parts in (kinds, counts, nodes))
-    return Cells(types, np.cumsum(counts), nodes, domains[0] if len(domains) == 1 else "")
+    types, sizes_of_cells, corners_of_cells = (
+        np.concatenate(parts).astype(np.int64) for parts in (kinds, counts, nodes)
+    )
+    return Cells(types, np.cumsum(sizes_of_cells), corners_of_cells, domains[0] if len(domains) == 1 else "")
 
 
-def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) -> None:
+def _add(
+    kinds: list[np.ndarray], counts: list[np.ndarray], nodes: list[np.ndarray], kind: str, values: np.ndarray
+) -> None:
     kinds.append(np.full(len(values), VTK_NUMBERS[kind]))
     counts.append(np.full(len(values), values.shape[1]))
     nodes.append(values.reshape(-1))

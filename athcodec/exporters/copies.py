@@ -88,9 +88,17 @@ class _Fit:
         spread = np.tile((self._local**2).mean(axis=0), (obj.copies, 1))
         self._solver = Placed(SimpleNamespace(spread=spread, axes=np.tile(part.axes[0], (obj.copies, 1, 1))))
         room = (motion.frame_count, obj.copies)
-        values = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
-        still, _ = self._placed(rest.reshape(obj.copies, count, 3))
-        self.copies = Copies(shape, *values, tuple(part.astype(np.float32) for part in still), 0.0, part.axes[0])
+        places, turns, scales = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
+        (place, turn, scale), _ = self._placed(rest.reshape(obj.copies, count, 3))
+        self.copies = Copies(
+            shape,
+            places,
+            turns,
+            scales,
+            (place.astype(np.float32), turn.astype(np.float32), scale.astype(np.float32)),
+            0.0,
+            part.axes[0],
+        )
 
     def add(self, start: int, frames: np.ndarray) -> None:
         """Fits the next frames."""

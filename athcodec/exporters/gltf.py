@@ -213,14 +213,16 @@ def check_morphs(motion: Motion, offset_count: int) -> None:
         )
 
 
-def _add_animation(glb: Glb, take: Take, samplers: list[dict], channels: list[dict]) -> None:
+def _add_animation(glb: Glb, take: Take, samplers: list[dict[str, Any]], channels: list[dict[str, Any]]) -> None:
     if channels:
         animation = {"name": take.name, "samplers": samplers, "channels": channels}
         extras = {"extras": take.extras} if take.extras else {}
         glb.json.setdefault("animations", []).append(animation | extras)
 
 
-def _animate(glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[dict], list[dict]]]) -> None:
+def _animate(
+    glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[dict[str, Any]], list[dict[str, Any]]]]
+) -> None:
     """An animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than at
     rest in any of them; one key where such a one stands still in one."""
     if movers is None:
@@ -315,8 +317,8 @@ def _add_channels(
     poses: list[np.ndarray],
     used: list[np.ndarray],
     moves: list[np.ndarray],
-    samplers: list[dict],
-    channels: list[dict],
+    samplers: list[dict[str, Any]],
+    channels: list[dict[str, Any]],
 ) -> None:
     """Append samplers and channels. poses, used, moves: one array for each of PATHS, of which the latter two say, (J,),
     which nodes have a channel and which of those move. A node that moves gets a key per frame, one that is still a
@@ -369,7 +371,9 @@ class _Morphed:
         least, self.max_error = self.max_error, UNKNOWN_BOUND
         return self._targets(glb, shapes, bounds, least, report)
 
-    def _add_targets(self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int) -> list[list[dict]]:
+    def _add_targets(
+        self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int
+    ) -> list[list[dict[str, Any]]]:
         """The accessors of positions, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for _ in range(self._motion.frame_count):

@@ -351,7 +351,7 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([first, second, second + 1], axis=1)
 
 
-def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, list[str]]:
+def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
@@ -359,14 +359,16 @@ def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, l
     for name in ("vertex_branch", "stem_index"):
         if getattr(motion, name, None) is not None:
             arrays[name] = getattr(motion, name)
-    per_vertex, per_corner, left_out = {}, {}, []
+    per_vertex: dict[str, np.ndarray] = {}
+    per_corner: dict[str, np.ndarray] = {}
+    left_out: list[str] = []
     for name, array in arrays.items():
         if name in NOT_PER_VERTEX or name == FACE_MATERIAL and face_materials(motion):
             continue
         domain = domains.get(name, "vertex" if array.ndim and len(array) == motion.vertex_count else "")
         where = {"vertex": (per_vertex, motion.vertex_count), "corner": (per_corner, corner_count)}.get(domain)
         entry = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
-        if entry is None or entry[0] in where[0]:
+        if where is None or entry is None or entry[0] in where[0]:
             left_out.append(name)
         else:
             where[0][entry[0]] = entry[1]

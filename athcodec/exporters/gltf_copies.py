@@ -103,7 +103,8 @@ def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh |
         parts = [next(waiting) for _ in run]
         made = _as_copies(_joined(parts), obj, fits[number]) if number in fits else None
         if made is None:
-            shapes, obj.copies = shapes + parts, 1
+            shapes += parts
+            obj.copies = 1
             continue
         made.names = [shape.name for shape in parts] if len(run) > 1 else None
         _hold(motion, made.copies, allowed)
@@ -175,7 +176,11 @@ def unit_quaternion(quaternion: np.ndarray) -> list[float]:
 def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCopies:
     if isinstance(shape, GltfCopies):
         attributes = {key: values for key, values in shape.copy_attributes.items() if key not in lost}
-        return GltfCopies(_without(shape.shape, lost), shape.copies, attributes, sorted(lost), shape.names)
+        return GltfCopies(_mesh_without(shape.shape, lost), shape.copies, attributes, sorted(lost), shape.names)
+    return _mesh_without(shape, lost)
+
+
+def _mesh_without(shape: GltfMesh, lost: set[str]) -> GltfMesh:
     return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
 
 

@@ -93,7 +93,8 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._pending: PendingFile | None = PendingFile(path)
-        self._file, self._sink = None, Sink(self._pending.descriptor, self._pending.path)
+        self._file: Any = None  # An h5py.File, which has no types.
+        self._sink = Sink(self._pending.descriptor, self._pending.path)
         try:
             self._file = h5py.File(self._sink, "w")
             self._positions = self._create_positions(dtype)
@@ -233,7 +234,7 @@ class Sink:
         if self._error is not None:
             raise self._error
 
-    def write(self, data) -> int:
+    def write(self, data: Any) -> int:
         data = memoryview(data).cast("B")
         done = 0
         while done < len(data) and self._error is None:
@@ -241,7 +242,7 @@ class Sink:
                 done += self._file.write(data[done:])
         return len(data)
 
-    def readinto(self, buffer) -> int:
+    def readinto(self, buffer: Any) -> int:
         view, done = memoryview(buffer).cast("B"), 0
         while done < len(view) and self._error is None:
             with self._noting():

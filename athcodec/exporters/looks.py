@@ -63,7 +63,8 @@ class Looks:
 
 def looks_of(motion: Motion, objects: list[SceneObject]) -> Looks:
     """Return what the faces of a motion look like, which are those of its objects."""
-    surface = Surface(*(motion.polygons or ((), ())), motion.rest)
+    counts, corners = motion.polygons or (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    surface = Surface(counts, corners, motion.rest)
     stated = [(obj.name, obj.face_rows, is_double_sided(obj.details)) for obj in objects]
     return _looks(surface, *_named(motion), stated)
 
@@ -86,7 +87,9 @@ def _looks(surface: Surface, labels: np.ndarray, names: list[str], objects: list
     is_nameless = labels < 0
     used, place = np.unique((2 * kinds + states_sides)[is_nameless], return_inverse=True)
     labels[is_nameless] = len(names) + place.ravel()
-    every = [(name, kind_of(name) or _commonest(kinds[labels == i]), ()) for i, name in enumerate(names)]
+    every: list[tuple[str, str, tuple[str, ...]]] = [
+        (name, kind_of(name) or _commonest(kinds[labels == i]), ()) for i, name in enumerate(names)
+    ]
     every += [(KINDS[code // 2], KINDS[code // 2], ("name",)) for code in used.tolist()]
     materials = []
     for i, (name, kind, guessed) in enumerate(every):

@@ -26,7 +26,7 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
-from athcodec.sources.xdmf import MIXED
+from athcodec.sources.xdmf_cells import MIXED
 
 DISPLACEMENT = "displacement"
 _XDMF_NUMBERS = {name: number for number, name in MIXED.items()} | {"line": 2, "vertex": 1}
@@ -89,7 +89,14 @@ class _Writer:
                 report((frame + 1) / motion.frame_count)
         return root
 
-    def _fill(self, grid: ElementTree.Element, frame: int, time: float, moved: np.ndarray, static: list) -> None:
+    def _fill(
+        self,
+        grid: ElementTree.Element,
+        frame: int,
+        time: float,
+        moved: np.ndarray,
+        static: tuple[list[ElementTree.Element], list[ElementTree.Element]],
+    ) -> None:
         mesh, attributes = static
         if frame == 0:
             grid.extend(mesh)

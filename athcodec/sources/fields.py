@@ -66,9 +66,11 @@ def clip_of_steps(
     parts: Sequence[Part] = (),
     not_read: Mapping[str, list[str]] | None = None,
 ) -> MotionClip:
-    """The clip of a result at (T,) times. static: data per point that do not change. parts: the objects that the points
-    are, one after the other, "" for one without a name. Raises ClipError where nothing moves, or it is not clear what
-    does."""
+    """Return the clip of a result at (T,) times.
+
+    `static` holds the data per point that do not change, and `parts` the objects that the points form one after the
+    other, "" for one without a name. Raises ClipError if nothing moves, or if it is not clear what does.
+    """
     first = _padded(steps.points(0))
     fixed = steps.fixed_points()
     moved_by = _displacement(steps, fixed, len(time), options)
@@ -79,7 +81,43 @@ def clip_of_steps(
             GuessWarning,
             stacklevel=2,
         )
-    topology, count = steps.topology, len(first)
+    frames = _frames(steps, first, fixed, moved_by, len(time))
+    topology, names = steps.topology, _names_of_static(static, steps)
+    attributes = topology.attributes | {new: static[key] for key, new in names.items()}
+    attributes = {key: values for key, values in attributes.items() if key not in options.skip}
+    metadata, numbers = scene_fields(metadata, len(first))
+    parts = parts or (Part("", len(first)),)
+    attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
+    domains = topology.domains | dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
+    facts = {
+        "part_names": [part.name or name for part in parts],
+        "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
+        "domains": {key: domain for key, domain in domains.items() if key in attributes},
+    }
+    kept = {*names, *options.skip, moved_by}
+    moving = [key for key in steps.fields() if key not in kept] + [
+        key for key in steps.left_out if key not in options.skip
+    ]
+    moving = list(dict.fromkeys(moving))
+    rest = first.astype(frames.dtype) if moved_by and options.rest == "auto" else None
+    return MotionClip(
+        frames,
+        time,
+        faces=topology.faces,
+        edges=topology.edges,
+        rest=rest,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        attributes=attributes,
+        metadata=facts | metadata,
+        resource=resource,
+        unchanged=unchanged,
+        not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
+    )
+
+
+def _frames(steps: Steps, first: np.ndarray, fixed: bool, moved_by: str | None, frame_count: int) -> Frames:
+    """Return the positions at each step: the points, or with `moved_by` the points and this displacement of them."""
+    count = len(first)
     dtype = _dtype(first, _padded(steps.field(0, moved_by)) if moved_by else first)
 
     def frame(step: int) -> np.ndarray:
@@ -101,39 +139,15 @@ def clip_of_steps(
         with np.errstate(over="ignore", invalid="ignore"):
             return np.stack([frame(step).astype(dtype) for step in range(start, stop)])
 
-    domains = dict(topology.domains)
-    names = {key: f"vertex_{key}" if key in topology.attributes else key for key in static}
-    names = {key: new for key, new in names.items() if new not in RESERVED_NAMES and new not in topology.attributes}
-    attributes = topology.attributes | {new: static[key] for key, new in names.items()}
-    attributes = {key: values for key, values in attributes.items() if key not in options.skip}
-    metadata, numbers = scene_fields(metadata, count)
-    parts = parts or (Part("", count),)
-    attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
-    domains |= dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
-    facts = {
-        "part_names": [part.name or name for part in parts],
-        "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
-        "domains": {key: domain for key, domain in domains.items() if key in attributes},
-    }
-    kept = {*names, *options.skip, moved_by}
-    moving = [key for key in steps.fields() if key not in kept] + [
-        key for key in steps.left_out if key not in options.skip
-    ]
-    moving = list(dict.fromkeys(moving))
-    rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
-    return MotionClip(
-        Frames(read, len(time), count, dtype),
-        time,
-        faces=topology.faces,
-        edges=topology.edges,
-        rest=rest,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        attributes=attributes,
-        metadata=facts | metadata,
-        resource=resource,
-        unchanged=unchanged,
-        not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
-    )
+    return Frames(read, frame_count, count, dtype)
+
+
+def _names_of_static(static: Mapping[str, np.ndarray], steps: Steps) -> dict[str, str]:
+    """Return the name of the attribute that each static array becomes; an array is left out if all of its names are
+    in use."""
+    attributes = steps.topology.attributes
+    names = {key: f"vertex_{key}" if key in attributes else key for key in static}
+    return {key: name for key, name in names.items() if name not in RESERVED_NAMES and name not in attributes}
 
 
 def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None) -> list[str]:

@@ -15,43 +15,35 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.files.gltf.document import DRACO, UNPACKED_BY, GltfFile
-from athcodec.files.gltf.json import BROKEN, brief, entries, entry, extension, indices, integer
+from athcodec.files.gltf.document import GltfFile
+from athcodec.files.gltf.json import BROKEN, brief, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import closing_on_failure, naming
-from athcodec.motion.clip import DEFAULT_FPS, RESERVED_NAMES, ClipRange, MotionClip, Skin
-from athcodec.motion.frames import Frames, is_far
+from athcodec.motion.clip import RESERVED_NAMES, ClipRange, MotionClip, Skin
+from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
-from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources import ReadOptions, besides
-from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
-from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING, guessed, not_read
+from athcodec.sources.gltf_motion import NodeMotion, sampling_of
+from athcodec.sources.gltf_nodes import GltfNode, load_node, moving_nodes, nodes_of_mesh
+from athcodec.sources.gltf_scene import Scene
+from athcodec.sources.gltf_unread import INSTANCING, guessed, not_read
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, Facing, presence_metadata
-from athcodec.sources.timing import warn_of_missed
 
-WORK_BYTES = 64 << 20
 MOST_VERTICES = 1 << 27
-INSTANCE_BYTES = 256  # Bytes that an instance takes.
 CORNER_BYTES = 96  # Bytes that a corner of a face takes; strips make three of each.
-INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
 VERTEX_BYTES = 160  # Bytes that a vertex takes in the poses that are held and made.
-MOST_FRAMES = 1 << 20
-FACING_FRAMES = 64  # Frames whose transforms are held at once to see whether they mirror.
-KINDS = ("points", "curves", "mesh")  # the last that a node has is what it is
-MODE_KINDS = ("points", "curves", "curves", "curves", "mesh", "mesh", "mesh")
 NAMES = {"TEXCOORD_0": "uv", "COLOR_0": "colors", "NORMAL": "normals"}
 FILLERS = {"colors": 1.0}
 ANIMATION = "animation:"
 REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over its largest coordinate.
-SAME = 1e-5  # Distance between the ends of a loop, over the plant's size.
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
@@ -71,48 +63,12 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
         return _read(file, options)
 
 
-@dataclass(eq=False)
-class GltfNode:
-    """A node that shows vertices: `first` to `first + count` - 1 of the clip. Where its mesh has several sets of
-    vertices, there is one of these for each."""
-
-    index: int
-    name: str
-    mesh: int
-    skin: int | None
-    attributes: dict[str, int]
-    targets: list[int | None]
-    weights: np.ndarray
-    first: int = 0
-    count: int = 0
-    kind: str = "points"
-    primitives: list[dict] = field(default_factory=list)
-    base: np.ndarray | None = None
-    joints: list[int] = field(default_factory=list)
-    bind: np.ndarray | None = None
-    influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
-    strongest: np.ndarray | None = None
-    copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
-    of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
-    is_flipped: bool = False
-    mirrored: np.ndarray = field(default_factory=lambda: np.zeros(1, bool))  # whether it, or a copy, is inside out
-
-    @property
-    def shape_count(self) -> int:
-        """Vertices of one copy."""
-        return self.count if self.copies is None else self.count // len(self.copies)
-
-    @property
-    def vertices(self) -> slice:
-        return slice(self.first, self.first + self.count)
-
-
 def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
     scenes = _scenes(file, options)
     scene = next(iter(scenes.values()))
     nodes = _chosen(scene, _patterns(options))
     for node in nodes:
-        _load(node, scene)
+        load_node(node, scene)
     return _clip(file, scenes, nodes, options, None)
 
 
@@ -136,7 +92,7 @@ def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[
             raise ClipError("animations: got none that moves vertices, expected skins, nodes or morph targets that do")
         _number(moving)
         for node in moving:
-            _load(node, scene)
+            load_node(node, scene)
             if node.copies is not None:
                 raise ClipError(
                     f"node {node.name!r}: got {INSTANCING} on a mesh that moves, expected one without: each instance "
@@ -153,11 +109,11 @@ class Placement:
     def __init__(self, scenes: list[Scene], nodes: list[GltfNode]):
         self._scenes = scenes
         self.starts = [float(scene.keys[0]) for scene in scenes]
-        self.space = _Motion(scenes[0], nodes).placed(max(nodes, key=self._preference))
+        self.space = NodeMotion(scenes[0], nodes).placed(max(nodes, key=self._preference))
         if not abs(np.linalg.det(self.space[:3, :3])) > 0:
             self.space = np.eye(4)
         self.from_world = None if np.array_equal(self.space, np.eye(4)) else np.linalg.inv(self.space)
-        self._motion = _Motion(scenes[0], nodes, self.from_world)
+        self._motion = NodeMotion(scenes[0], nodes, self.from_world)
 
     def _preference(self, node: GltfNode) -> tuple[bool, int]:
         """The largest mesh keeps its place, of those that can."""
@@ -202,9 +158,9 @@ def _clip(
     file: GltfFile, scenes: dict[str, Scene], nodes: list[GltfNode], options: ReadOptions, from_world: np.ndarray | None
 ) -> MotionClip:
     scene = next(iter(scenes.values()))
-    motions = {name: _Motion(take, nodes, from_world) for name, take in scenes.items()}
+    motions = {name: NodeMotion(take, nodes, from_world) for name, take in scenes.items()}
     motion = next(iter(motions.values()))
-    timings = {name: _sampling(take, options.fps) for name, take in motions.items()}
+    timings = {name: sampling_of(take, options.fps) for name, take in motions.items()}
     keeps_normals = all(len(timing.times) == 1 for timing in timings.values()) and not any(
         node.skin is not None or node.weights.any() or node.copies is not None for node in nodes
     )
@@ -253,7 +209,7 @@ def _clip(
     return join(clips) if options.takes else clips[""]
 
 
-def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
+def _rest_pose(motion: NodeMotion, nodes: Sequence[GltfNode]) -> np.ndarray:
     """(N, 3) the scene without animation. Where joints leave a mesh as it is stored, these are its very numbers, which
     others who read the file have too: products of matrices round."""
     rest = motion.read(None)[0]
@@ -268,7 +224,7 @@ def _rest_pose(motion: _Motion, nodes: Sequence[GltfNode]) -> np.ndarray:
     return rest
 
 
-def _positions(motion: _Motion, times: np.ndarray) -> Frames:
+def _positions(motion: NodeMotion, times: np.ndarray) -> Frames:
     return Frames(lambda start, stop: motion.read(times[start:stop]), len(times), motion.count, motion.dtype, True)
 
 
@@ -306,7 +262,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
             called = [scene.name(index), mesh["name"] if isinstance(mesh.get("name"), str) else ""]
             seen.extend(called)
             if not patterns or any(fnmatch.fnmatchcase(name, pattern) for name in called for pattern in patterns):
-                nodes.extend(_nodes(scene, index, mesh, next(filter(None, called), f"mesh {mesh_index}")))
+                nodes.extend(nodes_of_mesh(scene, index, mesh, next(filter(None, called), f"mesh {mesh_index}")))
     if not nodes:
         names = brief(sorted({name for name in seen if name}))
         raise ClipError(
@@ -354,368 +310,7 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
     return numbers
 
 
-def _nodes(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
-    """One per set of vertices: primitives that use the same accessors share theirs."""
-    copies, of_copies = _copies(scene, index)
-    nodes: dict[Any, GltfNode] = {}
-    for primitive in entries(mesh, "primitives"):
-        attributes = {key: integer(entry(primitive, "attributes"), key) for key in entry(primitive, "attributes")}
-        targets = [
-            integer(target, "POSITION") if "POSITION" in target else None for target in entries(primitive, "targets")
-        ]
-        if "POSITION" not in attributes:
-            raise ClipError(f"mesh {name!r}: got a primitive without POSITION, expected one with it")
-        _refuse_draco(scene.file, primitive, attributes["POSITION"])
-        key = (tuple(sorted(attributes.items())), tuple(targets))
-        if key not in nodes:
-            weights = scene.nodes[index].get("weights", mesh.get("weights")) or [0.0] * len(targets)
-            if not isinstance(weights, list) or len(weights) != len(targets):
-                raise ClipError(f"mesh {name!r}: got weights {brief(weights)}, expected {len(targets)}")
-            nodes[key] = GltfNode(
-                index,
-                name,
-                scene.nodes[index]["mesh"],
-                scene.nodes[index].get("skin"),
-                attributes,
-                targets,
-                np.array(weights, np.float64),
-                count=scene.file.count(attributes["POSITION"]) * (1 if copies is None else len(copies)),
-                copies=copies,
-                of_copies=of_copies,
-            )
-        node = nodes[key]
-        kind = MODE_KINDS[integer(primitive, "mode", 4, stop=7)]
-        node.kind = max(node.kind, kind, key=KINDS.index)
-        node.primitives.append(primitive)
-    in_order = list(nodes.values())
-    for number, node in enumerate(in_order[1:], 1):
-        node.name = f"{name}.{number}"
-    return in_order
-
-
-def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a shape
-    has, (k, width) by attribute."""
-    instancing = extension(scene.nodes[index], INSTANCING)
-    if instancing is None:
-        return None, _own_extras(scene, index)
-    if scene.nodes[index].get("skin") is not None:
-        raise ClipError(f"node {index}: got {INSTANCING} of a mesh with a skin, expected one without")
-    accessors = entry(instancing, "attributes")
-    for name in accessors:
-        scene.file.budget.take(INSTANCE_BYTES * scene.file.count(integer(accessors, name)), f"node {index}")
-    parts = {
-        name: scene.file.floats(integer(accessors, name)).astype(np.float64)
-        for name in INSTANCE_PARTS
-        if name in accessors
-    }
-    counts = {len(values) for values in parts.values()}
-    widths = all(values.shape[1] == INSTANCE_PARTS[name] for name, values in parts.items())
-    if len(counts) != 1 or not widths:
-        raise ClipError(
-            f"node {index}: got {INSTANCING} of {sorted(counts)} instances, expected TRANSLATION, ROTATION "
-            "or SCALE of as many"
-        )
-    matrices = np.tile(np.eye(4), (counts.pop(), 1, 1))
-    if "ROTATION" in parts:
-        matrices[:, :3, :3] = rotation_matrices(parts["ROTATION"])
-    if "SCALE" in parts:
-        matrices[:, :3, :3] *= parts["SCALE"][:, None, :]
-    if "TRANSLATION" in parts:
-        matrices[:, :3, 3] = parts["TRANSLATION"]
-    of_copies = {name: scene.file.attribute(integer(accessors, name)) for name in accessors if name.startswith("_")}
-    for name, values in of_copies.items():
-        if len(values) != len(matrices):
-            raise ClipError(
-                f"node {index}: got {len(values)} entries of {name}, expected {len(matrices)}, one an instance"
-            )
-    return matrices, of_copies
-
-
-def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
-    """Numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
-    extras = scene.nodes[index].get("extras")
-    if scene.says_copies(int(scene.parent[index])) is None or not isinstance(extras, dict):
-        return {}
-    attributes = {}
-    for key, value in extras.items():
-        row = value if isinstance(value, list) else [value]
-        if 1 <= len(row) <= 4 and all(_is_number(number) for number in row):
-            attributes[f"_{key}"] = np.array([row], np.int64 if all(type(n) is int for n in row) else np.float32)
-    return attributes
-
-
-def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
-    packed = DRACO in (primitive.get("extensions") or {})
-    if packed and file.item("accessors", positions).get("bufferView") is None:
-        raise ClipError(f"meshes: got {DRACO}, expected a file without it: {UNPACKED_BY}")
-
-
-def _load(node: GltfNode, scene: Scene) -> None:
-    file = scene.file
-    slots = sum(key.startswith("JOINTS_") for key in node.attributes) if node.skin is not None else 0
-    file.budget.take(INFLUENCE_BYTES * 4 * slots * node.count, f"mesh {node.name!r}")
-    node.base = _triples(file, node.attributes["POSITION"], node.shape_count, "POSITION")
-    for target in node.targets:
-        if target is not None and file.count(target) != node.shape_count:
-            raise ClipError(
-                f"mesh {node.name!r}: got a morph target of {file.count(target)} vertices, expected {node.shape_count}"
-            )
-    if node.skin is None:
-        return
-    skin = file.item("skins", node.skin)
-    node.joints = [integer({"joint": joint}, "joint") for joint in skin.get("joints") or ()]
-    node.bind = _bind_matrices(file, skin, len(node.joints))
-    if "JOINTS_0" not in node.attributes or not node.joints:
-        raise ClipError(f"mesh {node.name!r}: got a skin without joints, expected JOINTS_0 and WEIGHTS_0")
-    _load_influences(node, file)
-
-
-def _triples(file: GltfFile, index: int, count: int, subject: str) -> np.ndarray:
-    values = file.floats(index)
-    if values.shape != (count, 3):
-        raise ClipError(f"{subject}: got shape {values.shape}, expected ({count}, 3)")
-    return values
-
-
-def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
-    if skin.get("inverseBindMatrices") is None:
-        return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
-    file.budget.take(256 * file.count(skin["inverseBindMatrices"]), "skins")
-    values = file.floats(skin["inverseBindMatrices"]).astype(np.float64)
-    if values.shape[1] != 16 or len(values) < joint_count:
-        raise ClipError(f"skins: got inverse bind matrices of shape {values.shape}, expected ({joint_count}, 16)")
-    return values[:joint_count].reshape(-1, 4, 4).swapaxes(1, 2)
-
-
-def _load_influences(node: GltfNode, file: GltfFile) -> None:
-    """Per joint its vertices and their weights, which add up to 1; where a file has none, the first joint counts."""
-    vertex, joint, weight = [], [], []
-    for slot in range(64):
-        names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
-        if names[0] not in node.attributes or names[1] not in node.attributes:
-            break
-        joints, weights = file.array(node.attributes[names[0]]), file.floats(node.attributes[names[1]])
-        if joints.shape != (node.count, 4) or joints.shape != weights.shape or joints.dtype.kind not in "iu":
-            raise ClipError(f"mesh {node.name!r}: got {names[0]} of shape {joints.shape}, expected ({node.count}, 4)")
-        rows, columns = np.nonzero(weights)
-        vertex.append(rows)
-        joint.append(joints[rows, columns].astype(np.int64))
-        weight.append(weights[rows, columns].astype(np.float64))
-        if slot == 0:
-            first = joints[:, 0].astype(np.int64)
-    if not vertex:
-        raise ClipError(f"mesh {node.name!r}: got JOINTS_0 without WEIGHTS_0, expected both")
-    total = np.bincount(np.concatenate(vertex), np.concatenate(weight), node.count)
-    bare = np.flatnonzero(~(np.abs(total) > 1e-12))
-    vertex, joint = np.concatenate([*vertex, bare]), np.concatenate([*joint, first[bare]])
-    weight = np.concatenate([*weight, np.ones(len(bare))])
-    total[bare] = 1.0
-    if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(node.joints):
-        raise ClipError(
-            f"mesh {node.name!r}: got joints up to {joint.max()} or weights that are no numbers, expected "
-            f"joints below {len(node.joints)}"
-        )
-    pair, index = np.unique(joint * node.count + vertex, return_inverse=True)
-    weight = np.bincount(index, weight / total[vertex], len(pair))
-    joint, vertex = np.divmod(pair, node.count)
-    starts = np.flatnonzero(np.diff(joint, prepend=-1))
-    stops = np.append(starts[1:], len(pair))
-    node.influences = [(int(joint[a]), vertex[a:b], weight[a:b]) for a, b in zip(starts, stops)]
-    order = np.lexsort((weight, vertex))
-    node.strongest = np.empty(node.count, np.int64)
-    node.strongest[vertex[order]] = joint[order]
-
-
 # ---- how it moves ----
-
-
-class _Motion:
-    """Positions of all nodes at any times."""
-
-    def __init__(self, scene: Scene, nodes: list[GltfNode], from_world: np.ndarray | None = None):
-        self.scene, self._nodes, self._from_world = scene, nodes, from_world
-        self.count = nodes[-1].first + nodes[-1].count
-        self.ancestors = scene.ancestors(_movers(nodes))
-        self.dtype = np.dtype(np.float64)
-        placed = self.read(None)[0]
-        loses = is_far(placed) and not np.array_equal(placed, placed.astype(np.float32))
-        self.dtype = np.dtype(np.float64 if loses else np.float32)
-
-    def read(self, times: np.ndarray | None) -> np.ndarray:
-        """(k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose without
-        animation, k = 1."""
-        out = np.empty((1 if times is None else len(times), self.count, 3), self.dtype)
-        largest = max(node.count for node in self._nodes)
-        step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
-        with np.errstate(all="ignore"):
-            for start in range(0, len(out), step):
-                now = None if times is None else times[start : start + step]
-                matrices = self.scene.matrices(self.ancestors, now)
-                if self._from_world is not None:
-                    matrices = {index: self._from_world @ matrix for index, matrix in matrices.items()}
-                for node in self._nodes:
-                    rows = node.vertices
-                    out[start : start + step, rows] = self._positions(node, matrices, now)
-        return out
-
-    def _positions(self, node: GltfNode, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
-        local = self._morphed(node, times)
-        if node.skin is None:
-            matrix = matrices[node.index]
-            if node.copies is not None:
-                matrix = (matrix[:, None] @ node.copies).reshape(-1, 4, 4)
-                local = np.repeat(
-                    np.broadcast_to(local, (len(matrices[node.index]), *local.shape[1:])), len(node.copies), axis=0
-                )
-                placed = local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
-                return placed.reshape(-1, node.count, 3)
-            return local @ matrix[:, :3, :3].swapaxes(1, 2) + matrix[:, None, :3, 3]
-        return self._skinned(node, matrices, local)
-
-    def _morphed(self, node: GltfNode, times: np.ndarray | None) -> np.ndarray:
-        """(k or 1, n, 3): only targets that count in a frame are read."""
-        if not node.targets:
-            return node.base[None].astype(np.float64)
-        weights = self.scene.weights(node.index, times, node.weights)
-        local = np.repeat(node.base[None].astype(np.float64), len(weights), axis=0)
-        for column in np.flatnonzero((weights != 0).any(axis=0)):
-            if node.targets[column] is not None:
-                rows = np.flatnonzero(weights[:, column])
-                moved = _triples(self.scene.file, node.targets[column], node.shape_count, "morph target")
-                local[rows] += weights[rows, column, None, None] * moved
-        return local
-
-    def _skinned(self, node: GltfNode, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
-        frames = max(len(local), *(len(matrices[joint]) for joint in node.joints))
-        out = np.zeros((frames, 3, node.count))
-        for joint, vertices, weights in node.influences:
-            matrix = (matrices[node.joints[joint]] @ node.bind[joint])[:, :3]
-            points = np.ones((len(local), 4, len(vertices)))
-            points[:, :3] = local[:, vertices].swapaxes(1, 2)
-            points *= weights
-            out[:, :, vertices] += _product(matrix, points)
-        return out.swapaxes(1, 2)
-
-    def add_facings(self, times: np.ndarray, facings: Sequence[Facing]) -> None:
-        """Adds the frames at these times to the facing of each node."""
-        world = np.eye(4) if self._from_world is None else self._from_world
-        for start in range(0, len(times), FACING_FRAMES):
-            matrices = self.scene.matrices(self.ancestors, times[start : start + FACING_FRAMES])
-            for node, facing in zip(self._nodes, facings):
-                placed = (world @ self._placed(node, matrices))[:, None]
-                facing.add(placed if node.copies is None else placed @ node.copies)
-
-    def placed(self, node: GltfNode) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world without animation; of a skin, by the joint that counts most."""
-        return self._placed(node, self.scene.matrices(self.ancestors, None))[0]
-
-    def _placed(self, node: GltfNode, matrices: dict[int, np.ndarray]) -> np.ndarray:
-        if node.skin is None:
-            return matrices[node.index]
-        strongest = np.bincount(node.strongest).argmax()
-        return matrices[node.joints[strongest]] @ node.bind[strongest]
-
-    def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
-        """(n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length 1."""
-        matrices = self.scene.matrices(self.ancestors, None)
-        linear = np.eye(3) if self._from_world is None else self._from_world[:3, :3]
-
-        def moved(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-            matrix = linear @ matrix[:3, :3]
-            return vectors @ (np.linalg.pinv(matrix) if is_normal else matrix.T)
-
-        if node.skin is None:
-            turned = moved(matrices[node.index][0], directions)
-        else:
-            turned = np.zeros((node.count, 3))
-            for joint, vertices, weights in node.influences:
-                matrix = matrices[node.joints[joint]][0] @ node.bind[joint]
-                turned[vertices] += weights[:, None] * moved(matrix, directions[vertices])
-        length = np.linalg.norm(turned, axis=1, keepdims=True)
-        return turned / np.where(length > 0, length, 1.0)
-
-    def normal_matrix(self, node: GltfNode) -> np.ndarray:
-        """(3, 3) that turns normals of an unskinned node into the world."""
-        matrix = self.scene.matrices(self.ancestors, None)[node.index][0, :3, :3]
-        return np.linalg.pinv(matrix).T if np.isfinite(matrix).all() else np.eye(3)
-
-
-def _product(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(k, 3, 4) by (k or 1, 4, m); one multiplication where all frames have the same points."""
-    if len(points) > 1:
-        return matrices @ points
-    return (matrices.reshape(-1, 4) @ points[0]).reshape(len(matrices), 3, -1)
-
-
-@dataclass(frozen=True, eq=False)
-class Sampling:
-    """Frames per second, the times (T,) to evaluate, and metadata of both; whether the first follows the last."""
-
-    fps: float
-    times: np.ndarray
-    clock: dict[str, Any]
-    is_loop: bool = False
-
-
-def _sampling(motion: _Motion, wanted: float | None) -> Sampling:
-    scene, keys = motion.scene, motion.scene.keys
-    if not len(keys):
-        return Sampling(DEFAULT_FPS, np.zeros(1), {})
-    extras = _stated_extras(scene)
-    fps = wanted or _stated_rate(extras, keys) or key_rate(keys)
-    if fps is None:
-        fps = DEFAULT_FPS
-        warn_of_missed(keys, off_grid(keys, fps), fps, scene.file.path)
-    count = float(keys[-1] - keys[0]) * fps
-    if not count < MOST_FRAMES:
-        raise ClipError(f"animations: got {count:.0f} frames, expected at most {MOST_FRAMES}; sample at a lower rate")
-    scene.file.budget.take(32 * int(count), "animations")
-    is_loop = extras.get("loop") is True
-    frames = int(count + 0.02) + 1
-    if is_loop and frames > 1 and _returns(motion, keys):
-        frames = round(count)
-        if abs(count - frames) > 0.02:  # the time of all frames is that of the loop
-            fps *= frames / count
-    times = keys[0] + np.arange(frames) / fps
-    first = float(keys[0] * fps) + (extras["start_frame"] if _is_number(extras.get("start_frame")) else 0)
-    whole = round(first)
-    clock = {"fps": float(fps), "start_frame": whole if abs(first - whole) < 1e-3 else first}
-    return Sampling(float(fps), _on_keys(times, keys, fps), clock, is_loop)
-
-
-def _stated_extras(scene: Scene) -> dict[str, Any]:
-    """Return the extras: those of the file, overridden by those of the animation."""
-    items = [scene.file.json["asset"]]
-    if len(scene.played) == 1:
-        items.append(scene.file.item("animations", scene.played[0]))
-    return {
-        key: value for item in items if isinstance(item.get("extras"), dict) for key, value in item["extras"].items()
-    }
-
-
-def _returns(motion: _Motion, keys: np.ndarray) -> bool:
-    """Whether the last key has the pose of the first."""
-    first, last = motion.read(keys[[0, -1]]).astype(np.float64)
-    return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
-
-
-def _stated_rate(extras: dict, keys: np.ndarray) -> float | None:
-    """Return the frame rate that the file states, if its keys agree."""
-    fps = extras.get("fps")
-    return float(fps) if _is_number(fps) and 0 < fps < 1e6 and not off_grid(keys, fps).any() else None
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e15
-
-
-def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
-    """Times that are those of a key but for rounding become exactly it, which STEP asks for."""
-    after = np.clip(np.searchsorted(keys, times), 1, max(len(keys) - 1, 1))
-    right = keys[np.minimum(after, len(keys) - 1)]
-    nearest = np.where(np.abs(times - keys[after - 1]) <= np.abs(right - times), keys[after - 1], right)
-    return np.where(np.abs(nearest - times) * fps < 0.02, nearest, times)
 
 
 # ---- what does not move ----
@@ -766,7 +361,7 @@ def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.nd
 def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
     """The names of the animations that move these nodes, and of those that are not played."""
     names = list(_animation_numbers(scene.file))
-    movers = {node.index for node in nodes}.union(scene.ancestors(_movers(nodes)))
+    movers = {node.index for node in nodes}.union(scene.ancestors(moving_nodes(nodes)))
     played = [names[i] for i in scene.played if not movers.isdisjoint(scene.targets(i))]
     others = _other_animations(scene).get("animation")
     return ({"animations": played} if played else {}) | ({"other_animations": others} if others else {})
@@ -826,7 +421,7 @@ def _material_names(file: GltfFile) -> list[str]:
 
 
 def _attributes(
-    scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: _Motion, keeps_normals: bool
+    scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: NodeMotion, keeps_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
     was written with them."""
@@ -859,7 +454,7 @@ def _rigid_copies(part: list[GltfNode]) -> int:
     return len(part) if copies is None else 1 if part[0].targets else len(copies)
 
 
-def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: _Motion) -> np.ndarray:
+def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: NodeMotion) -> np.ndarray:
     pieces = {}
     for number, node in enumerate(nodes):
         if key in node.of_copies:
@@ -899,14 +494,9 @@ def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np
     return found_branches | {"branch_parent": np.array(parent, np.int64)}
 
 
-def _movers(nodes: list[GltfNode]) -> set[int]:
-    """Numbers of the joints that move vertices, and of the nodes without a skin."""
-    return {joint for node in nodes for joint in node.joints} | {node.index for node in nodes if node.skin is None}
-
-
 def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
     """The joints, or nodes, that vertices hang on; None where one node moves them all."""
-    movers = _movers(nodes)
+    movers = moving_nodes(nodes)
     order = [joint for joint in scene.order if joint in movers]
     copied = [node for node in nodes if node.copies is not None]
     if len(order) < 2 and not copied:

@@ -16,7 +16,7 @@ from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTE
 from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
 
 if TYPE_CHECKING:
-    from athcodec.sources.gltf import GltfNode
+    from athcodec.sources.gltf_nodes import GltfNode
 
 INSTANCING, LIGHTS, VARIANTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual", "KHR_materials_variants"
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
