@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], MotionClip]]:
-    """Clips that name branches, with what their figures depend on."""
+    """Yield clips that name branches, with what their figures depend on."""
     codec = fingerprint_of_athcodec()
     chosen = args.clips or (() if args.suite else SCENES)
     for name in (name for name in chosen if name in SCENES):
@@ -80,7 +80,7 @@ def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], Moti
 
 
 def _given(clip: MotionClip) -> dict[str, MotionClip]:
-    """The clip without branches, by what else it gives."""
+    """Return the clip without branches, by what else it gives."""
     if clip.polygons is not None:
         return {"faces": bare(clip).replace(edges=None)}
     points = {"points": bare(clip).replace(edges=None)}
@@ -105,7 +105,7 @@ def _shown(rows: Results) -> Results:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """What the figures show, in sentences for a document."""
+    """Return what the figures show, in sentences for a document."""
     rows = [row for row in contents["sizes"] if row["true"] >= LEAST_BYTES and row["bound"] == REL_ERROR]
     parts = []
     for knowledge, subject in (("faces", "meshes"), ("edges", "skeletons with edges"), ("points", "points alone")):

@@ -33,7 +33,7 @@ class Encoded:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
+    """Return the files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
     beside = path.parent.glob(f"{path.stem}.h5") if path.suffix == ".xdmf" else ()
     frames = numbered_files(path).paths if path.suffix in FRAME_SUFFIXES else ()
     return sorted({path, *frames, *beside})
@@ -78,7 +78,7 @@ def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> Non
 
 
 def file_and_seconds(clip: athcodec.MotionClip, **options: Any) -> tuple[bytes, float]:
-    """The file of a clip, and seconds of the processor."""
+    """Return the file of a clip, and seconds of the processor."""
     start = time.process_time()
     data = athcodec.encode(clip, **options)
     return data, time.process_time() - start
@@ -106,7 +106,7 @@ def encoded(
 def measure(
     clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None, frames: slice | None = None
 ) -> ErrorMeter:
-    """Errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
+    """Return errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
     meter = ErrorMeter(clip.rest)
     for start, block in decoder.blocks(level, frames=frames):
         meter.add(clip.block(start, start + len(block)), block)

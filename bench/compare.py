@@ -58,17 +58,17 @@ athcodec / the best others: {} / {}{}.
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
-    """Points with a file whose error is within their bound."""
+    """Point with a file whose error is within their bound."""
     return [point for point in points if point["status"] == OK]
 
 
 def sizes_of(points: Iterable[Point], clip: str) -> Sizes:
-    """A clip's measured points by codec and bound."""
+    """Return a clip's measured points by codec and bound."""
     return {(point["codec"], point["bound"]): point for point in measured(points) if point["clip"] == clip}
 
 
 def best_other(sizes: Sizes, bound: float) -> Point | None:
-    """The smallest file of another codec."""
+    """Return the smallest file of another codec."""
     others = [point for (_, at), point in sizes.items() if at == bound and point["kind"] != OURS]
     return min(others, key=lambda point: point["bytes"], default=None)
 
@@ -79,14 +79,14 @@ def exponent(bound: float) -> str:
 
 
 def short(codec: str) -> str:
-    """The name of a codec without what stands in brackets behind it."""
+    """Return the name of a codec without what stands in brackets behind it."""
     return codec.partition(" (")[0]
 
 
 def rows(
     clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]
 ) -> list[dict[str, Any]]:
-    """A row for each clip."""
+    """Return a row for each clip."""
     return [_row(clip, sizes_of(points, clip["clip"]), sorted(bounds, reverse=True)) for clip in clips]
 
 
@@ -121,7 +121,7 @@ def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict
 
 
 def _shown(sizes: Sizes, bounds: Collection[float]) -> tuple[list[Point], list[Point]]:
-    """The points of athcodec and the best ones of other codecs."""
+    """Return the points of athcodec and the best ones of other codecs."""
     points_of_athcodec = [point for (_, bound), point in sizes.items() if point["kind"] == OURS and bound in bounds]
     return points_of_athcodec, [best for bound in bounds if (best := best_other(sizes, bound))]
 
@@ -131,7 +131,7 @@ def _rounded(value: float | None) -> str:
 
 
 def _beside(size_of_athcodec: int | None, best: Point | None) -> str | None:
-    """The size and name of a file, and its ratio to ours; bold where it is smaller."""
+    """Return the size and name of a file, and its ratio to ours; bold where it is smaller."""
     if best is None:
         return None
     text = f"{best['bytes']:,} {short(best['codec'])}" + (
@@ -184,12 +184,13 @@ def _count_in_words(compared: int, smaller: int) -> str:
 
 
 def _percent(one: int, other: int) -> str:
-    """How far a size is from another one, in per cent of that."""
+    """Return how far a size is from another one, in per cent of that."""
     return f"{100 * abs(one / other - 1):.1f} %"
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """A row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are none."""
+    """Return a row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are
+    none."""
     points_of_clip = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
     columns = dict.fromkeys(
         exponent(bound) for bound in sorted({point["bound"] for point in points_of_clip}, reverse=True)
@@ -205,14 +206,14 @@ def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> l
 
 
 def suite_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) -> str:
-    """Sentences and the table of a suite, for a document."""
+    """Return sentences and the table of a suite, for a document."""
     clips, points = contents["clips"], contents["points"]
     table, caption = markdown(rows(clips, points, bounds)), " ".join(CAPTION.split())
     return "\n\n".join([losses(clips, points, bounds), table, caption]) + "\n"
 
 
 def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) -> str:
-    """Sentences and a table of all codecs for each clip, for a document."""
+    """Return sentences and a table of all codecs for each clip, for a document."""
     clips, points = contents["clips"], contents["points"]
     parts = [losses(clips, points, bounds)]
     for clip in (clip for clip in clips if "frames" in clip):
@@ -222,7 +223,7 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
 
 
 def overview_text(suites: Iterable[Mapping[str, Any]]) -> str:
-    """A table of a few clips at 1e-4, below its options, for readers who want one table."""
+    """Return a table of a few clips at 1e-4, below its options, for readers who want one table."""
     shown, points = [], ([], [])
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]

@@ -27,7 +27,7 @@ class Curve:
         return len(self.errors)
 
     def size_at(self, error: float) -> float | None:
-        """The size at an error, on the straight line between its neighbours; None beyond the curve's ends."""
+        """Return the size at an error, on the straight line between its neighbours; None beyond the curve's ends."""
         if not len(self) or not self.errors[0] <= error <= self.errors[-1]:
             return None
         return float(np.exp(np.interp(np.log(error), np.log(self.errors), np.log(self.sizes))))

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _encoded(folder: Path) -> dict[str, Path]:
-    """Files of the clips that do not ship as such."""
+    """Return files of the clips that do not ship as such."""
     made = {}
     for name, source, bound in (
         ("growth", athcodec.sample_path("growth"), 1e-4),

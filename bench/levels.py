@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _same_nodes(result: Encoded) -> Ath:
-    """The paper's ATH with the thresholds of the file."""
+    """Return the paper's ATH with the thresholds of the file."""
     hierarchy = result.decoder.file.hierarchy
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
     stored, computed = result.decoder.file.table1(), ath.table1()
@@ -138,7 +138,7 @@ def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> di
 
 
 def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, float | None]:
-    """How much worse than the level before, and than the source's own second differences, a level is."""
+    """Return how much worse than the level before, and than the source's own second differences, a level is."""
     before, this = levels[max(level - 1, 0)], levels[level]
     pairs = (this.max_error, before.max_error), (this.rms_error, before.rms_error)
     worse = max(ratio / other if other else float(ratio > 0) for ratio, other in pairs)
@@ -149,7 +149,7 @@ def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, fl
 
 
 def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
-    """A line if a level is worse than the one before it, or jerks."""
+    """Return a line if a level is worse than the one before it, or jerks."""
     limits = {"of the one before": 1.0} | ({} if may_jerk else {"second difference": 2.0})
     return [
         f"{path.name}, level {row['level']}: got {row[name]:.3f} {name}; expected at most {limit:g}"
@@ -159,7 +159,7 @@ def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
 
 
 def _broken_lines(path: Path, stored: Level, error: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
-    """A line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
+    """Return a line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
     is_last = stored.level == decoder.file.level_count - 1
     allowed = decoder.file.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
     if error.max_error <= allowed:
@@ -171,7 +171,7 @@ def _broken_lines(path: Path, stored: Level, error: ErrorMeter, decoder: athcode
 
 
 def _file_row(name: str, result: Encoded) -> dict[str, Any]:
-    """What the levels of a file are worth in each of its clips."""
+    """Return what the levels of a file are worth in each of its clips."""
     decoder, last = result.decoder, result.decoder.levels[-1].bytes
     parts = [decoder.play(clip.name) for clip in decoder.file.clips]
     return {
@@ -186,7 +186,7 @@ def _file_row(name: str, result: Encoded) -> dict[str, Any]:
 
 
 def _worst_ratio(part: athcodec.Decoder) -> float:
-    """The largest ratio of the errors of a level to those of the level before."""
+    """Return the largest ratio of the errors of a level to those of the level before."""
     pairs = [
         (getattr(after, name), getattr(before, name))
         for before, after in pairwise(part.levels)
@@ -196,7 +196,8 @@ def _worst_ratio(part: athcodec.Decoder) -> float:
 
 
 def _foot_drift(result: Encoded) -> float | None:
-    """How far any foot that stands still moves at any level, over the extent of its plant; None: no foot does."""
+    """Return how far any foot that stands still moves at any level, over the extent of its plant; None: no foot
+    does."""
     hierarchy, clip, decoder = result.decoder.file.hierarchy, result.clip, result.decoder
     roots = np.flatnonzero(hierarchy.branch_parent < 0)
     starts = hierarchy.first_vertex[roots]
@@ -216,7 +217,7 @@ def _foot_drift(result: Encoded) -> float | None:
 
 
 def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
-    """A line for each thing that a file should have and has not."""
+    """Return a line for each thing that a file should have and has not."""
     lines = []
     if row["of the one before"] > 1:
         lines.append(f"{row['of the one before']:.3f} of the level before in a clip; expected at most 1")
@@ -271,7 +272,7 @@ class _Joints:
         return int((self.decoder.file.tables.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
-        """Largest and RMS gap over these frames and all joints."""
+        """Return largest and RMS gap over these frames and all joints."""
         if not len(self.measured):
             return Gaps(0.0, 0.0)
         squares = np.array([self._squares(frame) for frame in frames])

@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _own_files(path: Path, rel_error: float) -> dict[str, Curve]:
-    """Sizes of files of their own by each measure of their error."""
+    """Return sizes of files of their own by each measure of their error."""
     rows = []
     for bound in _bounds(rel_error):
         with encoded(path, bound) as result:
@@ -123,6 +123,6 @@ def _ratios(prefixes: list[dict[str, Any]], curve: Curve) -> Iterator[float]:
 
 
 def _at(error: float, kind: str, prefixes: list[dict[str, Any]], curve: Curve) -> tuple[dict[str, Any], float] | None:
-    """The shortest prefix of at most this error, and the size of a file of its own of this error."""
+    """Return the shortest prefix of at most this error, and the size of a file of its own of this error."""
     prefix, size = next((row for row in prefixes if row[kind] <= error), None), curve.size_at(error)
     return (prefix, size) if prefix and size else None

@@ -190,6 +190,6 @@ SHOWN = {
 
 
 def sections() -> Iterator[tuple[Path, str, str]]:
-    """Every table: document, name and text."""
+    """Yield every table: document, name and text."""
     for name, shown in SHOWN.items():
         yield ROOT / shown.document, name, shown.text()

@@ -79,7 +79,7 @@ class Mesh:
         return Mesh(np.ascontiguousarray(self.positions[:, vertices]), faces, self.time)
 
     def apart(self) -> Mesh:
-        """Each face with vertices of its own."""
+        """Return each face with vertices of its own."""
         is_there = self.faces >= 0
         corners = self.faces[is_there]
         faces = np.full(self.faces.shape, -1, np.int32)
@@ -92,8 +92,8 @@ class Mesh:
 
 
 def places_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """The first vertex of each place, ascending, and the (N,) place of each vertex: found by sorting all coordinates,
-    not as the encoder does."""
+    """Return the first vertex of each place, ascending, and the (N,) place of each vertex: found by sorting all
+    coordinates, not as the encoder does."""
     rows = np.ascontiguousarray(mesh.positions.transpose(1, 0, 2)).reshape(mesh.positions.shape[1], -1) + 0.0
     whole = rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
     _, first, place = np.unique(whole, return_index=True, return_inverse=True)
@@ -126,7 +126,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _meshes(name: str, mesh: Mesh) -> Iterator[tuple[str, Mesh]]:
-    """A clip with shared places as it is, another one split; each with its faces, if it has any, and without."""
+    """Yield a clip with shared places as it is, another one split; each with its faces, if it has any, and without."""
     first, _ = places_of(mesh)
     if len(first) == mesh.positions.shape[1]:
         if mesh.faces is None:
@@ -164,7 +164,7 @@ def _rows(mesh: Mesh, rel_error: float) -> Iterator[dict[str, Any]]:
 
 
 def _decoded(split: bytes, welded: bytes, place: np.ndarray) -> tuple[bool, float, float]:
-    """Whether both files give the same bits, the ratio of their times, and seconds of decoding the split one."""
+    """Return whether both files give the same bits, the ratio of their times, and seconds of decoding the split one."""
 
     def one(data: bytes) -> np.ndarray:
         with athcodec.open(data) as decoder:

@@ -77,7 +77,7 @@ def _bound(scene: Scene, rel_error: float) -> float:
 
 
 def _branches(data: bytes) -> list[int]:
-    """Roots and branches of a file."""
+    """Return roots and branches of a file."""
     with athcodec.open(data) as decoder:
         parent = decoder.file.hierarchy.branch_parent
         return [int((parent < 0).sum()), len(parent)]

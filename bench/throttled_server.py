@@ -48,7 +48,7 @@ class ThrottledServer(ThreadingHTTPServer):
         return f"http://127.0.0.1:{self.server_address[1]}/"
 
     def page(self, name: str | None = None, **more: str) -> str:
-        """The viewer's address with a file, which it shows without the story of its first seconds."""
+        """Return the viewer's address with a file, which it shows without the story of its first seconds."""
         query = ([f"file=/{name}"] if name else []) + [
             f"{key}={value}" for key, value in ({"intro": "off"} | more).items()
         ]

@@ -21,7 +21,7 @@ Part = tuple[int, str]  # A number of bytes, and what they say.
 
 
 def lines(data: bytes) -> Iterator[str]:
-    """The dump of a file, line by line."""
+    """Yield the dump of a file, line by line."""
     at = 0
     for size, text in parts(data):
         words = textwrap.wrap(text, TEXT_WIDTH)
@@ -95,7 +95,7 @@ def described(file, chunk: tuple, content: bytes) -> Iterator[Part]:
 
 
 def rows(file, level: int, segment: int) -> str:
-    """The rows that STEMS of a level adds for the first piece."""
+    """Return the rows that STEMS of a level adds for the first piece."""
     plan = rules.plans_of(file, level)[0]
     motion = rules.decode_motion(file, plan, segment, level)
     piece = plan.pieces[0]

@@ -63,7 +63,7 @@ class Growing:
         return self.add(parent, joint, points.reshape(-1, 3), around)
 
     def leaf(self, parent: int, joint: np.ndarray, size: float, mirrored: bool) -> int:
-        """Quads and triangles; all leaves are the same shape, turned, scaled and mirrored."""
+        """Return quads and triangles; all leaves are the same shape, turned, scaled and mirrored."""
         rows = np.array([[0.0, 0.0], [0.3, 0.25], [0.6, 0.35], [0.8, 0.2]])
         shape = np.array([[x, y * side, 0.2 * x * x + 0.1 * side * y] for x, y in rows for side in (-1, 0, 1)])
         turn = np.linalg.qr(self.random.normal(size=(3, 3)))[0]
@@ -73,7 +73,7 @@ class Growing:
 
 
 def tree(seed: int = 3) -> Growing:
-    """A trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
+    """Return a trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
     plant = Growing(seed)
     random = plant.random
     trunk = plant.tube(-1, np.zeros(3), np.array([0.1, 0.0, 3.0]), 14, 0.08)
@@ -100,7 +100,7 @@ def tree(seed: int = 3) -> Growing:
 
 
 def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float, gust: float) -> np.ndarray:
-    """(frames, vertices, 3): branches turn about where they hang, and carry others along."""
+    """Return (frames, vertices, 3): branches turn about where they hang, and carry others along."""
     time = np.linspace(0.0, 1.0, frames, endpoint=False)
     gusts = plant.random.normal(size=frames) * gust
     turned: list[tuple[np.ndarray, np.ndarray]] = []  # For each branch: matrix and shift of each frame.
@@ -121,7 +121,7 @@ def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float,
 
 
 def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: bool) -> np.ndarray:
-    """(frames, 3, 3) about two axes."""
+    """Return (frames, 3, 3) about two axes."""
     a, c = (
         wind * size * np.sin(2 * np.pi * (turns * k * time) + phase * b)
         for size, k, phase in ((0.08, 1, 0.7), (0.3 if flutters else 0.04, 3, 1.9))
@@ -133,7 +133,7 @@ def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: boo
 
 
 def clip(name: str) -> Any:
-    """A wind in which poses are held, at times of their own, and a loop."""
+    """Return a wind in which poses are held, at times of their own, and a loop."""
     import athcodec
     from athcodec.motion.clip import MotionClip
 
@@ -179,8 +179,8 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """As athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest pose,
-    and one moves about its exact rest pose."""
+    """Return as athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest
+    pose, and one moves about its exact rest pose."""
     import athcodec
     from athcodec.encoding.search import start
     from athcodec.encoding.search.search import Search
@@ -202,7 +202,7 @@ def encoded(name: str) -> bytes:
 
 
 def features(data: bytes) -> set[str]:
-    """What a file uses of the format."""
+    """Return what a file uses of the format."""
     opened = File(data, strict=True)
     file, header = opened.file, opened.header
     of_refinements = file.parts.height + 1  # above it STEMS begin with Ratio

@@ -129,7 +129,7 @@ def _target(output: str, name: str) -> str:
 
 
 def _stem(name: str, path: str) -> str:
-    """A name without its suffix, and without the place of the numbers of a series: walk_####.obj is walk."""
+    """Return a name without its suffix, and without the place of the numbers of a series: walk_####.obj is walk."""
     head, tail = posixpath.split(name)
     series = NUMBER_PATTERN.fullmatch(tail) if not is_url(path) and is_pattern(path) else None
     if series:  # prefix, place, width, and what is behind it with the suffix
@@ -187,7 +187,7 @@ def _clip_suffixes() -> tuple[str, ...]:
 
 
 def _fixed_part(pattern: str, separator: str) -> str:
-    """The directory before the first wildcard."""
+    """Return the directory before the first wildcard."""
     parts = pattern.split(separator)
     first = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     return separator.join(parts[:first]) or (separator if pattern.startswith(separator) else "")
@@ -229,7 +229,7 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def download(url: str, path: str) -> str:
-    """Fetches a file, whole; its SHA-256. Raises RemoteError, OSError."""
+    """Fetch a file, whole; its SHA-256. Raises RemoteError, OSError."""
     system, source = file_system(url)
     try:
         system.get_file(source, path)
@@ -241,7 +241,7 @@ def download(url: str, path: str) -> str:
 
 
 def upload(path: str, url: str) -> dict[str, Any]:
-    """Stores an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
+    """Store an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
     try:
         others = system.exists(target) and system.cat_file(target, start=0, end=len(MAGIC)) not in (b"", MAGIC)
@@ -261,8 +261,8 @@ def upload(path: str, url: str) -> dict[str, Any]:
 
 
 def identity(item: Item) -> dict[str, Any]:
-    """Size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats that
-    spread over several files, others than numbered series, only the named file counts. Raises OSError."""
+    """Return size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats
+    that spread over several files, others than numbered series, only the named file counts. Raises OSError."""
     if is_url(item.input):
         known = remote_identity(item.input)
     else:
@@ -272,7 +272,7 @@ def identity(item: Item) -> dict[str, Any]:
 
 
 def is_telling(known: dict[str, Any]) -> bool:
-    """Whether an identity would show that a file has changed, though not its size."""
+    """Return whether an identity would show that a file has changed, though not its size."""
     return any(name in known for name in ("mtime_ns", *TAGS))
 
 

@@ -209,7 +209,7 @@ def _manifest_path(output: FilePath, manifest: FilePath | None) -> str:
 
 
 def _tidy(outputs: Iterable[str]) -> None:
-    """Removes the unfinished files of workers that were stopped."""
+    """Remove the unfinished files of workers that were stopped."""
     folders: dict[str, list[str]] = {}
     for output in outputs:
         folder, name = os.path.split(output)
@@ -265,7 +265,7 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 
 
 def _cluster(workers: int) -> Any:
-    """Processes on this machine, with one thread each. Raises SchedulerError."""
+    """Process on this machine, with one thread each. Raises SchedulerError."""
     import dask
     import distributed
 

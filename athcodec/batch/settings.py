@@ -139,13 +139,13 @@ def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str
 
 
 def loop_frames(settings: Settings) -> int | None:
-    """How many frames of a clip are blended to make a loop of it; None where it is to be none."""
+    """Return how many frames of a clip are blended to make a loop of it; None where it is to be none."""
     blend = settings.get("loop_blend", 0)
     return blend if settings.get("loop", blend > 0) else None
 
 
 def reading_options(settings: Settings) -> dict[str, Any]:
-    """Keywords of athcodec.read."""
+    """Return keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
     if options.get("rest") == HOST:  # how it is stored
         del options["rest"]
@@ -155,7 +155,7 @@ def reading_options(settings: Settings) -> dict[str, Any]:
 
 
 def coding_options(settings: Settings) -> dict[str, Any]:
-    """Keywords of athcodec.encode."""
+    """Return keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:
         options["host_rest"] = True

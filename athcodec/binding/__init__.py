@@ -307,7 +307,7 @@ class OntoMesh(ArrayLike):
 
 
 def _same_times(times: np.ndarray, others: np.ndarray) -> bool:
-    """Whether frames are at the same times, within half a frame."""
+    """Return whether frames are at the same times, within half a frame."""
     return len(times) == 1 or bool((np.abs(times - others) < 0.5 * np.abs(np.diff(others)).min()).all())
 
 
@@ -484,7 +484,7 @@ def _refuse_far_mesh(
 
 
 def _is_in_last_frame(view: ClipView, rest: np.ndarray) -> bool:
-    """Whether a mesh lies on the plant as it is in the clip's last frame."""
+    """Return whether a mesh lies on the plant as it is in the clip's last frame."""
     last = view.decoder.at_level(None).positions(-1, dtype=np.float64)
     distance = scipy_module("spatial").cKDTree(last).query(rest)[0]
     return bool((distance > FAR * np.linalg.norm(np.ptp(last, axis=0))).mean() < FITS)

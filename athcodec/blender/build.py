@@ -93,7 +93,7 @@ def platform(wheel: Path) -> str:
 
 
 def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
-    """Wheels of what is needed and not given, for each platform and Python, by pip."""
+    """Return wheels of what is needed and not given, for each platform and Python, by pip."""
     missing = [name for name in NEEDED if not any(wheel.name.startswith(f"{name}-") for wheel in wheels)]
     if not missing:
         return []

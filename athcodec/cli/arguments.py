@@ -46,7 +46,7 @@ class _Parser(argparse.ArgumentParser):
     """Whose messages are shown as all others are: they quote arguments, such as names of files."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
-        """The arguments; of those that a verb does not know, it is the verb whose usage is shown."""
+        """Return the arguments; of those that a verb does not know, it is the verb whose usage is shown."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -691,7 +691,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _counted(text: str) -> tuple[str, float]:
-    """A file and how many of it: FILE or FILE=COUNT."""
+    """Return a file and how many of it: FILE or FILE=COUNT."""
     file, equals, count = text.rpartition("=")
     return (file, _above_zero(count)) if equals else (text, 4.0)
 
@@ -780,7 +780,7 @@ def _positive_length(text: str) -> Length:
 
 
 def _rest_error(text: str) -> float | str:
-    """A fraction, a length with its unit, or OF_BOUND."""
+    """Return a fraction, a length with its unit, or OF_BOUND."""
     from athcodec.encoding.options.shape import RestPrecision  # heavy, as all that encodes is
 
     option = float(text) if re.fullmatch(r"[\d.]+([eE][+-]?\d+)?", text) else text

@@ -98,7 +98,7 @@ def print_demo(facts: dict[str, Any], diagonal: float) -> None:
 
 
 def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> dict[str, Any]:
-    """The files that are there now, and what their format costs."""
+    """Return the files that are there now, and what their format costs."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
     facts = {
         name: written.facts[name]

@@ -167,13 +167,13 @@ def batch(args: argparse.Namespace) -> int:
 
 
 def _listed(path: str) -> list[str]:
-    """Inputs from a file, one per line; "-" is stdin."""
+    """Return inputs from a file, one per line; "-" is stdin."""
     with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
         return [line.rstrip("\r\n") for line in file if line.strip()]
 
 
 def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a clip that options of the command line give."""
+    """Return the settings of a clip that options of the command line give."""
     from athcodec.batch.settings import BOUNDS, READING
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
@@ -298,7 +298,7 @@ def _bound(moving: OntoMesh, path: str) -> Written:
 
 
 def _goes_back(args: argparse.Namespace) -> bool:
-    """Whether a GLB with motions is to be written as a copy of it, with morph targets."""
+    """Return whether a GLB with motions is to be written as a copy of it, with morph targets."""
     is_gltf = (args.format or Path(args.output).suffix.lower()) in ("gltf", ".glb")
     is_plain = args.animation != "joints" and args.rig is None and not args.instances and not _blurs(args)
     return is_gltf and args.onto is None and is_plain

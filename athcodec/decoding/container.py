@@ -146,12 +146,13 @@ class Header:
 
 
 def is_prelude(kind: Any) -> Any:
-    """Whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
+    """Return whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
     return (kind & KIND_ID) < 16
 
 
 def is_motion(kind: Any) -> Any:
-    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved ones."""
+    """Return whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved
+    ones."""
     return (kind & KIND_ID) // 16 == 1
 
 
@@ -181,7 +182,7 @@ class Chunk:
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """All in front of the chunks; the header gets their count and File_Length.
+    """Return all in front of the chunks; the header gets their count and File_Length.
 
     errors: (levels, segments, 3) in scene units, of the measures in their order; they are rounded up.
     """
@@ -226,7 +227,7 @@ def short_floats(lengths: np.ndarray) -> np.ndarray:
 
 
 def from_short_float(stored: int) -> float:
-    """The length of which the error table stores this, scene units."""
+    """Return the length of which the error table stores this, scene units."""
     return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
 
 

@@ -63,7 +63,7 @@ Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
 def main() -> None:
-    """Takes a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
+    """Take a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
     pipe = sys.stdin.buffer
     motion, instanced = pickle.load(pipe)
     try:
@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def _samples(pipe: BinaryIO) -> Iterator[tuple[Any, ...]]:
-    """Frames as exporters.samples gives them."""
+    """Yield frames as exporters.samples gives them."""
     with suppress(EOFError):
         while True:
             yield pickle.load(pipe)
@@ -127,7 +127,7 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
 
 
 def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
-    """Writes the visibility of an object, or of each of its copies, to the transforms above them."""
+    """Write the visibility of an object, or of each of its copies, to the transforms above them."""
     if obj.shown is None or obj.shown.shape[1] > len(places):
         return
     for place, shown in zip(places, np.broadcast_to(obj.shown, (len(obj.shown), len(places))).T):
@@ -140,7 +140,7 @@ def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
 def _add_instanced(
     root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
 ) -> list[Any]:
-    """Writes the shape below the transform of the first copy, and an instance of it below that of each other one.
+    """Write the shape below the transform of the first copy, and an instance of it below that of each other one.
     Returns these transforms."""
     matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # Matrices act on row vectors.
     linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]

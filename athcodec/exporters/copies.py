@@ -64,14 +64,14 @@ def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
 
 
 def one_copy(obj: SceneObject) -> SceneObject:
-    """The first copy as an object of its own."""
+    """Return the first copy as an object of its own."""
     (counts, indices), copies = obj.faces, obj.copies
     faces = counts[: len(counts) // copies], indices[: len(indices) // copies]
     return replace(obj, count=obj.count // copies, faces=faces, curves=obj.curves[: len(obj.curves) // copies])
 
 
 def rows_of_one(rows: np.ndarray, obj: SceneObject) -> np.ndarray | None:
-    """The rows of the first copy, of those of a static array; None where others have other ones."""
+    """Return the rows of the first copy, of those of a static array; None where others have other ones."""
     each = rows.reshape(obj.copies, -1, *rows.shape[1:])
     return each[0] if (each == each[:1]).all() else None
 
@@ -101,7 +101,7 @@ class _Fit:
         )
 
     def add(self, start: int, frames: np.ndarray) -> None:
-        """Fits the next frames."""
+        """Fit the next frames."""
         copies = self.copies
         points = frames[:, self._rows].astype(np.float64).reshape(len(frames), copies.places.shape[1], -1, 3)
         for frame, placed in enumerate(points, start):
@@ -109,7 +109,7 @@ class _Fit:
             copies.max_error = max(copies.max_error, error)
 
     def _placed(self, points: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
-        """Places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
+        """Place, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
         middle = points.mean(axis=1)
         away = points - middle[:, None]
         linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / len(self._local))

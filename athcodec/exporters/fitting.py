@@ -38,7 +38,8 @@ OF_CLIP = 1e-4  # Tolerance over the clip's size, for clips without levels.
 
 
 def allowed_error(motion: Motion) -> float:
-    """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
+    """Return how far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its
+    size."""
     size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
     return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, ClipView) else OF_CLIP * size
 
@@ -74,7 +75,7 @@ class Parts:
         return cls(order, first, count, middle, axes, spread, extent)
 
     def vertex_part(self) -> np.ndarray:
-        """(N,) the part of each vertex of the clip, 0 where none holds it."""
+        """Return (N,) the part of each vertex of the clip, 0 where none holds it."""
         out = np.zeros(len(self.order), np.int64)
         for part, (first, count) in enumerate(zip(self.first, self.count)):
             out[self.order[first : first + count]] = part
@@ -144,8 +145,8 @@ class Mapped:
 def fit(
     motion: Motion, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Moving | None:
-    """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`.
-    chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
+    """Return the parts of a motion, cut until none is further off than `allowed`; None where that takes more than
+    `most`. chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
     rest = np.asarray(motion.rest, np.float64)
     order, first, count = _ranges(motion)
     if chosen is not None:
@@ -172,7 +173,7 @@ def fit(
 
 
 def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """An order of the vertices, and ranges of it that are the parts to begin with."""
+    """Return an order of the vertices, and ranges of it that are the parts to begin with."""
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return (
@@ -202,7 +203,7 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 def _fitted(
     motion: Motion, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
+    """Place (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
     that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
     starts, part = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
@@ -233,7 +234,7 @@ def _fitted(
 
 
 def portions(motion: Motion, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]:
-    """The blocks of a motion, in portions for work on that many of its vertices."""
+    """Yield the blocks of a motion, in portions for work on that many of its vertices."""
     step = max(1, WORK_BYTES // (vertex_count * 24))
     for start, frames in motion.blocks():
         for first in range(0, len(frames), step):

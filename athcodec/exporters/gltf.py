@@ -205,7 +205,7 @@ def _morphs_fit(motion: Motion, offset_count: int) -> bool:
 
 
 def check_morphs(motion: Motion, offset_count: int) -> None:
-    """Raises ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
+    """Raise ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
     if not _morphs_fit(motion, offset_count):
         raise ClipError(
             f"morph targets: got {motion.frame_count} frames of {offset_count} positions and normals, expected at most "
@@ -290,7 +290,7 @@ class _Joined:
 
 
 def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 4) joints and their weights."""
+    """Return (n, 4) joints and their weights."""
     vertex_joints = np.zeros((len(source), 4), dtype)
     if joints.weights is None:
         weights = np.zeros(vertex_joints.shape, np.uint8)
@@ -303,7 +303,7 @@ def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.nda
 
 
 def _keys(take: Take, values: np.ndarray) -> np.ndarray:
-    """The clip's of all frames, (n, J, width); a loop returns to its first rotation the shorter way."""
+    """Return the clip's of all frames, (n, J, width); a loop returns to its first rotation the shorter way."""
     keys = take.of(values)
     if take.is_loop and values.shape[2] == 4:
         keys[-1] *= np.where((keys[-1] * keys[-2]).sum(axis=1, keepdims=True) < 0, np.float32(-1), np.float32(1))
@@ -374,7 +374,7 @@ class _Morphed:
     def _add_targets(
         self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int
     ) -> list[list[dict[str, Any]]]:
-        """The accessors of positions, by frame and mesh, whose bounds are not known yet."""
+        """Return the accessors of positions, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for _ in range(self._motion.frame_count):
             accessors.append([])

@@ -64,7 +64,7 @@ class Glb:
         self._length = 0
 
     def node(self, parent: int | None = None, **values: Any) -> int:
-        """A node below another, or of the scene."""
+        """Return a node below another, or of the scene."""
         self.json["nodes"].append(values)
         index = len(self.json["nodes"]) - 1
         above = (
@@ -76,7 +76,7 @@ class Glb:
         return index
 
     def view(self, size: int, **values: Any) -> int:
-        """A buffer view of the next `size` bytes of the binary chunk."""
+        """Return a buffer view of the next `size` bytes of the binary chunk."""
         self.json["bufferViews"].append({"buffer": 0, "byteOffset": self._length, "byteLength": size} | values)
         self._length += size
         if self._length > LARGEST_GLB:
@@ -84,13 +84,13 @@ class Glb:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, view: int, dtype: np.dtype, count: int, width: int, **values: Any) -> int:
-        """The number of a new accessor of (count, width) values in a buffer view; values: further entries."""
+        """Return the number of a new accessor of (count, width) values in a buffer view; values: further entries."""
         kind = {"bufferView": view, "componentType": COMPONENTS[dtype.name], "count": count, "type": TYPES[width]}
         self.json["accessors"].append(kind | values)
         return len(self.json["accessors"]) - 1
 
     def array(self, values: np.ndarray, bounds: bool = False, normalized: bool = False, **view: Any) -> int:
-        """An accessor of its own for (count, width) values; those of vertices are padded to whole words."""
+        """Return an accessor of its own for (count, width) values; those of vertices are padded to whole words."""
         values = np.ascontiguousarray(values.reshape(len(values), -1))
         more: dict[str, Any] = {"normalized": True} if normalized else {}
         if bounds:
@@ -108,7 +108,7 @@ class Glb:
         return self.accessor(index, values.dtype, count, width, **more)
 
     def stored(self, values: np.ndarray) -> int:
-        """A buffer view of an array, for accessors of its parts."""
+        """Return a buffer view of an array, for accessors of its parts."""
         index = self.view(values.nbytes)
         self._append(values.tobytes())
         return index
@@ -221,7 +221,7 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
 def add_mesh(
     glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None, **primitive: Any
 ) -> int:
-    """Adds a mesh to the file, in its rest pose (N, 3)."""
+    """Add a mesh to the file, in its rest pose (N, 3)."""
     semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
     for key, values in (mesh.attributes | dict(attributes or {})).items():
         is_ratio = key == COLOUR or key.startswith("WEIGHTS_")
@@ -299,8 +299,8 @@ class Take:
 
 
 def takes(motion: Motion) -> list[Take]:
-    """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
-    apart."""
+    """Return an animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot
+    tell apart."""
     clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
     return [
         _take(motion, clip_range, start, stop)
@@ -343,7 +343,7 @@ def branch_extras(motion: Motion) -> dict[str, Any]:
 
 
 def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """Fans over the polygons: (F, 3) places among the corners."""
+    """Return fans over the polygons: (F, 3) places among the corners."""
     counts = np.asarray(counts, np.int64)
     starts, fans = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     first = np.repeat(starts, fans)
@@ -389,7 +389,7 @@ def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 
 def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
-    """As glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
+    """Return as glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
     if semantic == COLOUR and values.dtype in (np.uint8, np.uint16):
         return values
     if values.dtype.kind != "f" or not np.isfinite(values).all():
@@ -422,7 +422,7 @@ def _as_component(values: np.ndarray) -> np.ndarray | None:
 def _split(
     corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray], vertex_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
+    """Return the vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
     if not per_corner or not len(corner_vertex):
         return np.arange(vertex_count), corner_vertex
     rows = [corner_vertex.astype("<i8").view(np.uint8).reshape(-1, 8)]

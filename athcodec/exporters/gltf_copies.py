@@ -61,7 +61,7 @@ class GltfCopies:
     names: list[str] | None = None
 
     def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
-        """The mesh and its nodes, below one with a transform; those that move."""
+        """Return the mesh and its nodes, below one with a transform; those that move."""
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
         is_still = all((pose == pose[:1]).all() for pose in poses)
@@ -90,8 +90,9 @@ class GltfCopies:
 
 
 def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
-    """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
-    and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all lose."""
+    """Return the meshes, those that are copies of one shape as such: where transforms keep them within what the level
+    is off, and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all
+    lose."""
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
     if sum(len(run) for run in runs) != len(meshes):
         return list(meshes), {}
@@ -114,7 +115,7 @@ def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh |
 
 
 def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
-    """Objects side by side that have as many vertices in the same faces; each other one alone."""
+    """Yield objects side by side that have as many vertices in the same faces; each other one alone."""
     run: list[SceneObject] = []
     for obj in objects:
         if run and not _is_alike(run[0], obj):
@@ -135,7 +136,7 @@ def _is_alike(one: SceneObject, other: SceneObject) -> bool:
 
 
 def _together(run: list[SceneObject]) -> SceneObject:
-    """Objects side by side as copies of the first."""
+    """Return objects side by side as copies of the first."""
     first, last = run[0], run[-1]
     if len(run) == 1:
         return first
@@ -153,7 +154,7 @@ def _together(run: list[SceneObject]) -> SceneObject:
 
 
 def _joined(shapes: list[GltfMesh]) -> GltfMesh:
-    """One mesh of several, which are drawn alike."""
+    """Return one mesh of several, which are drawn alike."""
     if len(shapes) == 1:
         return shapes[0]
     starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
@@ -231,5 +232,5 @@ def _same(values: np.ndarray, expected: np.ndarray) -> bool:
 
 
 def _plain(row: np.ndarray) -> Any:
-    """As JSON has it."""
+    """Return as JSON has it."""
     return row[0].item() if len(row) == 1 else row.tolist()

@@ -22,7 +22,8 @@ Reference = tuple[str, Any, Any]
 
 
 def _references(gltf: dict[str, Any]) -> Iterator[Reference]:
-    """Every index of the file's arrays into each other, but those of meshes, animations and what these do not need."""
+    """Yield every index of the file's arrays into each other, but those of meshes, animations and what these do not
+    need."""
     for scene in gltf.get("scenes", ()):
         yield from _each("nodes", scene, "nodes")
     for node in gltf.get("nodes", ()):
@@ -82,7 +83,7 @@ def used_numbers(gltf: dict[str, Any]) -> dict[str, set[int]]:
 
 
 def prune(gltf: dict[str, Any], before: dict[str, set[int]], needless: set[int]) -> None:
-    """Removes these nodes, and what was referred to before and is no more."""
+    """Remove these nodes, and what was referred to before and is no more."""
     _remove(gltf, "skins", before["skins"] - used_numbers(gltf)["skins"])
     for holder, key in [(scene, "nodes") for scene in gltf.get("scenes", ())] + [
         (node, "children") for node in gltf["nodes"]
@@ -119,7 +120,7 @@ class Binary:
         self._views_before = copy.deepcopy(self._json.get("bufferViews", []))
 
     def add(self, data: bytes, **view: Any) -> int:
-        """A buffer view of these bytes."""
+        """Return a buffer view of these bytes."""
         self._json.setdefault("bufferViews", []).append(
             {"buffer": 0, "byteOffset": self._start + len(self._added), "byteLength": len(data)} | view
         )
@@ -131,7 +132,7 @@ class Binary:
         self._old = self._old[:start] + data + self._old[start + len(data) :]
 
     def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
-        """An accessor of (count, width) values of vertices, each padded to whole words."""
+        """Return an accessor of (count, width) values of vertices, each padded to whole words."""
         width, item = values.shape[1], values.itemsize * values.shape[1]
         padded = np.zeros((len(values), item + -item % 4), np.uint8)
         padded[:, :item] = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), item)
@@ -148,7 +149,7 @@ class Binary:
         return len(self._json["accessors"]) - 1
 
     def array(self, values: np.ndarray, target: int | None = None) -> int:
-        """An accessor of (count, 1) numbers without gaps, with its bounds."""
+        """Return an accessor of (count, 1) numbers without gaps, with its bounds."""
         index = self.attribute(values, bounds=True)
         view = self._json["bufferViews"][self._json["accessors"][index]["bufferView"]]
         del view["target"]
@@ -156,7 +157,7 @@ class Binary:
         return index
 
     def packed(self, gltf: dict[str, Any]) -> bytes:
-        """The bytes without those that only views had which are gone; the views' offsets become those in it."""
+        """Return the bytes without those that only views had which are gone; the views' offsets become those in it."""
         data = bytes(self._old).ljust(self._start, b"\0") + bytes(self._added)
         needless = np.zeros(len(data) + 1, bool)
         for holder in _byte_ranges(self._views_before):

@@ -130,7 +130,7 @@ class Into:
             raise ClipError("got another file than when it was opened, expected the same")
 
     def _motion(self, view: int, ath: bytes, animations: list[dict[str, Any]]) -> dict[str, Any]:
-        """Clips begin when their animations' first keys do, and keep what these say in extras."""
+        """Return clips begin when their animations' first keys do, and keep what these say in extras."""
         extras = {animation.get("name"): animation.get("extras") for animation in animations}
         clips = []
         with AthFile(io.BytesIO(ath)) as file:
@@ -208,14 +208,14 @@ class Into:
         self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
 
     def _faces(self, part: GltfNode, primitive: dict[str, Any]) -> np.ndarray:
-        """The triangles of a primitive, (F, 3), as they are to face in the motion's space."""
+        """Return the triangles of a primitive, (F, 3), as they are to face in the motion's space."""
         rows = triangles(self._file, primitive, part.count)
         return rows[:, ::-1] if part.mirrored.any() and not self._keep else rows
 
     def _dress(
         self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: Binary
     ) -> None:
-        """Gives primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
+        """Give primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
         if all("material" in primitive for primitive, _ in drawn):
             return
         faces = np.concatenate([rows for _, rows in drawn])
@@ -242,7 +242,7 @@ class Into:
                 each |= _drawn(binary, material) if further else {}
 
     def _material(self, look: Look, has_colours: bool) -> int:
-        """The number of a material, which is added where the file has not got it."""
+        """Return the number of a material, which is added where the file has not got it."""
         materials, material = self._json.setdefault("materials", []), material_of(look, has_colours)
         if material not in materials:
             materials.append(material)
@@ -251,7 +251,7 @@ class Into:
         return materials.index(material)
 
     def _attributes(self, part: GltfNode, binary: Binary) -> dict[str, int]:
-        """The attributes of a part that change, as new accessors."""
+        """Return the attributes of a part that change, as new accessors."""
         accessors = {}
         rest = self.clip.source_rest[self._vertices(part)]
         positions = part.attributes["POSITION"]
@@ -287,7 +287,7 @@ class Into:
 
 
 def _drawn(binary: Binary, faces: np.ndarray) -> dict[str, int]:
-    """The members of a primitive that draws these triangles, (F, 3)."""
+    """Return the members of a primitive that draws these triangles, (F, 3)."""
     return {"indices": binary.array(faces.reshape(-1, 1).astype(np.uint32), INDICES), "mode": 4}
 
 
@@ -399,7 +399,7 @@ def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion
 def _morph_nodes(
     gltf: dict[str, Any], binary: Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, dict]
 ) -> set[int]:
-    """Animates the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
+    """Animate the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
     them before goes. Returns the nodes that nothing needs any more."""
     moved = {id(primitive) for primitive, _ in places}
     moving = {
@@ -466,7 +466,7 @@ def _few_twins(kind: np.ndarray) -> bool:
 
 
 def _kinds(kind: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """(N,) from 0 on, the same where `kind` and positions (N, 3) are."""
+    """Return (N,) from 0 on, the same where `kind` and positions (N, 3) are."""
     table = np.concatenate([kind[:, None], positions.astype(np.float32).view("<i4").astype(np.int64)], axis=1)
     rows = np.ascontiguousarray(table).view(f"V{table.dtype.itemsize * table.shape[1]}").ravel()
     return np.unique(rows, return_inverse=True)[1].ravel()
@@ -490,7 +490,7 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
 
 
 def _drop_channels(gltf: dict[str, Any], moving: set[int], meshes: set[int], needless: set[int]) -> None:
-    """Removes the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
+    """Remove the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
 
     def stays(target: Target | str) -> bool:
         if isinstance(target, str):
@@ -524,7 +524,8 @@ def _has_pointer(channel: dict[str, Any]) -> bool:
 
 
 def _knows_references(gltf: dict[str, Any]) -> bool:
-    """Whether _references lists every index of the file: not where pointers to places in it remain, which are text."""
+    """Return whether _references lists every index of the file: not where pointers to places in it remain, which are
+    text."""
     return all(name.startswith(KNOWN) and name != POINTER for name in gltf.get("extensionsUsed", ()))
 
 

@@ -228,7 +228,7 @@ class Sink:
         self._error: BaseException | None = None
 
     def check(self) -> None:
-        """Raises the first error met; an OSError with the name of the file."""
+        """Raise the first error met; an OSError with the name of the file."""
         if isinstance(self._error, OSError):
             raise OSError(self._error.errno, self._error.strerror, self._path)
         if self._error is not None:

@@ -116,14 +116,15 @@ def _commonest(kinds: np.ndarray) -> str:
 
 
 def _named(motion: Motion) -> tuple[np.ndarray, list[str]]:
-    """(F,) the material of each face among the names of the clip's materials, -1 for none; and these names."""
+    """Return (F,) the material of each face among the names of the clip's materials, -1 for none; and these names."""
     count = 0 if motion.polygons is None else len(motion.polygons[0])
     labels, names = face_materials(motion) or _surfaces(motion) or (np.full(count, -1), [])
     return np.where(labels < len(names), np.maximum(labels, -1), -1), names
 
 
 def _surfaces(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
-    """Stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above 1."""
+    """Return stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above
+    1."""
     stated, uv = motion.metadata.get("surfaces"), motion.attributes.get("uv")
     names = stated.split(", ") if isinstance(stated, str) else []
     is_known = len(names) == 2 and names[0] in STEM_SURFACES and names[1] in LEAF_SURFACES

@@ -41,7 +41,7 @@ def domain_of(motion: Motion, name: str) -> str:
 
 
 def has_mesh(motion: Motion) -> bool:
-    """Whether there are faces or edges to write."""
+    """Return whether there are faces or edges to write."""
     return _count_polygons(motion) > 0 or (motion.edges is not None and len(motion.edges) > 0)
 
 
@@ -76,7 +76,7 @@ def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
 
 
 def _has_obj_colors(motion: Motion) -> bool:
-    """Whether a clip has colours as OBJ has them: three floats for each vertex."""
+    """Return whether a clip has colours as OBJ has them: three floats for each vertex."""
     colors = motion.attributes.get("colors")
     fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f"
     return fits and domain_of(motion, "colors") == "vertex"
@@ -117,7 +117,7 @@ class ObjWriter:
 
 
 def _obj_tail(motion: Motion) -> list[str]:
-    """All lines behind those of v."""
+    """Return all lines behind those of v."""
     uv, per_corner = _corner_uv(motion)
     lines = [] if uv is None else [f"vt {u:.9g} {v:.9g}\n" for u, v in uv.tolist()]
     faces = _obj_faces(motion, uv is not None, per_corner)
@@ -148,13 +148,13 @@ def _first_corners(motion: Motion) -> np.ndarray | None:
 
 
 def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
-    """The part of each vertex; None where they do not come in the order of the parts."""
+    """Return the part of each vertex; None where they do not come in the order of the parts."""
     parts = np.searchsorted(stops, [] if vertices is None else vertices, side="right")
     return parts if (np.diff(parts) >= 0).all() else None
 
 
 def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
-    """A line per face, behind the lines of the group and the material that it is the first of."""
+    """Return a line per face, behind the lines of the group and the material that it is the first of."""
     if not _count_polygons(motion):
         return []
     counts, corners = motion.polygons
@@ -217,7 +217,7 @@ class PlyWriter:
 
 
 def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
-    """The numbers that every vertex has beside its position, one column each."""
+    """Return the numbers that every vertex has beside its position, one column each."""
     columns: dict[str, np.ndarray] = {}
     for name, values in motion.attributes.items():
         if domain_of(motion, name) != "vertex" or len(values) != motion.vertex_count or name == "normals":
@@ -266,7 +266,7 @@ def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
 
 
 def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:
-    """Faces of `size` corners each."""
+    """Return faces of `size` corners each."""
     fields = [("count", number), ("corners", "<i4", (size,))]
     if uv is not None:
         fields += [("numbers", number), ("uv", "<f4", (2 * size,))]

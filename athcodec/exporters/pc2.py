@@ -85,7 +85,7 @@ def _write_frames(motion: Motion, file: BinaryIO, dtype: str, report: Progress) 
 
 
 def _mesh_to_write(motion: Motion, target: Path) -> str:
-    """The name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
+    """Return the name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
     if not has_mesh(motion):
         return ""
     mesh_path = target.with_suffix(".obj")

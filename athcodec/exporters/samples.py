@@ -92,7 +92,7 @@ def _is_loop(motion: Any) -> bool:
 
 
 def _frame_time(motion: Any) -> float:
-    """The mean time of a frame in seconds, after which the first frame of a loop follows its last."""
+    """Return the mean time of a frame in seconds, after which the first frame of a loop follows its last."""
     return float(motion.time[-1] - motion.time[0]) / (motion.frame_count - 1)
 
 
@@ -172,8 +172,8 @@ def velocities_of_copies(
 
 
 def _steps(motion: Any) -> np.ndarray:
-    """(T,) the seconds that each frame follows the one before; of the first frame those that it follows the last one of
-    a loop, else NaN."""
+    """Return (T,) the seconds that each frame follows the one before; of the first frame those that it follows the last
+    one of a loop, else NaN."""
     return np.append(_frame_time(motion) if _is_loop(motion) else np.nan, np.diff(motion.time))
 
 

@@ -50,7 +50,7 @@ class SceneObject:
 
 
 def objects_of(motion: Motion) -> list[SceneObject]:
-    """The objects of a motion, in the order of their vertices; one of all where it does not say."""
+    """Return the objects of a motion, in the order of their vertices; one of all where it does not say."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     face_indices = np.asarray(face_indices, np.int64)
@@ -97,7 +97,7 @@ def lost_arrays(motion: Motion, kept: Collection[str]) -> dict[str, dict[str, li
 
 
 def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
-    """The names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
+    """Return the names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
@@ -113,7 +113,7 @@ def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
 
 
 def is_double_sided(details: Any) -> bool:
-    """Whether the faces of an object with such details in "part_usd" are seen from both sides."""
+    """Return whether the faces of an object with such details in "part_usd" are seen from both sides."""
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
@@ -145,7 +145,7 @@ def _copies(motion: Motion, object_count: int) -> list[int]:
 
 
 def _repeats(obj: SceneObject, copies: int) -> bool:
-    """Whether vertices, faces and curves are those of the first copy again and again."""
+    """Return whether vertices, faces and curves are those of the first copy again and again."""
     counts, indices = obj.faces
     if obj.count % copies or len(counts) % copies or len(indices) % copies or len(obj.curves) % copies:
         return False
@@ -157,7 +157,7 @@ def _repeats(obj: SceneObject, copies: int) -> bool:
 
 
 def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
+    """Return (F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
     counts = np.diff(corners)
     of_corner = np.searchsorted(ends, indices, "right")
     faces = np.repeat(np.arange(len(counts)), counts)
@@ -169,7 +169,7 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
 
 
 def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
-    """Names, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
+    """Name, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
@@ -192,7 +192,7 @@ def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[di
 
 
 def _fits(motion: Motion, counts: np.ndarray) -> bool:
-    """Whether every face is of one object, and the faces are in the order of the objects."""
+    """Return whether every face is of one object, and the faces are in the order of the objects."""
     if motion.polygons is None:
         return True
     face_counts, indices = motion.polygons
@@ -216,8 +216,9 @@ def _kind(motion: Motion, counts: np.ndarray, index: int) -> str:
 
 
 def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
-    """Vertices per curve where runs of vertices that are neighbours in the numbering and joined by edges make curves
-    of two and more, else None. Further edges, where a branch begins at its parent, are not seen in the curves."""
+    """Return vertices per curve where runs of vertices that are neighbours in the numbering and joined by edges make
+    curves of two and more, else None. Further edges, where a branch begins at its parent, are not seen in the
+    curves."""
     links = np.asarray(edges, np.int64)
     links = links[(links >= start).all(axis=1) & (links < stop).all(axis=1)]
     neighbours = links[np.abs(np.diff(links, axis=1)[:, 0]) == 1]
@@ -248,8 +249,8 @@ def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterato
 
 
 def face_materials(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
-    """(F,) the material of each face, among the names; outside them where it has none. None where the clip says it of
-    no face."""
+    """Return (F,) the material of each face, among the names; outside them where it has none. None where the clip says
+    it of no face."""
     labels, names = motion.attributes.get(FACE_MATERIAL), motion.metadata.get(MATERIAL_NAMES)
     count = 0 if motion.polygons is None else len(motion.polygons[0])
     if labels is None or not isinstance(names, list) or labels.shape != (count,) or labels.dtype.kind not in "iu":
@@ -258,7 +259,7 @@ def face_materials(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
 
 
 def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.ndarray]]:
-    """The materials that faces have, (F,), and which faces these are."""
+    """Return the materials that faces have, (F,), and which faces these are."""
     return [(int(label), np.flatnonzero(labels == label)) for label in np.unique(labels) if 0 <= label < len(names)]
 
 
@@ -280,7 +281,7 @@ def domain_of(motion: Motion, name: str, values: np.ndarray, domains: dict[str, 
 
 
 def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
-    """The rows of a static array that belong to an object."""
+    """Return the rows of a static array that belong to an object."""
     rows = {"vertex": obj.vertices, "corner": obj.corner_rows, "face": obj.face_rows, "constant": slice(0, 1)}
     return values[rows[domain]]
 
@@ -298,7 +299,7 @@ def own_arrays(motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> Itera
 
 
 def distinct(names: Iterable[str]) -> list[str]:
-    """The names, each made different from those before it by a number behind it."""
+    """Return the names, each made different from those before it by a number behind it."""
     names_used: dict[str, None] = {}
     for wanted in names:
         name, number = wanted, 1

@@ -71,7 +71,7 @@ class Surface:
         return neighbour
 
     def _face_vectors(self, positions: np.ndarray) -> np.ndarray:
-        """(F, 3): normals of the faces, as long as these are large."""
+        """Return (F, 3): normals of the faces, as long as these are large."""
         points = np.asarray(positions, np.float64)[self._corners]
         away = points - points[self._first[self._face]]
         return _sums(np.cross(away, away[self._next]) / 2, self._face, self._face_count)
@@ -155,7 +155,8 @@ class MovingNormals:
         return (moved - normals).astype(np.float32)
 
     def _frames(self, positions: np.ndarray) -> np.ndarray:
-        """(N, 3, 3): of each vertex its normal, the direction of an edge across that, and what is across both."""
+        """Return (N, 3, 3): of each vertex its normal, the direction of an edge across that, and what is across
+        both."""
         points = np.asarray(positions, np.float64)
         normals = self._surface.normals(points)
         along = points[self._surface.neighbours] - points

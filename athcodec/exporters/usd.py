@@ -115,7 +115,7 @@ def _saying(path: str) -> Iterator[None]:
 
 
 def _convert(binary: str, target: str, suffix: str) -> None:
-    """Converts the binary file that was written to the wanted kind; only that remains."""
+    """Convert the binary file that was written to the wanted kind; only that remains."""
     if suffix == ".usda":
         text = f"{binary}.usda"
         _must(Sdf.Layer.FindOrOpen(binary).Export(text), binary)
@@ -173,7 +173,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
 
 
 def _time_codes(motion: Motion) -> np.ndarray:
-    """(T,) of all frames; of several clips each from 0 on."""
+    """Return (T,) of all frames; of several clips each from 0 on."""
     if len(motion.clip_ranges) < 2:
         return distinct_frame_numbers(motion)
     times = (np.asarray(motion.time[start:stop], np.float64) for start, stop in motion.clip_range_frames)
@@ -216,7 +216,7 @@ def _write_assembly(
     codes: np.ndarray,
     report: Progress,
 ) -> dict[str, Any]:
-    """As Nanite Assemblies are laid out, see usd_nanite.py."""
+    """Return as Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
     UsdSkel.Root.Define(stage, nanite.BASE)
     names = distinct(("base", *(_identifier(obj.name) for obj in objects)))[1:]
@@ -300,7 +300,7 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
 
 
 def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
-    """Sets the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
+    """Set the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
     that have colours keep these, which are written with the clip's other arrays."""
     colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
     if obj.kind == "mesh":
@@ -320,7 +320,7 @@ def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
 
 
 def _set_normals(obj: SceneObject, motion: Motion, normals: np.ndarray) -> None:
-    """Sets the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
+    """Set the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
     if obj.kind == "mesh" and "normals" not in motion.attributes:
         attribute = obj.target.CreateNormalsAttr(_vec3(normals))
         obj.target.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
@@ -328,7 +328,7 @@ def _set_normals(obj: SceneObject, motion: Motion, normals: np.ndarray) -> None:
 
 
 def _normals_of_one(motion: Motion, obj: SceneObject, copies: Copies, looks: Looks) -> np.ndarray:
-    """The normals of the shape of which an object's vertices are copies."""
+    """Return the normals of the shape of which an object's vertices are copies."""
     return looks.surface.unit_normals(motion.rest)[obj.vertices][: len(copies.shape)] @ copies.axes
 
 
@@ -423,7 +423,7 @@ def _int_array(values: np.ndarray) -> Vt.IntArray:
 
 
 def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
-    """Writes those that belong to vertices, corners and faces; returns the others, with their domains."""
+    """Write those that belong to vertices, corners and faces; returns the others, with their domains."""
     left = {}
     domains = motion.metadata.get("domains", {})
     for name, values in motion.attributes.items():
@@ -465,8 +465,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
 
 
 def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, np.ndarray] | None:
-    """The schema that takes the rows of an object, and those that it takes: of copies those of one, where all have the
-    same, or one for each, where it has the same throughout. None where neither is so."""
+    """Return the schema that takes the rows of an object, and those that it takes: of copies those of one, where all
+    have the same, or one for each, where it has the same throughout. None where neither is so."""
     if obj.copies == 1 or domain == "constant":
         return obj.target, rows
     shared = rows_of_one(rows, obj)
@@ -479,7 +479,7 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar."""
+    """Return as widths of curves and points; of meshes as a primvar."""
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
     if any(place is None or place[0] is not obj.target for place, obj in zip(placed, objects)):
         return False
@@ -553,7 +553,7 @@ def _write_frames(
 
 
 def _whole(obj: SceneObject) -> Any:
-    """The schema that all its vertices are under."""
+    """Return the schema that all its vertices are under."""
     return obj.target if obj.copies == 1 else obj.instancer
 
 

@@ -56,7 +56,7 @@ def parts_of(motion: Motion, objects: list[SceneObject], joints: Joints) -> dict
 
 
 def _joint_of_copies(obj: SceneObject, joints: Joints) -> np.ndarray:
-    """(k,) the joint that has the largest part in each copy."""
+    """Return (k,) the joint that has the largest part in each copy."""
     weights = np.zeros((obj.copies, len(joints.bind)))
     copy = np.repeat(np.arange(obj.copies), obj.count // obj.copies)
     assert joints.weights is not None
@@ -66,7 +66,7 @@ def _joint_of_copies(obj: SceneObject, joints: Joints) -> np.ndarray:
 
 
 def mark_root(root: Usd.Prim) -> None:
-    """Makes the prim an assembly of a skeletal mesh, whose skeleton is that of the base."""
+    """Make the prim an assembly of a skeletal mesh, whose skeleton is that of the base."""
     _apply(root, ROOT_SCHEMA)
     kind = root.CreateAttribute(
         "unreal:naniteAssembly:meshType", Sdf.ValueTypeNames.Token, False, Sdf.VariabilityUniform
@@ -81,7 +81,7 @@ def _apply(prim: Usd.Prim, schema: str) -> None:
 
 
 def define_part(stage: Usd.Stage, place: str, name: str) -> str:
-    """The instancer's prototype, without its mesh; returns where that goes."""
+    """Return the instancer's prototype, without its mesh; returns where that goes."""
     UsdGeom.PointInstancer.Define(stage, place)
     prototype = f"{place}/Prototypes/{name}"
     UsdSkel.Root.Define(stage, prototype)
@@ -128,7 +128,8 @@ def _bind_instances(prim: Usd.Prim, names: list[str]) -> None:
 
 
 def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, parts: dict[int, Part]) -> float:
-    """How far instances that move as their joints do are off, at most; or the rest of the rig, if that is more."""
+    """Return how far instances that move as their joints do are off, at most; or the rest of the rig, if that is
+    more."""
     largest = joints.max_error
     for number, part in parts.items():
         turns = rotation_matrices(part.copies.turns[0].astype(np.float64)) * part.copies.scales[0][:, None, :]
@@ -143,7 +144,7 @@ def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, pa
 
 
 def _world(joints: Joints, frame: int) -> np.ndarray:
-    """(J, 4, 4) what each joint does to vertices at rest."""
+    """Return (J, 4, 4) what each joint does to vertices at rest."""
     matrices = np.tile(np.eye(4), (len(joints.bind), 1, 1))
     matrices[:, :3, :3] = rotation_matrices(joints.poses[1][frame].astype(np.float64))
     matrices[:, :3, 3] = joints.poses[0][frame]
@@ -155,7 +156,7 @@ def _world(joints: Joints, frame: int) -> np.ndarray:
 
 
 def wind_of(motion: Motion, joints: Joints) -> str:
-    """The JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
+    """Return the JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
     hierarchy = hierarchy_to_rig(motion)
     order = np.empty(len(joints.vertex_joint), np.int64)
     order[hierarchy.vertex_source] = np.repeat(hierarchy.branch_depth, hierarchy.stem_count)

@@ -19,7 +19,7 @@ SKELETON = "skeleton"
 def write_rig(
     stage: Usd.Stage, place: str, motion: Motion, joints: Joints, objects: list[SceneObject], codes: np.ndarray
 ) -> None:
-    """Adds below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
+    """Add below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
     all frames, (T,), which begin again with each clip."""
     skeleton = UsdSkel.Skeleton.Define(stage, f"{place}/{SKELETON}")
     paths = _paths(joints)

@@ -69,7 +69,7 @@ class _Writer:
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
     def write(self, report: Progress) -> ElementTree.Element:
-        """The XML, once all numbers are in the HDF5 file."""
+        """Return the XML, once all numbers are in the HDF5 file."""
         motion, root = self._motion, ElementTree.Element("Xdmf", Version="3.0")
         domain = ElementTree.SubElement(root, "Domain")
         for key in ("fps", "start_frame", "unit", "up_axis"):
@@ -159,7 +159,8 @@ class _Writer:
 
 
 def _mixed(cells: Cells) -> np.ndarray:
-    """The stream of a topology of several types: number of the type, number of nodes where that varies, nodes."""
+    """Return the stream of a topology of several types: number of the type, number of nodes where that varies,
+    nodes."""
     parts, start = [], 0
     counted = {VTK_NUMBERS[name] for name in ("line", "vertex", "polygon")}
     for kind, stop in zip(cells.types.tolist(), cells.stops.tolist()):

@@ -144,7 +144,8 @@ def second_differences(frames: np.ndarray, axis: int = 0) -> np.ndarray:
 
 
 def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
-    """How much more a motion jerks at its seams than usually: the largest acceleration near a seam over the median.
+    """Return how much more a motion jerks at its seams than usually: the largest acceleration near a seam over the
+    median.
 
     Parameters
     ----------

@@ -294,7 +294,7 @@ class _AllUnchanged:
 
 
 def _joined(parts: Sequence[Any]) -> Frames:
-    """Positions of several clips, one after the other."""
+    """Return positions of several clips, one after the other."""
     ranges = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
     dtype = np.result_type(*(part.dtype for part in parts))
 
@@ -317,7 +317,8 @@ def _run(positions: Any, first: int, last: int) -> Frames:
 
 
 def _blended(positions: Any, blend: int) -> Frames:
-    """All but the last `blend` frames; the first ones are blended from the frames that follow the new last one."""
+    """Return all but the last `blend` frames; the first ones are blended from the frames that follow the new last
+    one."""
     frame_count, dtype = positions.shape[0] - blend, positions.dtype
 
     def read(start: int, stop: int) -> np.ndarray:

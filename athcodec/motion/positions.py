@@ -124,7 +124,7 @@ def order_of(shape: Sequence[int], facts: Facts, order: Order | None = None) -> 
 
 
 def is_possible(shape: Sequence[int], order: Order | None = None) -> bool:
-    """Whether an array of this shape can have this order, or any."""
+    """Return whether an array of this shape can have this order, or any."""
     if order is None:
         return any(_possible(tuple(shape)))
     try:
@@ -190,7 +190,7 @@ def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
 
 
 def looks_turned(positions: Any, facts: Facts) -> bool:
-    """Whether frames look like paths of vertices, so that the array probably has vertices first.
+    """Return whether frames look like paths of vertices, so that the array probably has vertices first.
 
     A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If each frame is much
     smaller than the paths, and its points follow each other more closely than those of a path, frames and vertices have
@@ -278,7 +278,7 @@ def conflicts(shape: Sequence[int], facts: Facts, order: Order = USUAL) -> list[
 
 
 def _confirm(shape: Sequence[int], facts: Facts) -> bool:
-    """Whether the facts fit frames and vertices of this shape, and not the other way round."""
+    """Return whether the facts fit frames and vertices of this shape, and not the other way round."""
     swapped: Order = (USUAL[1], USUAL[0], USUAL[2])
     return not conflicts(shape, facts) and bool(conflicts(shape, facts, swapped))
 

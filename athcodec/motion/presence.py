@@ -17,7 +17,7 @@ FAR = 1.1  # Ratio of the diagonals with and without a hidden part above which t
 
 
 def frame_runs(shown: np.ndarray) -> list[list[int]]:
-    """The [first, stop] frames of each run of True in `shown` (T,)."""
+    """Return the [first, stop] frames of each run of True in `shown` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]])))
     return edges.reshape(-1, 2).tolist()
 
@@ -34,7 +34,7 @@ def _are_runs(runs: Any) -> bool:
 
 
 def presence_within(metadata: Mapping[str, Any], frames: range) -> dict[str, Any]:
-    """The metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
+    """Return the metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
     if PRESENCE not in metadata:
         return dict(metadata)
     cut = {}
@@ -70,8 +70,8 @@ def presence_of_parts(
 
 
 def parts_hidden_far_away(clip: Any) -> list[str]:
-    """The names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times as
-    long. Reads every frame of a MotionClip that has presence."""
+    """Return the names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times
+    as long. Reads every frame of a MotionClip that has presence."""
     counts, names = clip.attributes.get("part_vertex_counts"), clip.metadata.get("part_names")
     if not stated_presence(clip.metadata) or counts is None or np.shape(counts) != np.shape(names):
         return []

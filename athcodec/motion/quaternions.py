@@ -12,7 +12,7 @@ def normalized(quaternions: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
+    """Return (..., 3, 3) of unit quaternions (..., 4), x y z w."""
     x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
     rows = [
         1 - 2 * (y * y + z * z),
@@ -29,7 +29,7 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 
 def quaternions(rotations: np.ndarray) -> np.ndarray:
-    """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
+    """Return (..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
     m = np.moveaxis(rotations, (-2, -1), (0, 1))
     squares = np.stack(
         [

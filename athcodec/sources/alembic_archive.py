@@ -74,7 +74,7 @@ BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, Unicod
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """The clip in an archive. Raises ClipError."""
+    """Return the clip in an archive. Raises ClipError."""
     unchanged = FileWatch(path)
     try:
         clip = _clip(Abc.IArchive(path), options)
@@ -106,7 +106,7 @@ class _Track:
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def at(self, time: float) -> list[tuple[int, float]]:
-        """Numbers of samples and their weights."""
+        """Return numbers of samples and their weights."""
         after = int(np.searchsorted(self.times, time))
         low = max(0, after - 1)
         high = min(after, len(self.times) - 1)
@@ -163,7 +163,7 @@ class _Place:
         yield from (each.track for each in (*self.xforms, *self.visibilities))
 
     def shown(self, times: np.ndarray) -> np.ndarray:
-        """(T,) whether the object is shown: the nearest that says anything decides."""
+        """Return (T,) whether the object is shown: the nearest that says anything decides."""
         stated = np.full(len(times), -1)
         for visibility in self.visibilities:
             stated = np.where(stated < 0, visibility.at(times), stated)
@@ -175,7 +175,7 @@ class _Place:
         return self.shown(np.unique([0.0, *(time for each in self.visibilities for time in each.track.times)])).any()
 
     def matrix(self, time: float) -> np.ndarray:
-        """(4, 4) to the world."""
+        """Return (4, 4) to the world."""
         matrix = np.eye(4)
         for xform in self.xforms:
             matrix = matrix @ xform.at(time)
@@ -253,7 +253,8 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
 
 
 def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
-    """All objects that are read, those of instances too; adds the others to not_read, by the names of their kinds."""
+    """Return all objects that are read, those of instances too; adds the others to not_read, by the names of their
+    kinds."""
     objects, visited, refused = [], 0, list[str]()
     waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
@@ -296,7 +297,7 @@ def _is_named(child: Any, patterns: Sequence[str]) -> bool:
 
 
 def _together(objects: list[_Object]) -> list[_Object]:
-    """Instances of one object, whose shape stays as it is, as copies at the place of the first."""
+    """Return instances of one object, whose shape stays as it is, as copies at the place of the first."""
     by_source: dict[str, _Object] = {}
     remaining = []
     for obj in objects:
@@ -312,7 +313,7 @@ def _together(objects: list[_Object]) -> list[_Object]:
 
 
 def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]) -> _Place:
-    """Adds an object that has points and is shown; returns where its children hang."""
+    """Add an object that has points and is shown; returns where its children hang."""
     name = _schema(child)
     if unread := _unread_properties(child):
         not_read.setdefault("attribute", []).extend(f"{child.getFullName()}.{each}" for each in unread)
@@ -340,7 +341,7 @@ def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_rea
 
 
 def _unread_properties(child: Any) -> list[str]:
-    """The names of properties beside the schema of an object, and, of a transform, of what users add to it."""
+    """Return the names of properties beside the schema of an object, and, of a transform, of what users add to it."""
     if child.isInstanceRoot() or child.isInstanceDescendant():
         return []  # They are named where the instance's source stands.
     schema = (child.getHeader().getMetaData().get("schemaObjTitle") or "").rpartition(":")[2]
@@ -380,7 +381,7 @@ def _visibility(child: Any) -> Iterator[_Visibility]:
 
 
 def _follow_ids(obj: _Object) -> None:
-    """Notes the ids of points that stand in another order in some sample."""
+    """Note the ids of points that stand in another order in some sample."""
     samples = obj.schema.getIdsProperty() if obj.kind == "points" else None
     if samples is None or not samples.valid() or samples.isConstant():
         return
@@ -412,7 +413,7 @@ def _topology(obj: _Object) -> None:
 
 
 def _name_unread(obj: _Object) -> None:
-    """Names the properties of an object that hold something and are not read."""
+    """Name the properties of an object that hold something and are not read."""
     for name in UNREAD:
         prop = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
         if prop.valid() and prop.getNumSamples():
@@ -433,7 +434,7 @@ def _bind_materials(obj: _Object) -> None:
 
 
 def _fixed(obj: _Object, values: Any) -> np.ndarray:
-    """Integers that are the same in every frame; ClipError where they change."""
+    """Return integers that are the same in every frame; ClipError where they change."""
     first = np.array(values.getValue(), np.int32)
     if values.isConstant():
         return first
@@ -451,7 +452,7 @@ def _fixed(obj: _Object, values: Any) -> np.ndarray:
 
 
 def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
-    """Seconds of the frames in the archive, and frames per second, None where nothing says it."""
+    """Return seconds of the frames in the archive, and frames per second, None where nothing says it."""
     tracks = [track for obj in objects for track in obj.tracks()]
     if not tracks:
         return np.zeros(1), fps
@@ -468,7 +469,8 @@ def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.
 
 
 def _rate(archive: Any, step: float, times: np.ndarray) -> float:
-    """The rate of the samples; where their steps differ, the one that the archive states for the tool that made it."""
+    """Return the rate of the samples; where their steps differ, the one that the archive states for the tool that made
+    it."""
     stated = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
     rate = 1 / step if step > 0 else float(stated) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
@@ -544,7 +546,7 @@ def _own_properties(schema: Any) -> Any:
 
 
 def _is_own(schema: Any) -> bool:
-    """Whether a transform is the one above everything in a file of ours, which only turns Z up into Y up."""
+    """Return whether a transform is the one above everything in a file of ours, which only turns Z up into Y up."""
     return _own_properties(schema) is not None
 
 
@@ -592,7 +594,7 @@ def _points(obj: _Object, time: float) -> np.ndarray:
 
 
 def _sample(obj: _Object, number: int) -> np.ndarray:
-    """(n, 3) points of a sample."""
+    """Return (n, 3) points of a sample."""
     when = obj.track.sample(number)
     points = np.array(obj.points.getValue(when), np.float32).reshape(-1, 3)
     if obj.ids is None:
@@ -602,6 +604,6 @@ def _sample(obj: _Object, number: int) -> np.ndarray:
 
 
 def _matrix(obj: _Object, time: float) -> np.ndarray:
-    """(4, 4) to the world; of what has instances (copies, 4, 4)."""
+    """Return (4, 4) to the world; of what has instances (copies, 4, 4)."""
     matrices = np.stack([place.matrix(time) for place in obj.places])
     return matrices if len(matrices) > 1 else matrices[0]

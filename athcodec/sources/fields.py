@@ -39,19 +39,19 @@ class Steps(Protocol):
     elsewhere: Mapping[str, str]
 
     def points(self, step: int) -> np.ndarray:
-        """(N, 2) or (N, 3) points of the mesh."""
+        """Return (N, 2) or (N, 3) points of the mesh."""
 
     def fields(self) -> Sequence[str]:
-        """The names of the fields per point."""
+        """Return the names of the fields per point."""
 
     def field(self, step: int, name: str) -> np.ndarray:
-        """(N, ...) values of a field."""
+        """Return (N, ...) values of a field."""
 
     def fixed_points(self) -> bool:
-        """Whether all steps have the points of the first."""
+        """Return whether all steps have the points of the first."""
 
     def check(self, step: int) -> None:
-        """Raises ClipError where the cells are others than in the first step."""
+        """Raise ClipError where the cells are others than in the first step."""
 
 
 def clip_of_steps(
@@ -151,7 +151,7 @@ def _names_of_static(static: Mapping[str, np.ndarray], steps: Steps) -> dict[str
 
 
 def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None) -> list[str]:
-    """The kind of each part."""
+    """Return the kind of each part."""
     if len(parts) == 1:
         return [kind_of(faces, edges)]
     stops = np.cumsum([part.point_count for part in parts])
@@ -163,7 +163,7 @@ def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, e
 
 
 def _padded(points: np.ndarray) -> np.ndarray:
-    """(N, 3) of (N, 2) or (N, 3)."""
+    """Return (N, 3) of (N, 2) or (N, 3)."""
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.dtype.kind not in "fiu":
         raise ClipError(f"points: got {points.dtype} of shape {points.shape}, expected two or three numbers each")
     return points if points.shape[1] == 3 else np.pad(points, ((0, 0), (0, 1)))
@@ -175,7 +175,7 @@ def _dtype(*arrays: np.ndarray) -> type:
 
 
 def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptions) -> str | None:
-    """The name of the field to add to the points; None: they move themselves."""
+    """Return the name of the field to add to the points; None: they move themselves."""
     names = list(steps.fields())
     others = _listed([f"{key} ({place})" for key, place in steps.elsewhere.items()])
     listed = _listed(names) + (f"; not per point: {others}" if steps.elsewhere else "")

@@ -73,7 +73,7 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
 
 
 def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[GltfNode], Placement]:
-    """The clip of what moves alone, its nodes, and how they lie in the space of the clip.
+    """Return the clip of what moves alone, its nodes, and how they lie in the space of the clip.
 
     Where nodes or skins leave meshes together as they are stored but for one matrix, the space is that of the meshes:
     the rest pose has their very numbers. Closes nothing. Raises ClipError.
@@ -116,12 +116,12 @@ class Placement:
         self._motion = NodeMotion(scenes[0], nodes, self.from_world)
 
     def _preference(self, node: GltfNode) -> tuple[bool, int]:
-        """The largest mesh keeps its place, of those that can."""
+        """Return the largest mesh keeps its place, of those that can."""
         hangs = node.skin is None and any(scene.animates({node.index}) for scene in self._scenes)
         return not hangs, node.count
 
     def stays(self, index: int) -> bool:
-        """Whether what a node shows lies in this space, at all times."""
+        """Return whether what a node shows lies in this space, at all times."""
         scene = self._scenes[0]
         matrix = scene.matrices(scene.ancestors({index}), None)[index][0]
         off = np.abs(matrix - self.space).max()
@@ -130,22 +130,22 @@ class Placement:
         )
 
     def is_always_shown(self, index: int) -> bool:
-        """Whether a node is visible at all keys of all takes."""
+        """Return whether a node is visible at all keys of all takes."""
         return all(scene.shown(index, scene.keys).all() for scene in self._scenes)
 
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
-        """(n, 3) unit directions at a node's vertices, in this space without animation."""
+        """Return (n, 3) unit directions at a node's vertices, in this space without animation."""
         return self._motion.turned(node, directions, is_normal)
 
 
 def _moves(scene: Scene, node: GltfNode) -> bool:
-    """Whether an animation that is played moves its vertices."""
+    """Return whether an animation that is played moves its vertices."""
     joints = [node.index] if node.skin is None else indices(scene.file.item("skins", node.skin), "joints")
     return scene.morphs(node.index) or scene.animates(set(joints))
 
 
 def _has_motion(node: GltfNode) -> bool:
-    """Whether a motion of ATH_motion moves it already."""
+    """Return whether a motion of ATH_motion moves it already."""
     return any(extension_of(primitive) is not None for primitive in node.primitives)
 
 
@@ -210,8 +210,8 @@ def _clip(
 
 
 def _rest_pose(motion: NodeMotion, nodes: Sequence[GltfNode]) -> np.ndarray:
-    """(N, 3) the scene without animation. Where joints leave a mesh as it is stored, these are its very numbers, which
-    others who read the file have too: products of matrices round."""
+    """Return (N, 3) the scene without animation. Where joints leave a mesh as it is stored, these are its very numbers,
+    which others who read the file have too: products of matrices round."""
     rest = motion.read(None)[0]
     for node in nodes:
         if node.copies is not None:
@@ -232,7 +232,7 @@ def _positions(motion: NodeMotion, times: np.ndarray) -> Frames:
 
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
-    """The scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
+    """Return the scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
     patterns = [name[len(ANIMATION) :] for name in options.only if name.startswith(ANIMATION)]
     if not _chooses(options):
         return {"": Scene(file)}
@@ -247,7 +247,7 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
 
 
 def _chooses(options: ReadOptions) -> bool:
-    """Whether the options name animations."""
+    """Return whether the options name animations."""
     return bool(options.takes) or any(name.startswith(ANIMATION) for name in options.only)
 
 
@@ -275,7 +275,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
 
 
 def _number(nodes: Sequence[GltfNode]) -> int:
-    """Gives each node its vertices, and says how many there are."""
+    """Give each node its vertices, and says how many there are."""
     first = 0
     for node in nodes:
         node.first = first
@@ -299,7 +299,7 @@ def _animations(scene: Scene, patterns: Sequence[str], subject: str) -> dict[str
 
 
 def _animation_numbers(file: GltfFile) -> dict[str, int]:
-    """All by name; where two have the same, the later one's number is added to it."""
+    """Return all by name; where two have the same, the later one's number is added to it."""
     numbers: dict[str, int] = {}
     for index, animation in enumerate(file.items("animations")):
         name = animation.get("name")
@@ -317,7 +317,8 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
 
 
 def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode]]]:
-    """The objects, by name: a node each, but for those side by side that show one shape below a node that says so."""
+    """Return the objects, by name: a node each, but for those side by side that show one shape below a node that says
+    so."""
     parts: list[tuple[int, str, list[GltfNode]]] = []
     for node in nodes:
         above = int(scene.parent[node.index])
@@ -331,7 +332,7 @@ def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode
 
 
 def _is_alike(node: GltfNode, other: GltfNode) -> bool:
-    """Whether two nodes show the same vertices and faces."""
+    """Return whether two nodes show the same vertices and faces."""
     return node.mesh == other.mesh and node.index != other.index and node.primitives == other.primitives
 
 
@@ -353,13 +354,13 @@ def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
 
 
 def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.ndarray]:
-    """The frames that show each object, or each of its copies."""
+    """Return the frames that show each object, or each of its copies."""
     parts = [part for _, part in _parts(scene, nodes)]
     return [np.stack([scene.shown(node.index, times) for node in part], axis=1) for part in parts]
 
 
 def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
-    """The names of the animations that move these nodes, and of those that are not played."""
+    """Return the names of the animations that move these nodes, and of those that are not played."""
     names = list(_animation_numbers(scene.file))
     movers = {node.index for node in nodes}.union(scene.ancestors(moving_nodes(nodes)))
     played = [names[i] for i in scene.played if not movers.isdisjoint(scene.targets(i))]
@@ -368,7 +369,7 @@ def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
 
 
 def _other_animations(scene: Scene) -> dict[str, list[str]]:
-    """The names of animations that are not played and would move something, as a kind of what is not read."""
+    """Return the names of animations that are not played and would move something, as a kind of what is not read."""
     numbers = _animation_numbers(scene.file)
     others = [name for name, i in numbers.items() if i not in scene.played and scene.targets(i)]
     return {"animation": others} if others else {}
@@ -495,7 +496,7 @@ def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np
 
 
 def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
-    """The joints, or nodes, that vertices hang on; None where one node moves them all."""
+    """Return the joints, or nodes, that vertices hang on; None where one node moves them all."""
     movers = moving_nodes(nodes)
     order = [joint for joint in scene.order if joint in movers]
     copied = [node for node in nodes if node.copies is not None]

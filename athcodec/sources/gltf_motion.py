@@ -35,8 +35,8 @@ class NodeMotion:
         self.dtype = np.dtype(np.float64 if loses else np.float32)
 
     def read(self, times: np.ndarray | None) -> np.ndarray:
-        """(k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose without
-        animation, k = 1."""
+        """Return (k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose
+        without animation, k = 1."""
         out = np.empty((1 if times is None else len(times), self.count, 3), self.dtype)
         largest = max(node.count for node in self._nodes)
         step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
@@ -66,7 +66,7 @@ class NodeMotion:
         return self._skinned(node, matrices, local)
 
     def _morphed(self, node: GltfNode, times: np.ndarray | None) -> np.ndarray:
-        """(k or 1, n, 3): only targets that count in a frame are read."""
+        """Return (k or 1, n, 3): only targets that count in a frame are read."""
         if not node.targets:
             return node.base[None].astype(np.float64)
         weights = self.scene.weights(node.index, times, node.weights)
@@ -90,7 +90,7 @@ class NodeMotion:
         return out.swapaxes(1, 2)
 
     def add_facings(self, times: np.ndarray, facings: Sequence[Facing]) -> None:
-        """Adds the frames at these times to the facing of each node."""
+        """Add the frames at these times to the facing of each node."""
         world = np.eye(4) if self._from_world is None else self._from_world
         for start in range(0, len(times), FACING_FRAMES):
             matrices = self.scene.matrices(self.ancestors, times[start : start + FACING_FRAMES])
@@ -99,7 +99,7 @@ class NodeMotion:
                 facing.add(placed if node.copies is None else placed @ node.copies)
 
     def placed(self, node: GltfNode) -> np.ndarray:
-        """(4, 4) from a node's mesh to the world without animation; of a skin, by the joint that counts most."""
+        """Return (4, 4) from a node's mesh to the world without animation; of a skin, by the joint that counts most."""
         return self._placed(node, self.scene.matrices(self.ancestors, None))[0]
 
     def _placed(self, node: GltfNode, matrices: dict[int, np.ndarray]) -> np.ndarray:
@@ -109,7 +109,8 @@ class NodeMotion:
         return matrices[node.joints[strongest]] @ node.bind[strongest]
 
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
-        """(n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length 1."""
+        """Return (n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length
+        1."""
         matrices = self.scene.matrices(self.ancestors, None)
         linear = np.eye(3) if self._from_world is None else self._from_world[:3, :3]
 
@@ -128,13 +129,13 @@ class NodeMotion:
         return turned / np.where(length > 0, length, 1.0)
 
     def normal_matrix(self, node: GltfNode) -> np.ndarray:
-        """(3, 3) that turns normals of an unskinned node into the world."""
+        """Return (3, 3) that turns normals of an unskinned node into the world."""
         matrix = self.scene.matrices(self.ancestors, None)[node.index][0, :3, :3]
         return np.linalg.pinv(matrix).T if np.isfinite(matrix).all() else np.eye(3)
 
 
 def _product(matrices: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(k, 3, 4) by (k or 1, 4, m); one multiplication where all frames have the same points."""
+    """Return (k, 3, 4) by (k or 1, 4, m); one multiplication where all frames have the same points."""
     if len(points) > 1:
         return matrices @ points
     return (matrices.reshape(-1, 4) @ points[0]).reshape(len(matrices), 3, -1)
@@ -187,7 +188,7 @@ def _stated_extras(scene: Scene) -> dict[str, Any]:
 
 
 def _returns(motion: NodeMotion, keys: np.ndarray) -> bool:
-    """Whether the last key has the pose of the first."""
+    """Return whether the last key has the pose of the first."""
     first, last = motion.read(keys[[0, -1]]).astype(np.float64)
     return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 
@@ -199,7 +200,7 @@ def _stated_rate(extras: dict, keys: np.ndarray) -> float | None:
 
 
 def _on_keys(times: np.ndarray, keys: np.ndarray, fps: float) -> np.ndarray:
-    """Times that are those of a key but for rounding become exactly it, which STEP asks for."""
+    """Return times that are those of a key but for rounding become exactly it, which STEP asks for."""
     after = np.clip(np.searchsorted(keys, times), 1, max(len(keys) - 1, 1))
     right = keys[np.minimum(after, len(keys) - 1)]
     nearest = np.where(np.abs(times - keys[after - 1]) <= np.abs(right - times), keys[after - 1], right)

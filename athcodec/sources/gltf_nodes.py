@@ -57,7 +57,7 @@ class GltfNode:
 
 
 def nodes_of_mesh(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
-    """One per set of vertices: primitives that use the same accessors share theirs."""
+    """Return one per set of vertices: primitives that use the same accessors share theirs."""
     copies, of_copies = _copies(scene, index)
     nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
@@ -96,8 +96,8 @@ def nodes_of_mesh(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfN
 
 
 def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """(k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a shape
-    has, (k, width) by attribute."""
+    """Return (k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a
+    shape has, (k, width) by attribute."""
     instancing = extension(scene.nodes[index], INSTANCING)
     if instancing is None:
         return None, _own_extras(scene, index)
@@ -135,7 +135,7 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
 
 
 def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
-    """Numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
+    """Return numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
     extras = scene.nodes[index].get("extras")
     if scene.says_copies(int(scene.parent[index])) is None or not isinstance(extras, dict):
         return {}
@@ -234,5 +234,5 @@ def is_number(value: Any) -> bool:
 
 
 def moving_nodes(nodes: list[GltfNode]) -> set[int]:
-    """Numbers of the joints that move vertices, and of the nodes without a skin."""
+    """Return numbers of the joints that move vertices, and of the nodes without a skin."""
     return {joint for node in nodes for joint in node.joints} | {node.index for node in nodes if node.skin is None}

@@ -59,7 +59,8 @@ class Channel(NamedTuple):
 
 
 def target_of(channel: dict) -> Target | str:
-    """What a channel animates; where that is nothing that is played, its pointer or a name for it. Raises ClipError."""
+    """Return what a channel animates; where that is nothing that is played, its pointer or a name for it. Raises
+    ClipError."""
     target = entry(channel, "target")
     pointed = extension(target, POINTER)
     if pointed is None:
@@ -85,7 +86,7 @@ class Track:
     is_rotation: bool
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(k, ...) float64."""
+        """Return (k, ...) float64."""
         after = np.searchsorted(self.times, times, "right")
         last = len(self.times) - 1
         left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
@@ -140,12 +141,12 @@ class Scene:
         self._groups = self._grouped()
 
     def name(self, node: int) -> str:
-        """The name of a node, "" where it has none."""
+        """Return the name of a node, "" where it has none."""
         name = self.nodes[node].get("name")
         return name if isinstance(name, str) else ""
 
     def says_copies(self, node: int) -> bool | None:
-        """What a node states by COPIES about those below it: whether they are one object; None for nothing."""
+        """Return what a node states by COPIES about those below it: whether they are one object; None for nothing."""
         extras = self.nodes[node].get("extras") if node >= 0 else None
         stated = extras.get(COPIES) if isinstance(extras, dict) else None
         return stated if isinstance(stated, bool) else None
@@ -162,7 +163,7 @@ class Scene:
         return parent
 
     def _reached(self) -> list[int]:
-        """The nodes of the default scene, parents first."""
+        """Return the nodes of the default scene, parents first."""
         scenes = self.file.items("scenes")
         if scenes:
             roots = indices(self.file.item("scenes", self.file.json.get("scene", 0)), "nodes")
@@ -179,7 +180,7 @@ class Scene:
         return order
 
     def ancestors(self, nodes: set[int]) -> list[int]:
-        """The nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
+        """Return the nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
         place = {node: i for i, node in enumerate(self.order)}
         wanted: set[int] = set()
         for node in nodes:
@@ -193,8 +194,8 @@ class Scene:
     # ---- animations ----
 
     def _together(self) -> list[int]:
-        """The first animation, and every further one that moves no node that those before it move: tools that write an
-        animation per object mean them to run at once, one with several takes starts with the default one."""
+        """Return the first animation, and every further one that moves no node that those before it move: tools that
+        write an animation per object mean them to run at once, one with several takes starts with the default one."""
         played, moved = [], set()
         for index in range(len(self.file.items("animations"))):
             targets = self.targets(index)
@@ -204,15 +205,15 @@ class Scene:
         return played
 
     def targets(self, index: int) -> set[int]:
-        """The nodes of the scene that an animation moves."""
+        """Return the nodes of the scene that an animation moves."""
         return {channel.node for channel in self._channels(index)[0]}
 
     def unplayed(self, index: int) -> list[str]:
-        """What an animation addresses that moves no node of the scene, as `target_of` names it."""
+        """Return what an animation addresses that moves no node of the scene, as `target_of` names it."""
         return self._channels(index)[1]
 
     def _channels(self, index: int) -> tuple[list[Channel], list[str]]:
-        """The channels of an animation that move nodes of the scene, and what the others address."""
+        """Return the channels of an animation that move nodes of the scene, and what the others address."""
         if index in self._channels_of:
             return self._channels_of[index]
         played, others, inside = [], [], set(self.order)
@@ -289,7 +290,7 @@ class Scene:
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
-        """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
+        """Return (path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
         Visibilities remain in _tracks."""
         alike: dict[tuple, list[int]] = {}
         for (node, path), track in self._tracks.items():
@@ -311,17 +312,17 @@ class Scene:
         return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
 
     def animates(self, nodes: set[int]) -> bool:
-        """Whether an animation that is played moves any of these nodes or one above them."""
+        """Return whether an animation that is played moves any of these nodes or one above them."""
         moved = {index for _, grouped, _ in self._groups for index in grouped}
         return not moved.isdisjoint(self.ancestors(nodes))
 
     def is_hidden(self, node: int) -> bool:
-        """Whether a node, or one above it, is never visible."""
+        """Return whether a node, or one above it, is never visible."""
         lineage = self._lineage(node)
         return any((each, "visible") not in self._tracks and not self._is_visible(each) for each in lineage)
 
     def shown(self, node: int, times: np.ndarray) -> np.ndarray:
-        """(T,) whether a node and all above it are visible."""
+        """Return (T,) whether a node and all above it are visible."""
         shown = np.ones(len(times), bool)
         for each in self._lineage(node):
             track = self._tracks.get((each, "visible"))
@@ -338,13 +339,13 @@ class Scene:
         return not isinstance(extension, dict) or extension.get("visible") is not False
 
     def morphs(self, node: int) -> bool:
-        """Whether an animation that is played changes the weights of a node's mesh."""
+        """Return whether an animation that is played changes the weights of a node's mesh."""
         return node in self._weights
 
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
-        """(k, targets) of a node's mesh; times None: without animation, k = 1."""
+        """Return (k, targets) of a node's mesh; times None: without animation, k = 1."""
         tracks = () if times is None else self._weights.get(node, ())
         weights = np.repeat(default[None], len(times) if tracks else 1, axis=0)
         for target, track in tracks:
@@ -356,7 +357,8 @@ class Scene:
         return weights
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
-        """(k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k = 1."""
+        """Return (k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k =
+        1."""
         place = {node: i for i, node in enumerate(nodes)}
         matrices = self._locals(place, times)
         above = np.array([place.get(int(self.parent[node]), -1) for node in nodes])
@@ -369,7 +371,7 @@ class Scene:
         return {node: matrices[:, i] for node, i in place.items()}
 
     def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
-        """(k, nodes, 4, 4): from each node to its parent."""
+        """Return (k, nodes, 4, 4): from each node to its parent."""
         frames = 1 if times is None else len(times)
         parts = {
             path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
@@ -389,7 +391,7 @@ class Scene:
 
 
 def key_rate(keys: np.ndarray) -> float | None:
-    """Frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
+    """Return frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
     if len(keys) < 2:
         return None
     step = float(np.median(np.diff(keys)))
@@ -400,7 +402,7 @@ def key_rate(keys: np.ndarray) -> float | None:
 
 
 def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
-    """(K,) whether keys, rounded to float32 as they are, lie between frames of a rate, from the first key on."""
+    """Return (K,) whether keys, rounded to float32 as they are, lie between frames of a rate, from the first key on."""
     places = (keys - keys[0]) * rate
     blur = 0.01 + float(np.abs(keys).max()) * 4e-7 * rate
     off: np.ndarray = (np.abs(places - np.round(places)) > blur) | (blur >= 0.3)
@@ -408,7 +410,7 @@ def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:
-    """The rate that a tool would have stated: whole, or of a drop-frame time code."""
+    """Return the rate that a tool would have stated: whole, or of a drop-frame time code."""
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)

@@ -31,8 +31,8 @@ ARRAYS = ("POSITION", "TEXCOORD_0", "COLOR_0")  # Attributes that are read of ev
 
 
 def not_read(scenes: Sequence[Scene], nodes: Sequence[GltfNode], keeps_normals: bool = True) -> dict[str, list[str]]:
-    """What is in the file and is not read with these nodes, as they move in each of these scenes; parts of a node by
-    the node's name. keeps_normals: whether normals are read."""
+    """Return what is in the file and is not read with these nodes, as they move in each of these scenes; parts of a
+    node by the node's name. keeps_normals: whether normals are read."""
     scene = scenes[0]
     file, unread = scene.file, _unused(scene)
     for index in scene.order:
@@ -71,7 +71,7 @@ def guessed(item: Any) -> list[Any]:
 
 
 def _unused(scene: Scene) -> dict[str, list[str]]:
-    """Materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
+    """Return materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
     file, unread = scene.file, dict[str, list[str]]()
     used = {kind: {scene.nodes[index].get(kind) for index in scene.order} for kind in ("mesh", "skin")}
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
@@ -86,7 +86,7 @@ def _unused(scene: Scene) -> dict[str, list[str]]:
 
 
 def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[str]:
-    """The attributes of a node's mesh, of its morph targets and of its instances that are not read."""
+    """Return the attributes of a node's mesh, of its morph targets and of its instances that are not read."""
     slots = 0
     while node.skin is not None and {f"JOINTS_{slots}", f"WEIGHTS_{slots}"} <= node.attributes.keys():
         slots += 1
@@ -103,8 +103,8 @@ def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[
 
 
 def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
-    """(kind, name) of what animations address that is not played; whole animations that others were chosen before are
-    not looked into."""
+    """Yield (kind, name) of what animations address that is not played; whole animations that others were chosen before
+    are not looked into."""
     first = scenes[0]
     played = {index for scene in scenes for index in scene.played}
     for index, animation in enumerate(first.file.items("animations")):
@@ -118,7 +118,7 @@ def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
 
 
 def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
-    """(kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
+    """Yield (kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
     yield "file", 0, file.json
     yield "asset", 0, entry(file.json, "asset")
     for kind in ("scene", "node", "skin", "animation", "camera", "accessor", "bufferView", "buffer"):
@@ -131,7 +131,7 @@ def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
 
 
 def _extensions(file: GltfFile) -> list[str]:
-    """Names of extensions that the file uses and that are not read; those of materials are part of these."""
+    """Return names of extensions that the file uses and that are not read; those of materials are part of these."""
     used = file.json.get("extensionsUsed")
     names = dict.fromkeys(name for name in (used if isinstance(used, list) else ()) if isinstance(name, str))
     for _, _, part in _parts(file):
@@ -141,7 +141,7 @@ def _extensions(file: GltfFile) -> list[str]:
 
 
 def _extras(scene: Scene) -> list[str]:
-    """The parts of the file that have extras which are not read."""
+    """Return the parts of the file that have extras which are not read."""
     names = []
     for kind, number, part in _parts(scene.file):
         extras = part.get("extras")

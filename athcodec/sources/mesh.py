@@ -95,19 +95,19 @@ class Mesh:
 
 
 def same_values(values: np.ndarray | None, others: np.ndarray | None) -> bool:
-    """Whether both are numbers of one shape and value, NaN included."""
+    """Return whether both are numbers of one shape and value, NaN included."""
     if values is None or others is None or values.dtype.kind != others.dtype.kind:
         return False
     return np.array_equal(values, others, equal_nan=values.dtype.kind == "f")
 
 
 def read_mesh(path: FilePath, budget: Budget) -> Mesh:
-    """The mesh in an OBJ or PLY file. Raises ClipError, OSError."""
+    """Return the mesh in an OBJ or PLY file. Raises ClipError, OSError."""
     return parse_mesh(read_plain(path, budget), path, budget)
 
 
 def parse_mesh(data: bytes, path: FilePath, budget: Budget) -> Mesh:
-    """The mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
+    """Return the mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
     try:
         budget.need_for(data, WORD_ENDS, WORD_BYTES, "words")
         if data.startswith((b"ply\n", b"ply\r")):
@@ -131,7 +131,8 @@ def kind_of(faces: object, edges: object) -> str:
 
 
 def with_polygons(counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """(faces, attributes) of a clip for polygons: faces (F, k) int32 where all have k corners, else two attributes."""
+    """Return (faces, attributes) of a clip for polygons: faces (F, k) int32 where all have k corners, else two
+    attributes."""
     counts, corners = np.asarray(counts, np.int32), np.asarray(corners, np.int32)
     if not len(counts):
         return None, {}
@@ -245,14 +246,14 @@ def _text(words: Sequence[bytes]) -> str:
 
 
 def obj_lines(data: bytes) -> list[bytes]:
-    """The lines of an OBJ file; those that a backslash continues are joined."""
+    """Return the lines of an OBJ file; those that a backslash continues are joined."""
     if b"\\" in data:
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     return data.splitlines()
 
 
 def parse_obj(data: bytes) -> Mesh:
-    """The mesh in the bytes of an OBJ file. Raises ClipError."""
+    """Return the mesh in the bytes of an OBJ file. Raises ClipError."""
     file = _Obj()
     for line in obj_lines(data):
         file.line(line)
@@ -278,8 +279,8 @@ def parse_obj(data: bytes) -> Mesh:
 
 
 def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[np.ndarray, np.ndarray | None]:
-    """(N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where the
-    coordinates have more digits than float32 holds."""
+    """Return (N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where
+    the coordinates have more digits than float32 holds."""
     flat = [word for row in rows for word in row[:3]]
     if len(flat) != 3 * len(rows) or any(len(row) < 3 for row in rows):
         raise ClipError("vertices: got fewer than three coordinates")
@@ -343,7 +344,7 @@ def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
 
 
 def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int) -> np.ndarray:
-    """(N,) the name that the first element with the vertex is under; without one that of the vertex before."""
+    """Return (N,) the name that the first element with the vertex is under; without one that of the vertex before."""
     labels = np.full(len(mesh.points), -1, np.int64)
     if mesh.polygons is not None:
         counts, corners = mesh.polygons
@@ -384,7 +385,7 @@ def _add_face_names(mesh: Mesh, name: str, labels: np.ndarray, names_key: str, n
 
 
 def comments(data: bytes) -> list[str]:
-    """The comments at the beginning of an OBJ or PLY file, but for that of our writer."""
+    """Return the comments at the beginning of an OBJ or PLY file, but for that of our writer."""
     head, is_ply = data[:COMMENT_BYTES], data.startswith((b"ply\n", b"ply\r"))
     marks = (b"comment", b"obj_info") if is_ply else (b"#",)
     lines = (line.strip() for line in (head.partition(b"end_header")[0] if is_ply else head).splitlines())
@@ -409,7 +410,7 @@ class PlyElement:
         return [name for name, _, counted_by in self.properties if counted_by]
 
     def row(self, order: str, lengths: dict[str, int]) -> np.dtype:
-        """A row whose lists have these lengths."""
+        """Return a row whose lists have these lengths."""
         fields: list[tuple] = []
         for name, dtype, counted_by in self.properties:
             if counted_by:
@@ -430,7 +431,7 @@ class PlyHeader:
 
 
 def ply_header(data: bytes) -> PlyHeader:
-    """The header in the bytes of a PLY file. Raises ClipError."""
+    """Return the header in the bytes of a PLY file. Raises ClipError."""
     end = data.find(b"end_header", 0, HEADER_BYTES)
     line_end = data.find(b"\n", end)
     if end < 0 or line_end < 0:
@@ -536,7 +537,7 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, n
 
 
 def _first_lengths(source: _Text | _Binary, element: PlyElement) -> dict[str, int]:
-    """How long the lists of the next row are: each says it behind those before it."""
+    """Return how long the lists of the next row are: each says it behind those before it."""
     lengths: dict[str, int] = {}
     for position, (name, _, counted_by) in enumerate(element.properties):
         if counted_by:
@@ -575,7 +576,7 @@ def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, np.nd
 
 
 def parse_ply(data: bytes) -> Mesh:
-    """The mesh in the bytes of a PLY file. Raises ClipError."""
+    """Return the mesh in the bytes of a PLY file. Raises ClipError."""
     header = ply_header(data)
     source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length :])
     values: dict[str, dict[str, np.ndarray]] = {}
@@ -608,7 +609,7 @@ def parse_ply(data: bytes) -> Mesh:
 
 
 def ply_points(vertices: Any) -> np.ndarray:
-    """(N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
+    """Return (N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
     dtype = (
         np.float32
         if all(

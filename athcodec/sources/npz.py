@@ -125,7 +125,7 @@ class _Members:
         return ()
 
     def _offset(self, name: str) -> int:
-        """Where an array begins in the file: each member has a header of its own length before it."""
+        """Return where an array begins in the file: each member has a header of its own length before it."""
         info = self._members[name]
         self._file.seek(info.header_offset)
         magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, name))
@@ -139,7 +139,7 @@ class _Members:
 
 
 def _parsed(values: np.ndarray) -> dict[str, Any]:
-    """The metadata in an array of JSON text."""
+    """Return the metadata in an array of JSON text."""
     try:
         text = values.reshape(()).item()
         content = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)

@@ -54,11 +54,11 @@ class Numbering:
         return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
 
     def path(self, number: int) -> Path:
-        """The file of this number."""
+        """Return the file of this number."""
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
     def files(self) -> dict[int, Path]:
-        """The files that are there, by their numbers, in that order."""
+        """Return the files that are there, by their numbers, in that order."""
         files = {}
         for name, sign, digits in _numbered(self.folder, self.prefix, self.suffix):
             longer = len(digits) - self.width
@@ -87,7 +87,8 @@ class NumberedFiles:
 
 
 def numbering_of(path: FilePath) -> Numbering | None:
-    """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
+    """Return the numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has
+    none."""
     path = Path(path)
     if is_pattern(path):
         return Numbering.of_pattern(path)
@@ -113,8 +114,8 @@ def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, st
 
 
 def numbered_files(path: FilePath) -> NumberedFiles:
-    """The files of the sequence that a file or a pattern names. Raises ClipError where a pattern matches none or two
-    files have one number, OSError where the folder or the named file is not there."""
+    """Return the files of the sequence that a file or a pattern names. Raises ClipError where a pattern matches none or
+    two files have one number, OSError where the folder or the named file is not there."""
     path = Path(path)
     if is_pattern(path):
         numbering = Numbering.of_pattern(path)
@@ -130,7 +131,7 @@ def numbered_files(path: FilePath) -> NumberedFiles:
 
 
 def _at_end(path: Path) -> NumberedFiles:
-    """The files that differ in the number at the end of their names."""
+    """Return the files that differ in the number at the end of their names."""
     match = _AT_END.fullmatch(path.stem)
     if match is None:
         return NumberedFiles((path,), name=path.stem)
@@ -144,7 +145,8 @@ def _at_end(path: Path) -> NumberedFiles:
 
 
 def _behind_t(path: Path) -> NumberedFiles | None:
-    """The files that differ in a number behind "t" or "time"; None where there is no such number, or one file alone."""
+    """Return the files that differ in a number behind "t" or "time"; None where there is no such number, or one file
+    alone."""
     for match in _BEHIND_T.finditer(path.stem):
         place = match.start(1)
         decimals = _Decimals.of(path.parent, path.stem[:place], path.stem[match.end() :] + path.suffix)
@@ -201,11 +203,11 @@ class _Decimals:
         return cls(folder, prefix, tuple(sorted(numbers, key=lambda number: (number.value, number.file))))
 
     def are_meant(self, named: str = "") -> bool:
-        """Whether the numbers of these files, of which one may be named, are decimals."""
+        """Return whether the numbers of these files, of which one may be named, are decimals."""
         return self._kind(named) == "decimals"
 
     def are_doubtful(self, named: str) -> bool:
-        """Whether they are as likely decimals as a name and the number of a frame."""
+        """Return whether they are as likely decimals as a name and the number of a frame."""
         return self._kind(named) == "doubtful"
 
     def _kind(self, named: str) -> str:
@@ -232,7 +234,8 @@ class _Decimals:
 
     @staticmethod
     def _follow(broken: Sequence[_Decimal], named: str) -> bool:
-        """Whether the digits behind the point, of files with the same before it as the named one, count frames."""
+        """Return whether the digits behind the point, of files with the same before it as the named one, count
+        frames."""
         whole = next((number.whole for number in broken if number.file == named), broken[0].whole)
         behind = sorted(int(number.behind) for number in broken if number.whole == whole)
         return len(behind) > 1 and behind == list(range(behind[0], behind[-1] + 1))
@@ -242,7 +245,7 @@ class _Decimals:
         return bool(steps.max() <= 1.001 * steps.min())
 
     def files(self) -> NumberedFiles:
-        """Raises ClipError where two of them have one number."""
+        """Raise ClipError where two of them have one number."""
         for before, now in zip(self.numbers, self.numbers[1:]):
             if before.value == now.value:
                 raise ClipError(
@@ -256,7 +259,7 @@ class _Decimals:
 
 
 def _word_before(prefix: str) -> str:
-    """The letters, in lower case, that a number follows at once."""
+    """Return the letters, in lower case, that a number follows at once."""
     word = _WORD.search(prefix)
     return word[0].lower() if word else ""
 
@@ -290,7 +293,7 @@ def files_to_read(path: FilePath) -> NumberedFiles:
 
 
 def _of_form(path: Path, places: re.Pattern[str], names_read: Iterable[str]) -> list[str]:
-    """Names of files that are as that of `path` but for these places."""
+    """Return names of files that are as that of `path` but for these places."""
     form = places.sub("#", path.stem)
     return sorted(
         name
@@ -300,7 +303,7 @@ def _of_form(path: Path, places: re.Pattern[str], names_read: Iterable[str]) -> 
 
 
 def _pattern_of(path: Path) -> tuple[str, list[str]]:
-    """A pattern for files that differ from `path` in one number, wherever it stands, and their names."""
+    """Return a pattern for files that differ from `path` in one number, wherever it stands, and their names."""
     similar = [name for name in _of_form(path, _TOKENS, [path.name]) if "#" not in name and "%" not in name]
     parts = _TOKENS.findall(path.stem)
     for place, match in enumerate(_TOKENS.finditer(path.stem)):
@@ -320,13 +323,14 @@ def _pattern_of(path: Path) -> tuple[str, list[str]]:
 
 
 def some(names: Sequence[str]) -> str:
-    """The first of some names, and how many more there are."""
+    """Return the first of some names, and how many more there are."""
     return ", ".join(names[:LISTED]) + (f" and {len(names) - LISTED} more" if len(names) > LISTED else "")
 
 
 def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
-    """Paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them of a
-    pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are named."""
+    """Return paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them
+    of a pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are
+    named."""
     sequence_of: dict[Path, NumberedFiles] = {}
     named: dict[NumberedFiles | str, list[str]] = {}
     for path in paths:

@@ -35,22 +35,22 @@ class Part(Protocol):
     elsewhere: Mapping[str, str]
 
     def points(self, step: int) -> np.ndarray:
-        """(N, 2) or (N, 3) points."""
+        """Return (N, 2) or (N, 3) points."""
 
     def fixed_points(self) -> bool:
-        """Whether all steps have the points of the first."""
+        """Return whether all steps have the points of the first."""
 
     def check(self, step: int) -> None:
-        """Raises ClipError where the cells are others than in the first step."""
+        """Raise ClipError where the cells are others than in the first step."""
 
     def names(self, center: str) -> Sequence[str]:
-        """The names of the data per point (NODE) or per cell (CELL) of any step."""
+        """Return the names of the data per point (NODE) or per cell (CELL) of any step."""
 
     def values(self, step: int, name: str, center: str) -> np.ndarray:
-        """(N, ...) values. Raises ClipError where the step has none of this name."""
+        """Return (N, ...) values. Raises ClipError where the step has none of this name."""
 
     def is_static(self, name: str, center: str) -> bool:
-        """Whether all steps have the same values."""
+        """Return whether all steps have the same values."""
 
 
 class JoinedSteps:
@@ -105,7 +105,7 @@ class JoinedSteps:
         return self._joined(filled, name)
 
     def static(self) -> dict[str, np.ndarray]:
-        """Data per point that are the same in all steps, and in all parts."""
+        """Return data per point that are the same in all steps, and in all parts."""
         return self._static_data(NODE, self._counts)
 
     def _static_data(self, center: str, counts: Sequence[int]) -> dict[str, np.ndarray]:
@@ -137,7 +137,7 @@ class JoinedSteps:
 
 
 def _joined_blocks(parts: Sequence[Part], counts: Sequence[int]) -> list[Block]:
-    """The cells of all parts, numbered as their points and cells follow each other."""
+    """Return the cells of all parts, numbered as their points and cells follow each other."""
     blocks, first, row = [], 0, 0
     for part, count in zip(parts, counts):
         if len(parts) > 1:

@@ -67,7 +67,7 @@ def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes
 
 
 def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> MotionClip:
-    """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
+    """Return the clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
     positions, time and metadata."""
     file = open_plain(path)
     with naming(path), closing_on_failure(file):
@@ -91,7 +91,7 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
 
 
 def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
-    """The mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
+    """Return the mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
 
     OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in
     other units or axes."""
@@ -137,7 +137,7 @@ def _say_other_meshes(path: Path) -> None:
 
 
 def _mesh_beside(path: Path) -> Path | None:
-    """The OBJ or PLY file of the cache's name beside it."""
+    """Return the OBJ or PLY file of the cache's name beside it."""
     for suffix in (*MESH_SUFFIXES, *(suffix.upper() for suffix in MESH_SUFFIXES)):
         if path.with_suffix(suffix).is_file():
             return path.with_suffix(suffix)

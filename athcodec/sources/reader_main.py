@@ -88,7 +88,7 @@ def _send(answers: BinaryIO, data: bytes) -> None:
 
 
 def _described(clip: MotionClip, guesses: list[str]) -> bytes:
-    """All but the positions, with the texts of warnings, as an .npz."""
+    """Return all but the positions, with the texts of warnings, as an .npz."""
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest

@@ -31,8 +31,8 @@ MAIN = "athcodec.sources.reader_main"
 
 
 def read_apart(path: FilePath, options: ReadOptions, module: str, crashed: str) -> MotionClip:
-    """The clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has crashed.
-    Raises ClipError, OSError."""
+    """Return the clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has
+    crashed. Raises ClipError, OSError."""
     path = fspath(path)
     open_plain(path).close()
     process = _Process(path, options, module, crashed)

@@ -91,20 +91,20 @@ class Arrays(Protocol):
     counts_from_1: bool
 
     def read(self, name: str) -> np.ndarray:
-        """The whole array."""
+        """Return the whole array."""
 
     def positions(self, name: str, order: Order) -> Any:
-        """(T, N, 3) frames of an array whose axes have this order, read when they are sliced."""
+        """Return (T, N, 3) frames of an array whose axes have this order, read when they are sliced."""
 
     def notes(self, name: str) -> Mapping[str, Any]:
-        """What the file says of an array, or of a group."""
+        """Return what the file says of an array, or of a group."""
 
     def labels(self, name: str) -> Sequence[str]:
-        """Names of the dimensions of an array, as far as the file states them."""
+        """Return names of the dimensions of an array, as far as the file states them."""
 
 
 def clip_of_arrays(arrays: Arrays, path: FilePath, options: ReadOptions, **watched: Any) -> MotionClip:
-    """The clip of a file's arrays.
+    """Return the clip of a file's arrays.
 
     watched: resource and unchanged as in MotionClip. Raises ClipError, which lists the arrays where none, or several,
     can be the positions.
@@ -435,12 +435,12 @@ def _last(name: str) -> str:
 
 
 def _is_unnamed(name: str) -> bool:
-    """Whether a file's only array has no name, or the one that NumPy gives to it."""
+    """Return whether a file's only array has no name, or the one that NumPy gives to it."""
     return name in ("", "arr_0")
 
 
 def _is_row(stored: Stored) -> bool:
-    """Whether an array is a row of numbers, whatever else its shape is."""
+    """Return whether an array is a row of numbers, whatever else its shape is."""
     return bool(stored.shape) and max(stored.shape) == np.prod(stored.shape, dtype=object)
 
 
@@ -454,7 +454,7 @@ def _ascends(values: np.ndarray) -> bool:
 
 
 def _is_scalar_name(key: str) -> bool:
-    """Whether metadata of this name are a rate, or what else is a single word or number."""
+    """Return whether metadata of this name are a rate, or what else is a single word or number."""
     return key in SCALARS or _plain(key) in RATE_NAMES | STEP_NAMES
 
 

@@ -35,7 +35,7 @@ class Copies:
         self.names: np.ndarray | None = None
 
     def follow(self, codes: np.ndarray) -> None:
-        """Finds the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
+        """Find the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
         if self.names is not None:
             return
         schema, times = self.instancer, [float(codes[0])]
@@ -78,7 +78,7 @@ class Copies:
         raise ClipError(f"{self.instancer.GetPath()}: {got} in {frame_name(self._codes, frame)}, expected {expected}")
 
     def _hold(self) -> None:
-        """Notes where copies stand in frames that do not have them: where they were last, or where they appear."""
+        """Note where copies stand in frames that do not have them: where they were last, or where they appear."""
         absent, states = self._rows < 0, np.arange(len(self._rows))
         last = np.maximum.accumulate(np.where(absent, -1, states[:, None]), axis=0)
         following = np.minimum.accumulate(np.where(absent, states[-1], states[:, None])[::-1], axis=0)[::-1]
@@ -94,7 +94,7 @@ class Copies:
             self._places[is_frame] = self._placed(frame)[self._rows[self._states[frame], copies[is_frame]]]
 
     def places(self, frame: int) -> np.ndarray:
-        """(copies, 4, 4) from the prototype to the instancer."""
+        """Return (copies, 4, 4) from the prototype to the instancer."""
         state = self._states[frame]
         rows, absent = self._rows[state], np.flatnonzero(self._rows[state] < 0)
         matrices = self._placed(frame)
@@ -106,7 +106,7 @@ class Copies:
         return out
 
     def _placed(self, frame: int) -> np.ndarray:
-        """(rows, 4, 4) as the arrays have them."""
+        """Return (rows, 4, 4) as the arrays have them."""
         code = code_of_order(self.instancer.GetIdsAttr(), float(self._codes[frame]))
         matrices = self.instancer.ComputeInstanceTransformsAtTime(
             code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
@@ -127,7 +127,8 @@ class Instances:
         self.instancer = copies.instancer
 
     def choose(self, codes: np.ndarray) -> tuple[np.ndarray, list[str]]:
-        """The frames that show each copy, (T, copies); and the names of copies that none shows, which are left out."""
+        """Return the frames that show each copy, (T, copies); and the names of copies that none shows, which are left
+        out."""
         self.all.follow(codes)
         is_of_prototype, seen = self.all.protos == self.number, self.all.shown.any(axis=0)
         self.rows = np.flatnonzero(is_of_prototype & seen)
@@ -136,13 +137,13 @@ class Instances:
         ]
 
     def matrices(self, cache: UsdGeom.XformCache, prim: Usd.Prim, frame: int) -> np.ndarray:
-        """(copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
+        """Return (copies, 4, 4) from a prim of the prototype to the world, at the time of the cache."""
         inner = np.array(cache.ComputeRelativeTransform(prim, self.prototype)[0])
         world = np.array(cache.GetLocalToWorldTransform(self.instancer.GetPrim()))
         return inner @ self.all.places(frame)[self.rows] @ world
 
     def add_arrays(self, obj: PrimObject, codes: np.ndarray) -> None:
-        """Adds the static arrays that the instancer has for each of its copies."""
+        """Add the static arrays that the instancer has for each of its copies."""
         obj.left_out += unread_properties(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), numbers_of(value_at(primvar, codes[0]))
@@ -156,7 +157,7 @@ class Instances:
 
 
 def code_of_order(ids: Usd.Attribute, code: float) -> float:
-    """The time code at which to read arrays whose order `ids` says: the code, or, where USD would mix two orders
+    """Return the time code at which to read arrays whose order `ids` says: the code, or, where USD would mix two orders
     between samples, that of the sample before it."""
     if ids.GetNumTimeSamples() < 2:
         return code

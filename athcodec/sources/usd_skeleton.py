@@ -27,7 +27,7 @@ class Skeleton:
             self._offsets = self._shapes.ComputeSubShapePointOffsets()
 
     def deform(self, points: Vt.Vec3fArray, code: float) -> Vt.Vec3fArray:
-        """Points in the skeleton's space where joints move them, else in the mesh's own."""
+        """Return points in the skeleton's space where joints move them, else in the mesh's own."""
         points = Vt.Vec3fArray(points)
         if self._shapes is not None:
             self._blend(points, code)
@@ -54,7 +54,7 @@ class Skeleton:
         return self.query.GetPrim() if self.skins else self.target.GetPrim()
 
     def mirrors(self, count: int, code: float) -> bool:
-        """Whether skinning turns a mesh of so many points inside out, by the joint that moves most of them."""
+        """Return whether skinning turns a mesh of so many points inside out, by the joint that moves most of them."""
         joints = self.largest(count)
         joints = joints[joints >= 0]
         if not len(joints):
@@ -115,13 +115,14 @@ def bind_skeletons(
 
 
 def _is_bound(prim: Usd.Prim) -> bool:
-    """Whether a prim says that joints or blend shapes move it."""
+    """Return whether a prim says that joints or blend shapes move it."""
     binding = UsdSkel.BindingAPI(prim)
     return binding.GetJointIndicesAttr().HasAuthoredValue() or binding.GetBlendShapesAttr().HasAuthoredValue()
 
 
 def _missing_animation(skeleton: Usd.Prim) -> str | None:
-    """The animation that a skeleton names, or a prim above it does, and that is not there; None where none is named."""
+    """Return the animation that a skeleton names, or a prim above it does, and that is not there; None where none is
+    named."""
     for prim in lineage(skeleton):
         relationship = UsdSkel.BindingAPI(prim).GetAnimationSourceRel()
         if relationship and relationship.HasAuthoredTargets():
@@ -130,7 +131,7 @@ def _missing_animation(skeleton: Usd.Prim) -> str | None:
 
 
 def skin_of(objects: list[PrimObject], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
-    """The joints of all skeletons, one after the other."""
+    """Return the joints of all skeletons, one after the other."""
     parents, names, first = [], [], {}
     for _, query in queries:
         path = query.GetPrim().GetPath()

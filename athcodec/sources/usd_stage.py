@@ -80,7 +80,7 @@ DOMAINS = {"vertex": "vertex", "varying": "vertex", "faceVarying": "corner", "un
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """The clip in a USD file. Raises ClipError, OSError."""
+    """Return the clip in a USD file. Raises ClipError, OSError."""
     check_crates(path)
     with quietly() as trap:
         clip = _clip(_Stage(path, options.allow_outside), options)
@@ -90,7 +90,7 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
 
 
 def _warnings(trap: Tf.DiagnosticTrap) -> list[str]:
-    """What USD has warned of, but for layers that cannot be found, which are named as missing."""
+    """Return what USD has warned of, but for layers that cannot be found, which are named as missing."""
     texts = dict.fromkeys(" ".join(str(warning.commentary).split()) for warning in trap.GetWarnings())
     return [text for text in texts if not text.startswith("In <") and "clip layer" not in text]
 
@@ -198,7 +198,7 @@ class _Choice:
 
 
 def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, list[str]]) -> list[PrimObject]:
-    """All with points. What has none, or is no object, is added to not_read by the name of its type."""
+    """Return all with points. What has none, or is no object, is added to not_read by the name of its type."""
     objects, choice, prototypes = list[PrimObject](), _Choice(only), set[Sdf.Path]()
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
@@ -308,7 +308,7 @@ def _in_prototype(prototype: Usd.Prim, choice: _Choice, not_read: dict[str, list
 
 
 def _unshown(instancer: Usd.Prim, prototypes: set[Sdf.Path]) -> Iterator[Usd.Prim]:
-    """The first prims with a shape below an instancer that are in no prototype: USD shows none of these."""
+    """Yield the first prims with a shape below an instancer that are in no prototype: USD shows none of these."""
     prims = iter(Usd.PrimRange(instancer, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
         if prim.GetPath() in prototypes:
@@ -326,11 +326,11 @@ def _kind(prim: Usd.Prim) -> str | None:
 
 
 def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[PrimObject]:
-    """The objects that a frame shows, with the frames that do; notes the others."""
+    """Return the objects that a frame shows, with the frames that do; notes the others."""
     known: dict[Sdf.Path, np.ndarray] = {}
 
     def inherited(prim: Usd.Prim) -> np.ndarray:
-        """(T,) whether a prim does not say that it is invisible."""
+        """Return (T,) whether a prim does not say that it is invisible."""
         attribute = visibility(prim)
         if attribute is None:
             return np.ones(len(codes), bool)
@@ -390,7 +390,7 @@ def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[Pri
 
 
 def _follow_ids(obj: PrimObject, codes: np.ndarray) -> None:
-    """Notes the ids of points that stand in another order in some frame."""
+    """Note the ids of points that stand in another order in some frame."""
     if obj.kind != "points":
         return
     attribute = UsdGeom.Points(obj.prim).GetIdsAttr()
@@ -523,7 +523,7 @@ def _keep_unless_it_changes(
 
 
 def _keep(obj: PrimObject, name: str, values: Any, interpolation: str, primvar: UsdGeom.Primvar | None = None) -> None:
-    """Keeps a static array if it has numbers, and rows that fit the prim; notes the names of others."""
+    """Keep a static array if it has numbers, and rows that fit the prim; notes the names of others."""
     values, element_size = numbers_of(values), 1 if primvar is None else primvar.GetElementSize()
     if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])

@@ -60,15 +60,15 @@ def time_codes(
 
 
 def _off_grid(times: np.ndarray, start: float, step: float) -> np.ndarray:
-    """(K,) whether time codes lie between frames."""
+    """Return (K,) whether time codes lie between frames."""
     places = (times - start) / step
     off: np.ndarray = np.abs(places - np.round(places)) > 1e-3
     return off
 
 
 def _rate(stage: Usd.Stage, keys: _Keys, start: float, not_read: dict[str, list[str]]) -> float:
-    """Frames per second: a frame for each time code, unless framesPerSecond has frames at keys that these miss, or more
-    frames of splines; where it is another rate and is not taken, it is added to not_read."""
+    """Return frames per second: a frame for each time code, unless framesPerSecond has frames at keys that these miss,
+    or more frames of splines; where it is another rate and is not taken, it is added to not_read."""
     codes_per_second, stated = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
     if (
         not stage.HasAuthoredMetadata("framesPerSecond")
@@ -123,6 +123,6 @@ def _keys(objects: list[PrimObject]) -> _Keys:
 
 
 def _goes_on(spline: Ts.Spline) -> bool:
-    """Whether a spline moves before its first knot or behind its last."""
+    """Return whether a spline moves before its first knot or behind its last."""
     still = (Ts.ExtrapHeld, Ts.ExtrapValueBlock)
     return any(each.mode not in still for each in (spline.GetPreExtrapolation(), spline.GetPostExtrapolation()))

@@ -29,8 +29,9 @@ PURPOSE_BINDINGS = ("material:binding:full", "material:binding:preview")
 
 
 def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dict[str, list[str]]:
-    """Prims that are inactive, overs of nothing or classes that nothing takes, variants that are not selected, layers
-    of a package that no other names, and data of the layer. prototypes: what instancers show, wherever it stands."""
+    """Return prims that are inactive, overs of nothing or classes that nothing takes, variants that are not selected,
+    layers of a package that no other names, and data of the layer. prototypes: what instancers show, wherever it
+    stands."""
     left_out: dict[str, list[str]] = {}
     classes = []
 
@@ -87,7 +88,7 @@ class _PrimsOnce:
 
 
 def _is_below(path: Sdf.Path, places: Collection[Sdf.Path]) -> bool:
-    """Whether a path is one of `places`, which is a set, or below one."""
+    """Return whether a path is one of `places`, which is a set, or below one."""
     return any(prefix in places for prefix in path.GetPrefixes())
 
 
@@ -112,7 +113,7 @@ def _other_variants(prim: Usd.Prim) -> Iterator[str]:
 
 
 def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
-    """The paths in the stage that inherits, specializes and references of prims lead to."""
+    """Return the paths in the stage that inherits, specializes and references of prims lead to."""
     paths = set()
 
     def follow(node: Pcp.NodeRef) -> None:
@@ -128,7 +129,7 @@ def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
 
 
 def _other_layers(root: Sdf.Layer) -> list[str]:
-    """The layers of a .usdz that its first one does not lead to."""
+    """Return the layers of a .usdz that its first one does not lead to."""
     if not zipfile.is_zipfile(root.realPath):
         return []
     with zipfile.ZipFile(root.realPath) as package:
@@ -149,7 +150,8 @@ def _other_layers(root: Sdf.Layer) -> list[str]:
 
 
 def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
-    """The files of value clips, which USD opens when a value is asked for; and the names of those that are missing."""
+    """Return the files of value clips, which USD opens when a value is asked for; and the names of those that are
+    missing."""
     files, missing = [], []
     for prim in stage.TraverseAll():
         if not prim.HasAuthoredMetadata("clips"):
@@ -169,8 +171,8 @@ def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
 
 
 def unread_properties(prim: Usd.Prim) -> list[str]:
-    """The names of attributes and relationships, or their namespaces, and metadata that are authored on a prim, differ
-    from their fallback and are not read."""
+    """Return the names of attributes and relationships, or their namespaces, and metadata that are authored on a prim,
+    differ from their fallback and are not read."""
     unread: dict[str, None] = {}
     order = UsdGeom.Xformable(prim).GetXformOpOrderAttr().Get() if prim.IsA(UsdGeom.Xformable) else None
     operations = {name.removeprefix("!invert!") for name in order or ()}
@@ -206,5 +208,5 @@ def _differs(prim: Usd.Prim, attribute: Usd.Attribute) -> bool:
 
 
 def is_array(value: Any) -> bool:
-    """Whether a value is one of USD's arrays."""
+    """Return whether a value is one of USD's arrays."""
     return type(value).__module__.startswith("pxr.Vt")

@@ -22,7 +22,7 @@ NAMES = {"st": "uv", "displayColor": "colors"}
 
 
 def one_line(error: Exception) -> str:
-    """The message of the first of USD's errors, without its place in USD's source."""
+    """Return the message of the first of USD's errors, without its place in USD's source."""
     try:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     except UnicodeDecodeError:  # it quotes bytes of the file
@@ -49,14 +49,14 @@ def lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
 
 
 def all_above(obj: PrimObject) -> Iterator[Usd.Prim]:
-    """The prims whose transforms place an object."""
+    """Yield the prims whose transforms place an object."""
     yield from lineage(obj.prim)
     if obj.instances is not None:
         yield from lineage(obj.instances.instancer.GetPrim())
 
 
 def hiding(obj: PrimObject) -> Iterator[Usd.Prim]:
-    """The prims that hide an object where they are invisible."""
+    """Yield the prims that hide an object where they are invisible."""
     for prim in lineage(obj.prim):
         if obj.instances is not None and prim == obj.instances.prototype:
             yield from lineage(obj.instances.instancer.GetPrim())
@@ -69,12 +69,12 @@ def visibility(prim: Usd.Prim) -> Usd.Attribute | None:
 
 
 def held_at(times: Sequence[float], codes: np.ndarray) -> np.ndarray:
-    """(T,) the number of the time whose sample holds at each time code."""
+    """Return (T,) the number of the time whose sample holds at each time code."""
     return np.maximum(np.searchsorted(times, codes + 1e-6, "right") - 1, 0)
 
 
 def fixed(obj: PrimObject, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
-    """Integers that stay the same in every frame; ClipError where they change."""
+    """Return integers that stay the same in every frame; ClipError where they change."""
     query = Usd.AttributeQuery(attribute)
     first = array_of(query.Get(codes[0]), np.int32)
     if query.GetNumTimeSamples() > 1 and query.ValueMightBeTimeVarying():
@@ -89,8 +89,8 @@ def fixed(obj: PrimObject, attribute: Usd.Attribute, codes: np.ndarray) -> np.nd
 
 
 def samples(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> Sequence[float]:
-    """The time codes in the stage's range, or all, at which an attribute or primvar may change: those of its samples,
-    or, where it has a spline, those of all frames or knots."""
+    """Return the time codes in the stage's range, or all, at which an attribute or primvar may change: those of its
+    samples, or, where it has a spline, those of all frames or knots."""
     attribute = source.GetAttr() if isinstance(source, UsdGeom.Primvar) else source
     if not has_range(attribute.GetStage()):
         return [*attribute.GetSpline().GetKnots().keys()] if attribute.HasSpline() else source.GetTimeSamples()
@@ -108,7 +108,7 @@ def array_of(value: Any, dtype: Any) -> np.ndarray:
 
 
 def value_at(source: Usd.Attribute | UsdGeom.Primvar, code: float) -> Any:
-    """What an array holds at a time, without indices; None where USD finds it faulty."""
+    """Return what an array holds at a time, without indices; None where USD finds it faulty."""
     try:
         return source.ComputeFlattened(code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)
     except Tf.ErrorException:
@@ -116,7 +116,7 @@ def value_at(source: Usd.Attribute | UsdGeom.Primvar, code: float) -> Any:
 
 
 def changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
-    """Whether an array has other values in any frame than in the first."""
+    """Return whether an array has other values in any frame than in the first."""
     if not source.ValueMightBeTimeVarying():
         return False
     first = np.array(value_at(source, codes[0]))
@@ -138,7 +138,7 @@ def numbers_of(values: Any) -> np.ndarray | None:
 
 
 def is_guessed(attribute: Usd.Attribute) -> bool:
-    """Whether athcodec's writer has made up the value, so that it says nothing of the clip."""
+    """Return whether athcodec's writer has made up the value, so that it says nothing of the clip."""
     return attribute.GetCustomDataByKey(f"{OWN}:{GUESSED}") is True
 
 
@@ -158,7 +158,7 @@ def frame_name(codes: np.ndarray, frame: int) -> str:
 
 @contextmanager
 def quietly() -> Iterator[Tf.DiagnosticTrap]:
-    """Keeps USD's messages off stderr; its errors become ClipErrors of one line."""
+    """Keep USD's messages off stderr; its errors become ClipErrors of one line."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield trap

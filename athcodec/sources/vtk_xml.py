@@ -98,7 +98,7 @@ class VtkXml:
         self._unpack = _UNPACKERS.get(name or "")
 
     def files(self) -> list[Listed] | None:
-        """The files that a list names; None for a data set."""
+        """Return the files that a list names; None for a data set."""
         if self._type not in _LISTS:
             return None
         tag, attribute = _LISTS[self._type]
@@ -113,7 +113,7 @@ class VtkXml:
         return files
 
     def fields(self) -> tuple[dict[str, np.ndarray], dict[str, Any], list[str]]:
-        """Fields that may be times, what our writer adds, and the names of the other fields."""
+        """Return fields that may be times, what our writer adds, and the names of the other fields."""
         times: dict[str, np.ndarray] = {}
         metadata: dict[str, Any] = {}
         others = []
@@ -129,7 +129,8 @@ class VtkXml:
         return times, metadata, others
 
     def grid(self) -> Grid:
-        """The data set, whose pieces are joined. Raises ClipError, and ValueError and the like for broken files."""
+        """Return the data set, whose pieces are joined. Raises ClipError, and ValueError and the like for broken
+        files."""
         whole = self._root.find(self._type)
         pieces = [] if whole is None else whole.findall("Piece")
         if whole is None or not pieces:
@@ -186,7 +187,7 @@ class VtkXml:
         return lattice_cells(size)
 
     def _cells(self, piece: ElementTree.Element, tag: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Types, ends and nodes of cells; none of what the file does not list."""
+        """Type, ends and nodes of cells; none of what the file does not list."""
         cells = {element.get("Name"): element for element in piece.findall(f"{tag}/DataArray")}
         none = np.zeros(0, np.int64)
         types, stops, nodes = (
@@ -282,7 +283,7 @@ class VtkXml:
 
 
 def _from_base64(text: bytes, size: int) -> bytes:
-    """The first `size` bytes."""
+    """Return the first `size` bytes."""
     data = base64.b64decode(text[: 4 * ((size + 2) // 3)], validate=False)
     if len(data) < size:
         raise ClipError(f"got {len(data)} bytes of data, expected {size}")
@@ -290,7 +291,7 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
-    """The XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
+    """Return the XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
     match = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
     if not match:
         return data, None

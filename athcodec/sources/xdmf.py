@@ -121,7 +121,7 @@ class _Scene:
     # ---- from grids to tracks ----
 
     def _tracks_of(self, grid: Element, depth: int) -> list[Track]:
-        """The tracks of a grid. Raises ClipError."""
+        """Return the tracks of a grid. Raises ClipError."""
         self._grid_count += 1
         most = MOST_VISITS + VISITS_PER_ELEMENT * self.documents.size
         if depth > MOST_NESTED or self._grid_count > most:
@@ -146,7 +146,7 @@ class _Scene:
         return time is not None and track.times is None and len(track.steps) == 1
 
     def _series(self, collection: Element, name: str, grids: Sequence[Element], depth: int) -> list[Track]:
-        """The tracks of a temporal collection: each of its grids is a step of all of them."""
+        """Return the tracks of a temporal collection: each of its grids is a step of all of them."""
         steps = [self._tracks_of(grid, depth + 1) for grid in grids]
         if not steps:
             return []
@@ -172,7 +172,7 @@ class _Scene:
     # ---- times ----
 
     def _time_of(self, grid: Element) -> float | None:
-        """The time that a grid states for itself alone."""
+        """Return the time that a grid states for itself alone."""
         element = self.documents.child(grid, "Time")
         numbers = self._time_elsewhere(grid) if element is None else self._numbers(element)
         if len(numbers) > 1 and grid.get("GridType", UNIFORM).lower() != "collection":
@@ -180,7 +180,7 @@ class _Scene:
         return float(numbers[0]) if len(numbers) == 1 else None
 
     def _time_elsewhere(self, grid: Element) -> np.ndarray:
-        """The time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
+        """Return the time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
         for element in self.documents.children(grid, "Information", "Attribute"):
             is_whole = local_name(element) == "Information" or element.get("Center", "").lower() == "grid"
             if is_whole and element.get("Name", "").lower() in TIME_NAMES:
@@ -203,7 +203,7 @@ class _Scene:
     def _series_times(
         self, collection: Element, stated: Sequence[np.ndarray | None], grids: Sequence[Element]
     ) -> np.ndarray | None:
-        """The times of a collection's steps: their own, or those of the collection. None where it has none."""
+        """Return the times of a collection's steps: their own, or those of the collection. None where it has none."""
         count = len(stated)
         missing = [number for number, time in enumerate(stated) if time is None]
         if not missing:
@@ -230,7 +230,7 @@ class _Scene:
         return numbers
 
     def times(self, track: Track) -> tuple[np.ndarray, dict[str, Any]]:
-        """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
+        """Return (T,) seconds from 0, and what the file says of rate, unit and up axis."""
         information, stored, count = self._facts, track.times, len(track.steps)
         fps = information.get("fps") if self.options.fps is None else self.options.fps
         if stored is None or not track.is_series:
@@ -295,7 +295,8 @@ class _Selection:
         self.other_fields: list[str] = []
 
     def chosen(self) -> list[Track]:
-        """The tracks that are the clip; the others are named. Raises ClipError where it is not clear which they are."""
+        """Return the tracks that are the clip; the others are named. Raises ClipError where it is not clear which they
+        are."""
         tracks = self._scene.tracks
         if self._scene.options.only:
             tracks = [t for t in tracks if any(fnmatchcase(t.name, pattern) for pattern in self._scene.options.only)]
@@ -311,7 +312,7 @@ class _Selection:
         return chosen
 
     def _still(self, tracks: Sequence[Track]) -> list[Track]:
-        """The meshes of a file without a series: they are one frame."""
+        """Return the meshes of a file without a series: they are one frame."""
         with_points = [track for track in tracks if self._element(track, "Geometry") is not None]
         if not with_points:
             raise ClipError("got no grid with a Geometry, expected points")
@@ -325,7 +326,7 @@ class _Selection:
         return with_points
 
     def _groups(self, series: Sequence[Track]) -> list[Track]:
-        """The series, those of one mesh at the same times in one: that has all their data."""
+        """Return the series, those of one mesh at the same times in one: that has all their data."""
         groups: list[Track] = []
         for track in series:
             group = next((each for each in groups if self._belong_together(each, track)), None)
@@ -338,7 +339,7 @@ class _Selection:
         return groups
 
     def _belong_together(self, one: Track, other: Track) -> bool:
-        """Whether two series are of one mesh, of different grids at the top, at the same times."""
+        """Return whether two series are of one mesh, of different grids at the top, at the same times."""
         if one.families & other.families or len(one.steps) != len(other.steps):
             return False
         if (one.times is None) != (other.times is None) or not np.array_equal(one.times, other.times):
@@ -346,7 +347,7 @@ class _Selection:
         return self._same_mesh(one, other)
 
     def _same_mesh(self, one: Track, other: Track) -> bool:
-        """Whether two tracks have the same points and cells in their first step, in one place or in several."""
+        """Return whether two tracks have the same points and cells in their first step, in one place or in several."""
         geometry = self._element(one, "Geometry"), self._element(other, "Geometry")
         topology = self._element(one, "Topology"), self._element(other, "Topology")
         if None in geometry:
@@ -412,7 +413,7 @@ class _Selection:
                 self.other_fields += [f"{track.name}/{name}" for center in (NODE, CELL) for name in part.names(center)]
 
     def mesh_for(self, track: Track) -> Element | None:
-        """The grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
+        """Return the grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
         if self._element(track, "Geometry") is not None:
             return None
         meshes = [
@@ -436,7 +437,7 @@ class _Selection:
 
 
 def _in_order(track: Track) -> Track:
-    """The track with its steps in the order of time, in which not all programs write them."""
+    """Return the track with its steps in the order of time, in which not all programs write them."""
     if track.times is None or not np.isfinite(track.times).all() or (np.diff(track.times) > 0).all():
         return track
     order = np.argsort(track.times, kind="stable")
@@ -510,7 +511,7 @@ class _Part:
         return all(same_values(values, self._items.read(item)) for item in others)
 
     def _element(self, step: int, tag: str) -> Element | None:
-        """The Topology or Geometry of a step: its own, that of the first step, or of the mesh that was taken."""
+        """Return the Topology or Geometry of a step: its own, that of the first step, or of the mesh that was taken."""
         for grids in (self._steps[step], self._steps[0], [] if self._mesh is None else [self._mesh]):
             for grid in grids:
                 element = self._documents.child(grid, tag)
@@ -519,12 +520,12 @@ class _Part:
         return None
 
     def _same(self, one: Element | None, other: Element | None) -> bool:
-        """Whether two elements say the same."""
+        """Return whether two elements say the same."""
         return one is other or self._documents.source(one) == self._documents.source(other)
 
     def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
-        """The attributes of a step by name and center. Those of a name that several grids have, as collections that
-        were joined may, are called by their grid as well."""
+        """Return the attributes of a step by name and center. Those of a name that several grids have, as collections
+        that were joined may, are called by their grid as well."""
         elements: dict[tuple[str, str], Element] = {}
         for number, grid in enumerate(grids):
             for element in self._documents.children(grid, "Attribute"):

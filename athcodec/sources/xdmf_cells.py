@@ -84,7 +84,7 @@ def same_block(one: Block, other: Block) -> bool:
 
 
 def structured_blocks(kind: str, element: Element, budget: Budget) -> list[Block]:
-    """The cells between the points of a curvilinear grid, whose last dimension is the fastest."""
+    """Return the cells between the points of a curvilinear grid, whose last dimension is the fastest."""
     shape = [int(size) for size in (element.get("Dimensions") or element.get("NumberOfElements") or "").split()]
     if len(shape) != (2 if kind == "quad" else 3) or min(shape) < 1:
         raise ClipError(f"Topology: got the dimensions {shape}, expected {2 if kind == 'quad' else 3} of points")
@@ -104,7 +104,7 @@ def whole_numbers(values: np.ndarray) -> np.ndarray:
 
 
 def mixed_blocks(stream: np.ndarray) -> list[Block]:
-    """Cells one behind the other, each with its type before it, and its number of nodes where that varies."""
+    """Return cells one behind the other, each with its type before it, and its number of nodes where that varies."""
     types, starts, stops, at = [], [], [], 0
     numbers = stream.tolist()
     while at < len(numbers):

@@ -36,20 +36,20 @@ class Documents:
         self.root = self._load(path)
 
     def children(self, element: Element, *tags: str) -> list[Element]:
-        """The children of these tags, or all of them, as the file means them. Raises ClipError."""
+        """Return the children of these tags, or all of them, as the file means them. Raises ClipError."""
         elements = self._included(list(element), MOST_FOLLOWED)
         return [self._followed(each) for each in elements if not tags or local_name(each) in tags]
 
     def child(self, element: Element, *tags: str) -> Element | None:
-        """The first child of one of these tags; None without any."""
+        """Return the first child of one of these tags; None without any."""
         return next(iter(self.children(element, *tags)), None)
 
     def folder(self, element: Element) -> Path:
-        """The folder of the file that an element is in, from which files that it names are looked for."""
+        """Return the folder of the file that an element is in, from which files that it names are looked for."""
         return self._home.get(element, self._path).parent
 
     def source(self, element: Element | None) -> bytes:
-        """What is the same for two elements that say the same in the same place."""
+        """Return what is the same for two elements that say the same in the same place."""
         if element is None:
             return b""
         return f"{self.folder(element)}\n".encode("utf-8", "surrogateescape") + ElementTree.tostring(element).strip()
@@ -64,7 +64,7 @@ class Documents:
         return root
 
     def _included(self, elements: Sequence[Element], left: int) -> list[Element]:
-        """The elements, with what is included in place of each xi:include."""
+        """Return the elements, with what is included in place of each xi:include."""
         if left <= 0:
             raise ClipError(f"xi:include: got more than {MOST_FOLLOWED} that lead to each other, expected an end")
         included: list[Element] = []
@@ -76,7 +76,7 @@ class Documents:
         return included
 
     def _targets(self, include: Element) -> list[Element]:
-        """The elements that an xi:include stands for. Raises ClipError where there are none."""
+        """Return the elements that an xi:include stands for. Raises ClipError where there are none."""
         href, pointer = unquote(include.get("href", "")), include.get("xpointer")
         fallback = next((child for child in include if local_name(child) == FALLBACK), None)
         try:
@@ -107,7 +107,7 @@ class Documents:
         return self._pointers[path]
 
     def _followed(self, element: Element) -> Element:
-        """The element that a reference stands for, or the element itself."""
+        """Return the element that a reference stands for, or the element itself."""
         for _ in range(MOST_FOLLOWED):
             reference = element.get("Reference")
             if not reference:

@@ -36,7 +36,8 @@ class Pointers:
         self.visited = 0
 
     def find(self, path: str, start: Element | None = None) -> list[Element]:
-        """The elements of an XPath, which may be relative to `start`. Raises ClipError for one that is not known."""
+        """Return the elements of an XPath, which may be relative to `start`. Raises ClipError for one that is not
+        known."""
         key = path if start is None or path.lstrip().startswith("/") else ""
         if key not in self._found or not key:
             elements = _Parser(path).parsed()(self, self._top if start is None else start)
@@ -44,7 +45,7 @@ class Pointers:
         return self._found[key]
 
     def of_xpointer(self, pointer: str) -> list[Element]:
-        """The elements of an XPointer: the first of its parts that names any. Raises ClipError."""
+        """Return the elements of an XPointer: the first of its parts that names any. Raises ClipError."""
         elements: list[Element] = []
         for scheme, text in _parts(pointer):
             if scheme in ("xpointer", "xpath1", "xpath"):
@@ -65,7 +66,7 @@ class Pointers:
         return elements[:1]
 
     def _by_numbers(self, text: str) -> list[Element]:
-        """The element of /1/2/3, or of that below an id."""
+        """Return the element of /1/2/3, or of that below an id."""
         name, *numbers = text.strip().split("/")
         elements = self._by_id(name) if name else [self._top]
         for number in numbers:
@@ -83,7 +84,7 @@ class Pointers:
                 yield each
 
     def along(self, axis: str, element: Element) -> list[Element]:
-        """The elements along an axis from one."""
+        """Return the elements along an axis from one."""
         if axis == "self":
             return [element]
         if axis == "child":

@@ -87,7 +87,7 @@ class BuildError(Exception):
 
 
 def decoder_sources() -> list[Path]:
-    """The C files that a player needs, as core/CMakeLists.txt lists them."""
+    """Return the C files that a player needs, as core/CMakeLists.txt lists them."""
     lists = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES\s([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
     if len(lists) != 2:
         raise BuildError(f"{CORE / 'CMakeLists.txt'}: got {len(lists)} lists of C files, expected decoder and GPU form")
@@ -95,7 +95,7 @@ def decoder_sources() -> list[Path]:
 
 
 def exports(template: str) -> list[str]:
-    """The C functions that the template calls."""
+    """Return the C functions that the template calls."""
     return sorted(set(re.findall(r"\bc\.(ath_\w+)\(", template)))
 
 
@@ -109,7 +109,7 @@ def check_compiler() -> None:
 
 
 def compile_decoder(template: str) -> bytes:
-    """The decoder as a WebAssembly module."""
+    """Return the decoder as a WebAssembly module."""
     check_compiler()
     wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
     # functions of one kind beside each other compress better
@@ -131,7 +131,7 @@ def _zig(folder: str, *arguments: str) -> None:
 
 
 def pack(template: str, wasm: bytes) -> str:
-    """The module's text."""
+    """Return the module's text."""
     payload = base64.b64encode(zstandard.ZstdCompressor(level=PACKING).compress(wasm)).decode("ascii")
     head, code = template.split("\n\n", 1)
     pieces = INCLUDE.split(code)  # Text of the template and names of files take turns.
@@ -147,7 +147,7 @@ def _lean(text: str) -> str:
 
 
 def unpack(module: str) -> tuple[str, bytes]:
-    """(text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
+    """Return (text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
     match = PAYLOAD.search(module)
     try:
         return PAYLOAD.sub("", module, count=1), zstandard.ZstdDecompressor().decompress(base64.b64decode(match[2]))

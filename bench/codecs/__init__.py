@@ -80,13 +80,13 @@ class Codec(Protocol):
     settings: dict  # Settings that the last encode chose.
 
     def missing(self) -> str | None:
-        """The reason why it cannot run here, in one line; None if it can."""
+        """Return the reason why it cannot run here, in one line; None if it can."""
 
     def encode(self, source: Source, bound: float) -> bytes:
-        """The smallest encoding found within `bound`, in scene units."""
+        """Return the smallest encoding found within `bound`, in scene units."""
 
     def decode(self, data: bytes) -> np.ndarray:
-        """(T, N, 3) float32, in the source's order."""
+        """Return (T, N, 3) float32, in the source's order."""
 
 
 class BoundBroken(Exception):
@@ -94,7 +94,7 @@ class BoundBroken(Exception):
 
 
 def blocks(values: np.ndarray) -> Iterator[slice]:
-    """Slices of the first axis, short enough for float64 copies to stay small."""
+    """Return slices of the first axis, short enough for float64 copies to stay small."""
     length = max(1, BLOCK // values[0].size)
     return (slice(start, start + length) for start in range(0, len(values), length))
 
@@ -110,7 +110,7 @@ def largest_error(positions: np.ndarray, decoded: np.ndarray) -> float:
 
 
 def check(codec: Codec, source: Source, bound: float) -> tuple[bytes, np.ndarray]:
-    """Encodes and decodes. Raises BoundBroken if the error exceeds the bound, or the shape or type differs."""
+    """Return encodes and decodes. Raises BoundBroken if the error exceeds the bound, or the shape or type differs."""
     data = codec.encode(source, bound)
     decoded = codec.decode(data)
     if decoded.shape != source.positions.shape or decoded.dtype != np.float32:

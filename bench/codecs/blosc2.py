@@ -24,7 +24,7 @@ class Blosc2(Program):
     sample_values = 90_000
 
     def choices(self, form: str) -> list:
-        """(layout, filter, zigzag)."""
+        """Return (layout, filter, zigzag)."""
         return list(product(FLAT_LAYOUTS, FILTERS, (True, False) if form == "integers" else (False,)))
 
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:

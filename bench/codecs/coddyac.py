@@ -71,7 +71,7 @@ class Coddyac(Baseline):
 
 
 def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
-    """(N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
+    """Return (N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
     before, before2 = order.before, order.before2
     length = np.linalg.norm(pose - pose[before], axis=1)
     last = np.linalg.norm(pose[before] - pose[before2], axis=1)
@@ -80,7 +80,7 @@ def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
 
 
 def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
-    """(2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
+    """Return (2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
     some = np.flatnonzero(order.before >= 0)
     target, near = units[some], units[order.before[some]]
     step = step_ratio[some] * (near - units[order.before2[some]])

@@ -54,7 +54,7 @@ GRID: dict[str, Ladder | Choice] = {
 
 
 def grid_of(names: str, **parameters: Ladder | Choice) -> dict[str, Ladder | Choice]:
-    """Settings by name, in the order of the search: those of GRID, and the codec's own."""
+    """Return settings by name, in the order of the search: those of GRID, and the codec's own."""
     return {name: parameters.get(name) or GRID[name] for name in names.split()}
 
 
@@ -76,7 +76,7 @@ class Trajectories:
         return rows.reshape(-1, 3, self.frames)
 
     def to_axes(self, coefficients: np.ndarray) -> np.ndarray:
-        """(N, 3, F) for code_row of coefficients (rows, K): joint components take the axes by turns."""
+        """Return (N, 3, F) for code_row of coefficients (rows, K): joint components take the axes by turns."""
         if not self.joint:
             return coefficients.reshape(-1, 3, coefficients.shape[1])
         missing = -coefficients.shape[1] % 3
@@ -97,12 +97,12 @@ def principal(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mean_of(source: Source, order: VertexOrder) -> np.ndarray:
-    """(N, 3) mean of each vertex."""
+    """Return (N, 3) mean of each vertex."""
     return memo(source, ("mean", order.hierarchy is not None), lambda: ordered(source, order).mean(axis=2))
 
 
 def mean_motion(source: Source, order: VertexOrder) -> np.ndarray:
-    """(N, 3, T) motion about the mean."""
+    """Return (N, 3, T) motion about the mean."""
     return ordered(source, order) - mean_of(source, order)[:, :, None]
 
 
@@ -113,7 +113,7 @@ def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories)
 
 
 def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories) -> np.ndarray:
-    """Basis rows (K, length), each at about its step; returns what a reader will decode."""
+    """Return basis rows (K, length), each at about its step; returns what a reader will decode."""
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
@@ -138,7 +138,7 @@ def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
 
 
 def _in_threes(tracks: np.ndarray) -> np.ndarray:
-    """(R, T) as rows of three axes."""
+    """Return (R, T) as rows of three axes."""
     return np.pad(tracks, ((0, -len(tracks) % 3), (0, 0))).reshape(-1, 3, tracks.shape[1])
 
 
@@ -181,7 +181,7 @@ def significant(
     trajectories: Trajectories,
     least: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The basis vectors that are worth their bytes, at least `least`, and the step of each."""
+    """Return the basis vectors that are worth their bytes, at least `least`, and the step of each."""
     values, basis = spectrum
     count = max(least, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
     steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / np.maximum(values[:count], 1e-30)
@@ -223,7 +223,7 @@ def _inverse(normal: np.ndarray) -> np.ndarray:
 
 
 def fitted_to(basis: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Least-squares coefficients of rows."""
+    """Return least-squares coefficients of rows."""
     return rows @ (basis.T @ _inverse(basis @ basis.T))
 
 
@@ -311,7 +311,7 @@ class ClusteredPca(Baseline):
         return positions, order
 
     def _clusters(self, source: Source, order: VertexOrder, count: int, trajectories: Trajectories):
-        """Cluster of each vertex (N,), and the spectrum of each cluster."""
+        """Return cluster of each vertex (N,), and the spectrum of each cluster."""
 
         def make():
             motion = mean_motion(source, order)
@@ -323,7 +323,7 @@ class ClusteredPca(Baseline):
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
     def _lloyd(self, coefficients: np.ndarray, count: int, vertices: int) -> np.ndarray:
-        """Clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
+        """Return clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
         by_vertex = coefficients.reshape(vertices, -1, coefficients.shape[1])
         some = by_vertex[:: -(-vertices // self.moved)]
         groups = np.arange(len(some)) * count // len(some)

@@ -46,7 +46,7 @@ def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
 
 
 def _swayed(rest: np.ndarray, order: np.ndarray, parent: np.ndarray, wind: Wind, seconds: float) -> np.ndarray:
-    """Every piece turns with the one below and a little more, across the wind where it is."""
+    """Return every piece turns with the one below and a little more, across the wind where it is."""
     push = wind.at(rest, seconds)
     axis = np.cross([0, 1, 0], push) * (0.002 + 0.006 * rest[:, 1:2] / rest[:, 1].max())
     above = order[1:]

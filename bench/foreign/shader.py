@@ -43,7 +43,7 @@ class _Tree:
         self.height = height
 
     def at(self, seconds: float) -> np.ndarray:
-        """The positions that the shader gives."""
+        """Return the positions that the shader gives."""
         edge, phase, swing = self.colours.T
         phases = np.stack([self.points @ np.full(3, 0.7) + phase, phase], axis=1)
         waves = np.abs(((seconds + phases)[:, [0, 0, 1, 1]] * WAVES * 0.7 + 0.5) % 1.0 * 2 - 1)

@@ -23,14 +23,14 @@ class Scene:
     standing: MotionClip | None = None
 
     def bare(self) -> MotionClip:
-        """The clip as a source without branches gives it."""
+        """Return the clip as a source without branches gives it."""
         return bare(self.clip)
 
     def without_faces(self) -> Scene:
         return replace(self, clip=self.clip.replace(faces=None))
 
     def part(self, plant: int) -> MotionClip:
-        """One plant alone, without branches."""
+        """Return one plant alone, without branches."""
         kept = np.flatnonzero(self.plant == plant)
         number = np.full(len(self.plant), -1, np.int32)
         number[kept] = np.arange(len(kept))

@@ -18,12 +18,12 @@ for part in sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py")
 
 
 def results(data: bytes, mesh: bytes | None = None) -> dict[str, str]:
-    """The document's result for every item of a file."""
+    """Return the document's result for every item of a file."""
     return {item: conformance.result(conformance.document, data, item, mesh) for item in conformance.items(data)}
 
 
 def line_of(vector: Vector, data: bytes) -> str:
-    """The line in expected.txt. Raises ValueError if the document's result is not the vector's."""
+    """Return the line in expected.txt. Raises ValueError if the document's result is not the vector's."""
     outcome = results(data, vector.mesh)
     wrong = {item: result for item, result in outcome.items() if result in conformance.ERRORS}
     if (vector.error and outcome.get(vector.item) != vector.error) or (not vector.error and wrong):
@@ -36,7 +36,7 @@ def line_of(vector: Vector, data: bytes) -> str:
 
 
 def write(folder: Path = conformance.FOLDER) -> int:
-    """Writes missing vectors; returns their number."""
+    """Write missing vectors; returns their number."""
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"

@@ -82,7 +82,7 @@ def points_of(text: str) -> list[list[float]]:
 
 
 def lone(**fields) -> Plant:
-    """One vertex, one frame."""
+    """Return one vertex, one frame."""
     return Plant([Stem(-1, 1)], points=[[4.0, 8.0, 12.0]], **fields)
 
 
@@ -90,7 +90,7 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 
 
 def forked(**fields) -> Plant:
-    """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
+    """Return a trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
         (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
         (STEMS, 1): 1,
@@ -106,7 +106,7 @@ def fork() -> Draft:
 
 
 def still(stems: list[Stem], **fields) -> Plant:
-    """A plant whose rows are all empty."""
+    """Return a plant whose rows are all empty."""
     return Plant(stems, **fields)
 
 
@@ -184,7 +184,7 @@ def inserted(at: int, *entries: Entry) -> Draft:
 
 
 def cut(short: Callable[[Draft], int], draft: Draft | None = None) -> bytes:
-    """The first chunks of a file, of the fork if none is given, less some bytes."""
+    """Return the first chunks of a file, of the fork if none is given, less some bytes."""
     draft = draft or fork()
     return draft.file()[: short(draft)]
 
@@ -221,7 +221,7 @@ def placed(stems: list[Stem], points: Sequence, seed: int, frames: int = 3, **fi
 
 
 def not_refused(make: Callable[[], Draft]) -> bytes:
-    """The file with streams that go on behind what is refused."""
+    """Return the file with streams that go on behind what is refused."""
     kept, rules.require = rules.require, lambda *_: None
     try:
         return make().file()
@@ -235,5 +235,6 @@ SHORT, LARGEST = [Stem(-1, 3)], (1 << 30) - 1
 
 
 def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0) -> list:
-    """Script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its turn."""
+    """Return script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its
+    turn."""
     return [1, rank, mirrored, place[0], largest >> 1, largest & 1, *place[1:]]

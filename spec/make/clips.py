@@ -6,7 +6,7 @@ CALM, STORM = Clip(3, 1, "calm"), Clip(4, 2, "storm")
 
 
 def two_clips(**fields) -> Draft:
-    """The fork with two clips, of 3 frames, and of 4 in two segments."""
+    """Return the fork with two clips, of 3 frames, and of 4 in two segments."""
     return forked(**{"clips": (CALM, STORM)} | fields).draft()
 
 
@@ -19,7 +19,7 @@ def periodic(clip: Clip, *seams: float) -> Clip:
 
 
 def named(*names: str) -> Plant:
-    """One vertex with a clip of a frame for each name."""
+    """Return one vertex with a clip of a frame for each name."""
     return lone(clips=tuple(Clip(1, 1, name) for name in names))
 
 
@@ -34,7 +34,7 @@ def clips(title: str, *entries: bytes, count: int = 2) -> None:
 
 
 def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
-    """One vertex, and any CLIPS."""
+    """Return one vertex, and any CLIPS."""
     draft = lone(frames=frames, segments=segments).add(Entry(CLIPS, b"".join(entries)))
     return draft.with_header(clip_count=len(entries), **header_fields)
 

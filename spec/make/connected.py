@@ -28,7 +28,7 @@ def connected(
 
 
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
-    """A rest pose by faces, of any sizes."""
+    """Return a rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
     places = fields.get("places")
     content = mixed_polygons(faces, count if places is None else places)
@@ -39,7 +39,7 @@ def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **f
 
 
 def hub(first: int, quads: int, edges: int) -> list[list[int]]:
-    """Faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
+    """Return faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
     chain = list(range(first, first + 2 * quads + edges))
     middle, across = len(chain) + first + 1, len(chain) + first
     faces = [[middle, chain[2 * i], across, chain[2 * i + 1]] for i in range(quads)]
@@ -69,7 +69,7 @@ def hubs() -> list[list[int]]:
 
 
 def crowd(seed: int) -> list[list[int]]:
-    """Triangles and quadrangles by chance that share many sides, and corners."""
+    """Return triangles and quadrangles by chance that share many sides, and corners."""
     random = np.random.default_rng(seed)
     faces = [random.integers(0, 16, 3 + (i % 5 == 4)).tolist() for i in range(31)]
     return [*faces, [0, 1, 2], [2, 1, 3], [1, 2, 4], [2, 1, 5], [1, 2, 6], [14, 15, 16], [16, 15, 13]]
@@ -82,7 +82,7 @@ LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones,
 
 
 def leaves() -> list[list[int]]:
-    """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    """Return a triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
     faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
     return [
         *faces,

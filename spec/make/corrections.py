@@ -8,7 +8,7 @@ def corrections(step: float) -> Callable[[], bytes]:
 
 
 def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
-    """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
+    """Return a vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
     draft = lone(scripts={(CORRECTIONS, 1): [0]}, **fields).draft()
     content = draft.content(CORRECTIONS, 1, 0)
     return draft.change(CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))

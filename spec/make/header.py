@@ -9,7 +9,7 @@ from spec.make.static import attributes, element
 
 
 def traced() -> Plant:
-    """The file of "A file in bytes" and "A level traced" in FORMAT.md."""
+    """Return the file of "A file in bytes" and "A level traced" in FORMAT.md."""
     stem = [Stem(-1, 3)]
     return Plant(
         stem,
@@ -44,7 +44,7 @@ def front_alone(draft: Draft) -> bytes:
 
 
 def errors_by_chance(count: int) -> tuple[int, ...]:
-    """Large and small steps up and down, to both ends of the range."""
+    """Return large and small steps up and down, to both ends of the range."""
     random, last, errors = np.random.default_rng(411), [4000] * 3, []
     for _ in range(count):
         step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
@@ -59,7 +59,7 @@ def of_memory(vertices: int) -> Draft:
 
 
 def of_range(max_error: int) -> Draft:
-    """Counts after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
+    """Count after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
     clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
     return (
         lone()
@@ -102,7 +102,7 @@ def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().d
 
 
 def shown(*levels: int) -> Draft:
-    """The fork, of which these levels are shown."""
+    """Return the fork, of which these levels are shown."""
     draft = fork().with_header(stages=levels, level_count=len(levels), full_level_count=len(levels))
     for segment in range(2 if 0 not in levels else 0):
         draft = draft.without(AFFINES, 0, segment)
@@ -289,7 +289,7 @@ def damaged_before_cut() -> bytes:
 
 
 def stages_without_end() -> bytes:
-    """A front stream that ends where stages are left out: all decisions behind it are 1."""
+    """Return a front stream that ends where stages are left out: all decisions behind it are 1."""
 
     def stages(data: bytes) -> None:
         coder = rules.RangeDecoder(data)

@@ -6,7 +6,7 @@ BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
 
 
 def interleaved(stems: list[Stem]) -> list[int]:
-    """Numbers of the vertices in a source that holds all first vertices, then all second ones."""
+    """Return numbers of the vertices in a source that holds all first vertices, then all second ones."""
     places = [(i, b) for b, stem in enumerate(stems) for i in range(stem.count)]
     return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
 

@@ -101,7 +101,7 @@ for title, make in {
 
 
 def apart(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
-    """The same, of segments that move in different ways."""
+    """Return the same, of segments that move in different ways."""
     plant = joined(stems, seed, *widths, **fields)
     plant.scripts = {}
     for level, s in product(range(8), range(len(widths))):

@@ -10,7 +10,8 @@ from spec.make.tubes import RIGID, TUBES
 
 
 def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
-    """The fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`: scripts."""
+    """Return the fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`:
+    scripts."""
     more = {"scripts": {}} | fields
     scripts = forked().scripts | {
         (SHAPES, 3, 0): [
@@ -44,14 +45,14 @@ LEVEL_1_REST = {(REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
 
 
 def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
-    """The same, with a rest pose of level 0 alone."""
+    """Return the same, with a rest pose of level 0 alone."""
     plant = refinements(stems, seed, **fields)
     plant.scripts |= LEVEL_1_REST
     return plant
 
 
 def learned(*levels: int) -> dict:
-    """Heads with learned time bases for some levels, in segments of two frames."""
+    """Return heads with learned time bases for some levels, in segments of two frames."""
     random = np.random.default_rng(5)
     return LAYER_HEADS | {
         level: stems_head(
@@ -62,7 +63,7 @@ def learned(*levels: int) -> dict:
 
 
 def lossless_layers() -> Draft:
-    """An additional last level with empty streams."""
+    """Return an additional last level with empty streams."""
     return (
         layered().with_header(level_count=6, full_level_count=6).add(Entry(EXACT, b"", 5, 0), Entry(EXACT, b"", 5, 1))
     )
@@ -97,7 +98,7 @@ def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
 
 
 def refined_run(count: int) -> bytes:
-    """The stream of a root of three vertices, the last two of which are a run with so many modes."""
+    """Return the stream of a root of three vertices, the last two of which are a run with so many modes."""
     branches = branches_of([Stem(-1, 3, lag=0)])
     before = rules.Record(rest=[[0.0] * 3] * 3, rows={})
     return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)

@@ -10,8 +10,8 @@ TUBES = stems_of(
 
 
 def of_sizes(*powers: int) -> list[list[float]]:
-    """A stem, and for each power of two three vertices by chance that are as far away from its first one; every second
-    three are flat."""
+    """Return a stem, and for each power of two three vertices by chance that are as far away from its first one; every
+    second three are flat."""
     random = np.random.default_rng(531)
     triples = [
         math.ldexp(1.0, power - 10) * random.integers(-1024, 1025, (3, 3)) * [1, 1, i % 2]

@@ -43,7 +43,7 @@ class Cases:
 
 
 def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
-    """Runs as many cases as time allows, in a fixed random order."""
+    """Run as many cases as time allows, in a fixed random order."""
     order = list(range(len(cases.arguments)))
     random.Random(0).shuffle(order)
     counts = dict.fromkeys(("crashes", "hangs", "over_limit", "wrong"), 0)
@@ -58,7 +58,7 @@ def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
 
 
 def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, hang: float) -> tuple[int, str, str]:
-    """Runs cases from number `start`: (the next number, kind of fault or "", message)."""
+    """Run cases from number `start`: (the next number, kind of fault or "", message)."""
     context = multiprocessing.get_context("spawn")
     at, messages = context.Value("q", start), context.SimpleQueue()
     process = context.Process(target=_work, args=(cases, order, start, deadline, at, messages), daemon=True)

@@ -32,13 +32,13 @@ DEAD = 70
 
 
 def build(folder: Path) -> Path:
-    """The library. Raises RuntimeError where there is no C compiler."""
+    """Return the library. Raises RuntimeError where there is no C compiler."""
     return compiled(folder, [HERE / "faulty.c"], "-shared", "-fPIC")
 
 
 def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, until: float = float("inf")) -> Row:
-    """A run of `verb` for every call that can fail; for so many of them, chosen at random, where `sample` says so.
-    lasts: all further calls fail too."""
+    """Return a run of `verb` for every call that can fail; for so many of them, chosen at random, where `sample` says
+    so. lasts: all further calls fail too."""
     row = Row(f"{verb}: call n fails{', and all after it' if lasts else ''}", 0)
     library = build(folder)
     asked = {"verb": verb, "folder": str(folder), "sample": sample, "lasts": lasts, "seconds": until - time.monotonic()}
@@ -61,8 +61,8 @@ def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, unt
 
 
 def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("inf")) -> Row:
-    """A batch of one clip whose n-th call fails, in the run and in each of its workers; the next run, without faults,
-    has to finish it and to leave nothing else."""
+    """Return a batch of one clip whose n-th call fails, in the run and in each of its workers; the next run, without
+    faults, has to finish it and to leave nothing else."""
     row = Row("batch: call n fails", 0, note="in the run and in its worker")
     library, place = build(folder), Place.make(folder)
     words = ["batch", str(place.source), "--out", str(place.folder), "--workers", "1", "--effort", "fast"]
@@ -151,7 +151,7 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def rows(budget: float) -> list[Row]:
-    """All calls of all verbs, within about `budget` seconds."""
+    """Return all calls of all verbs, within about `budget` seconds."""
     start, outcomes = time.monotonic(), []
     for number, (verb, lasts) in enumerate((verb, lasts) for verb in VERBS for lasts in (False, True)):
         with tempfile.TemporaryDirectory() as folder:

@@ -60,13 +60,13 @@ def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **op
 
 
 def within_limits(data: bytes) -> int:
-    """Reads the file in every way; returns the memory that this may take."""
+    """Read the file in every way; returns the memory that this may take."""
     use(data, limits=LIMITS)
     return 2 * LIMITS.memory_bytes + _whole_clip(data)
 
 
 def _whole_clip(data: bytes) -> int:
-    """Bytes of all positions, which `use` reads as float64."""
+    """Return bytes of all positions, which `use` reads as float64."""
     try:
         header = AthFile(BytesIO(data), limits=LIMITS).tables.header
     except FormatError:
@@ -125,7 +125,7 @@ def flipped_bit(data: bytes, bit: int) -> int:
 
 
 def checked_bits(data: bytes) -> list[int]:
-    """All bits but those of unknown chunks, which no decoder reads."""
+    """Return all bits but those of unknown chunks, which no decoder reads."""
     file = AthFile(BytesIO(data))
     known = [range(chunk.offset, chunk.offset + chunk.length) for chunk in file.chunks]
     front = range(file.chunks[0].offset)
@@ -138,7 +138,7 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 
 def repaired(data: bytes) -> bytes:
-    """The file with correct checksums, as far as the front can be read."""
+    """Return the file with correct checksums, as far as the front can be read."""
     *_, length, count = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
     if not ct._HEADER.size + 4 * count <= length <= len(data):
         return data
@@ -182,7 +182,8 @@ MOST_GROWTH = 3.2
 
 
 def seconds_and_bytes(data: bytes) -> tuple[float, int]:
-    """Seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts determine."""
+    """Return seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts
+    determine."""
     start = time.perf_counter()
     decoder = athcodec.open(BytesIO(data))
     decoded = sum(block.nbytes for _, block in decoder.blocks())
@@ -229,7 +230,7 @@ def announces_too_much(_: bytes, name: str) -> int:
 
 
 def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
-    """(weight of the time, cases)"""
+    """Return (weight of the time, cases)"""
     small = {name: data for name, data in files.items() if len(data) <= SMALL}
     of_files = [
         (0.5, "a byte or more too many", files, lambda _: [b"\0", b"more", bytes(4096)], too_long),
@@ -259,7 +260,7 @@ def run(budget: float) -> list[Row]:
 
 
 def figures() -> dict[str, str]:
-    """The cost of slow files, measured again in this process."""
+    """Return the cost of slow files, measured again in this process."""
     lines = {}
     for name, make in hostile_files.SLOW.items():
         seconds, size = seconds_and_bytes(make(2))

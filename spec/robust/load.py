@@ -57,7 +57,7 @@ def job(name: str, *words: object) -> tuple[int, dict]:
 
 
 def compilers() -> list[str]:
-    """Compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
+    """Return compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
     commands = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
     if not commands:
         raise RuntimeError("C compiler: found none of clang, gcc and cc; expected one, or its name in CC")
@@ -65,7 +65,7 @@ def compilers() -> list[str]:
 
 
 def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
-    """A program or library in C, by the first compiler that succeeds."""
+    """Return a program or library in C, by the first compiler that succeeds."""
     target = folder / sources[0].stem
     problems = ""
     for compiler in compilers():
@@ -110,7 +110,7 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
 
 
 def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
-    """Threads on shared and on separate decoders of each file, compared with a single thread."""
+    """Return threads on shared and on separate decoders of each file, compared with a single thread."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
     expected = [[decoder.positions(level=level) for level in range(decoder.file.level_count)] for decoder in shared]
@@ -135,7 +135,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
 
 def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
-    """Whether a random frame, or some frames, of a random level are as expected."""
+    """Return whether a random frame, or some frames, of a random level are as expected."""
     level, frame = rng.randrange(decoder.file.level_count), rng.randrange(decoder.frame_count)
     if rng.random() < 0.2:
         frames = slice(frame, frame + 10)
@@ -155,7 +155,7 @@ def resident_bytes() -> int:
 
 
 def seek_at_random(path: str, seeks: int) -> dict:
-    """Growth of memory and of the number of Python's objects over so many seeks and changes of level."""
+    """Return growth of memory and of the number of Python's objects over so many seeks and changes of level."""
     rng = random.Random(4)
     with athcodec.open(path) as decoder:
         expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
@@ -188,7 +188,7 @@ ALLOWED_GROWTH = 4 << 20
 
 
 def open_many(path: str, count: int) -> dict:
-    """Opens many decoders at once and reads from each, before and after others are closed in random order."""
+    """Open many decoders at once and reads from each, before and after others are closed in random order."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = count + 100
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -242,7 +242,7 @@ class FailingAllocator:
         self._library.scarce_arm(n)
 
     def stop(self) -> bool:
-        """Stops failing; whether the allocation has failed."""
+        """Stop failing; whether the allocation has failed."""
         return bool(self._library.scarce_arm(0))
 
 
@@ -250,7 +250,7 @@ Call = Callable[[], object]
 
 
 def _calls(path: str, out: str) -> dict[str, Call]:
-    """The tested calls, which keep nothing in memory between each other."""
+    """Return the tested calls, which keep nothing in memory between each other."""
 
     def opened(use: Callable[[athcodec.Decoder], object]) -> Call:
         def call() -> object:
@@ -288,8 +288,8 @@ def _calls(path: str, out: str) -> dict[str, Call]:
 
 
 def run_out_of_memory(path: str, seconds: float) -> dict:
-    """Each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or raise
-    MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
+    """Return each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or
+    raise MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
     wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
         folder = Path(name)
@@ -332,7 +332,7 @@ def _error_of(call: Call) -> BaseException | None:
 
 
 def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
-    """Every allocation of an array in every call fails once."""
+    """Return every allocation of an array in every call fails once."""
     code, result = job("allocations", path, seconds)
     row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
@@ -342,7 +342,7 @@ def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
 
 
 def in_little_space(path: str, megabytes: float) -> dict:
-    """Decodes with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
+    """Decode with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
     with athcodec.open(path) as decoder:
         expected = decoder.positions(0)
         room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
@@ -368,7 +368,7 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Limits.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
+    """Limit.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()
@@ -394,7 +394,7 @@ JOBS: dict[str, Callable[..., dict]] = {
 
 
 def run(budget: float) -> list[Row]:
-    """All runs, within about `budget` seconds."""
+    """Return all runs, within about `budget` seconds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = [folder / "short.ath", folder / "long.ath"]

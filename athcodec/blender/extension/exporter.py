@@ -87,7 +87,8 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
 
 
 def left_out_of(context, summary) -> str:
-    """What is selected besides the active object, and what of that is not in the file, in words; "" for nothing."""
+    """Return what is selected besides the active object, and what of that is not in the file, in words; "" for
+    nothing."""
     from athcodec.sources import listed
 
     others = [obj.name for obj in context.selected_objects if obj != context.active_object]
@@ -169,7 +170,7 @@ class Recording:
         self._spool.write(positions.tobytes())
 
     def clip(self, scene):
-        """The MotionClip of the frames."""
+        """Return the MotionClip of the frames."""
         from athcodec.motion.clip import MotionClip
 
         self._spool.flush()
@@ -226,7 +227,8 @@ def _unit(scene, world: bool) -> dict:
 
 
 def _static(mesh, obj) -> dict:
-    """Arguments of MotionClip that do not move, the domains of the attributes, and the names of those left out."""
+    """Return arguments of MotionClip that do not move, the domains of the attributes, and the names of those left
+    out."""
     fields, arrays, domains = {}, {}, {}
     counts = np.empty(len(mesh.polygons), np.int32)
     corners = np.empty(len(mesh.loops), np.int32)
@@ -251,7 +253,7 @@ def _static(mesh, obj) -> dict:
 
 
 def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
-    """Adds the attributes that an .ath file holds, and returns the names of the others."""
+    """Add the attributes that an .ath file holds, and returns the names of the others."""
     from athcodec.motion.clip import RESERVED_NAMES
 
     active = mesh.uv_layers.active
@@ -288,7 +290,7 @@ def _take_branches(obj, arrays: dict, fields: dict) -> None:
 
 
 def _skin(obj, vertex_count: int):
-    """The armature that moves the object, for finding its branches."""
+    """Return the armature that moves the object, for finding its branches."""
     from athcodec.motion.clip import Skin
 
     armatures = (modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")

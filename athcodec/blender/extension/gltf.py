@@ -52,7 +52,7 @@ class glTF2ExportUserExtension:
         self._first = {}  # By id: primitives whose vertices are numbered as the motion numbers them.
 
     def pre_export_hook(self, export_settings):
-        """Evaluates the frames of all objects that may move."""
+        """Evaluate the frames of all objects that may move."""
         scene = bpy.context.scene
         if not scene.ath_gltf.use:
             return
@@ -81,7 +81,7 @@ class glTF2ExportUserExtension:
                 yield obj
 
     def gather_attributes_change(self, attributes, export_settings):
-        """Adds the numbers of Blender's vertices to those of a mesh."""
+        """Add the numbers of Blender's vertices to those of a mesh."""
         if not self._recordings:
             return
         position = next(each for each in attributes if each["gltf_attribute_name"] == "POSITION")
@@ -97,7 +97,7 @@ class glTF2ExportUserExtension:
         attributes.append({"gltf_attribute_name": VERTEX, "skip_getting_to_dots": True, "set": set_vertices} | kind)
 
     def gather_node_hook(self, node, blender_object, export_settings):
-        """Gives the mesh of an object its motion."""
+        """Give the mesh of an object its motion."""
         primitives = node.mesh.primitives if node.mesh is not None else []
         self._primitives += primitives
         recording = self._recordings.get(blender_object.name) if blender_object else None
@@ -113,13 +113,13 @@ class glTF2ExportUserExtension:
             primitive.extensions = (primitive.extensions or {}) | {EXTENSION: extension}
 
     def gather_gltf_hook(self, active_scene, scenes, animations, export_settings):
-        """Leaves meshes without a motion as they would be."""
+        """Leave meshes without a motion as they would be."""
         for primitive in self._primitives:
             if EXTENSION not in (primitive.extensions or {}):
                 primitive.attributes.pop(VERTEX, None)
 
     def _motion(self, recording, obj, primitives, export_settings) -> dict:
-        """The entry of the motion; primitives number its vertices from now on."""
+        """Return the entry of the motion; primitives number its vertices from now on."""
         if not export_settings["gltf_apply"] and len(obj.data.vertices) != recording.vertex_count:
             raise ValueError(
                 f"{obj.name}: got {recording.vertex_count} vertices that move and {len(obj.data.vertices)} that are "

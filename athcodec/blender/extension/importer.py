@@ -114,7 +114,7 @@ def add_object(
     clip: str = "",
     host_mesh: str = "",
 ):
-    """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
+    """Return a new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
     from athcodec.opening import set_host_mesh_of
 
     path = os.path.normpath(bpy.path.abspath(path))
@@ -138,7 +138,7 @@ def add_object(
 
 
 def _timing(decoder, scene) -> tuple[float, float]:
-    """The scene's frame at which the file begins, and the file's frames per second."""
+    """Return the scene's frame at which the file begins, and the file's frames per second."""
     metadata = decoder.metadata
     rate = float(metadata.get("fps") or decoder.fps or scene.render.fps / scene.render.fps_base)
     first = metadata.get("start_frame", scene.frame_start)
