@@ -93,7 +93,7 @@ def encoded(
     host_rest: bool = False,
     segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
-    """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
+    """Encode the clip at `path` without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}

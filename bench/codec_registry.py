@@ -107,7 +107,7 @@ def _version(name: str) -> str:
 
 
 def _athcodec_files() -> set[Path]:
-    """Python of the encoder and decoder, and the compiled core, of the installed package."""
+    """Yield Python of the encoder and decoder, and the compiled core, of the installed package."""
     package = Path(athcodec.__file__).parent
     return {
         library_path(),
@@ -131,7 +131,7 @@ def _bench_files(module: str) -> set[Path]:
 
 
 def _c_files(sources: Iterable[Path]) -> set[Path]:
-    """C files and what they include of the core, recursively."""
+    """Yield C files and what they include of the core, recursively."""
     files, waiting = set(), list(sources)
     while waiting:
         file = waiting.pop()

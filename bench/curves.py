@@ -16,7 +16,8 @@ class Curve:
 
     @classmethod
     def of(cls, errors, sizes) -> Curve:
-        """From points in any order; those with an error or a size of 0 have no logarithm and are left out."""
+        """Return a curve through points in any order. Points with an error or a size of 0 have no logarithm and are
+        left out."""
         kept: list[tuple[float, float]] = []
         for error, size in sorted(zip(errors, sizes, strict=True)):
             if error > 0 and size > 0 and (not kept or size < kept[-1][1]):

@@ -210,7 +210,7 @@ def _recipe_in(path: Path, name: str) -> str | None:
 
 
 def tip_motion(clip: athcodec.MotionClip) -> float:
-    """RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
+    """Return the RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
     order = np.arange(clip.vertex_count) if clip.stem_index is None else clip.stem_index
     last = np.lexsort((order, clip.vertex_branch))
     ends = last[np.flatnonzero(np.diff(clip.vertex_branch[last], append=clip.branch_count))]

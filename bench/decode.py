@@ -265,7 +265,7 @@ def _sz3_job(positions: np.ndarray, bound: float, algorithm: str) -> Callable[[]
 
 
 def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Level 1 and the deepest, each with one segment and with two."""
+    """Return rows for level 1 and the deepest level, each with one segment and with two."""
     levels, rows = figures["levels"], []
     positions = 12 * figures["vertices"] * figures["longest_segment"]
     for level in sorted({min(1, len(levels) - 1), len(levels) - 1}):

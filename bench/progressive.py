@@ -101,7 +101,7 @@ def _prefixes(result: Encoded, curves: dict[str, Curve]) -> Iterator[dict[str, A
 
 
 def _at_errors(prefixes: list[dict[str, Any]], curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
-    """At 1e-2, 3e-3, 1e-3 and so on, by both measures."""
+    """Yield a row for each of the errors 1e-2, 3e-3, 1e-3 and so on, by both measures."""
     for error in (digit * 10.0**-decade for decade in range(1, 9) for digit in (1, 0.3)):
         row: dict[str, Any] = {}
         for kind in MEASURES:
@@ -114,7 +114,8 @@ def _at_errors(prefixes: list[dict[str, Any]], curves: dict[str, Curve]) -> Iter
 
 
 def _ratios(prefixes: list[dict[str, Any]], curve: Curve) -> Iterator[float]:
-    """Prefix over own file at the errors of ASKED that both have, and just below those of the prefixes."""
+    """Yield the size of a prefix over that of a file encoded directly, at the errors of ASKED that both have and
+    just below those of the prefixes."""
     steps = {prefix["max"] for prefix in prefixes}
     for error in {*curve.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}:
         if ASKED[0] <= error <= ASKED[1] and (match := _at(error, "max", prefixes, curve)):

@@ -74,7 +74,7 @@ class Mesh:
         return Mesh(self.positions, None, self.time)
 
     def with_vertices(self, vertices: np.ndarray, number: np.ndarray) -> Mesh:
-        """These vertices; number: (N,) of each vertex among them."""
+        """Return the mesh with these vertices alone. `number` (N,) is the place of each vertex among them."""
         faces = None if self.faces is None else np.where(self.faces < 0, -1, number[self.faces]).astype(np.int32)
         return Mesh(np.ascontiguousarray(self.positions[:, vertices]), faces, self.time)
 

@@ -97,7 +97,7 @@ def _results_of(table: dict[str, Any]) -> Results:
 
 
 def _layout(value: Any, newline: str = "\n") -> str:
-    """JSON with a line for each value of an object and each item of a list."""
+    """Return JSON with a line for each value of an object and each item of a list."""
     if isinstance(value, dict):
         items = [f"{json.dumps(name)}: {_layout(item, newline + ' ')}" for name, item in value.items()]
     elif isinstance(value, list):

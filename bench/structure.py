@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bound(scene: Scene, rel_error: float) -> float:
-    """In scene units: parts are held to that of the scene."""
+    """Return the bound of a scene, to which its parts are held too, in scene units."""
     low = np.min(scene.clip.positions, axis=(0, 1)).astype(np.float64)
     return rel_error * float(np.linalg.norm(np.max(scene.clip.positions, axis=(0, 1)) - low))
 

@@ -57,7 +57,7 @@ def commit(code: tuple[str, ...] = CODE) -> str:
 
 
 def cpu_model() -> str:
-    """Of the first processor, as the system names it."""
+    """Return the name that the system gives the first processor."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
@@ -99,7 +99,7 @@ def markdown(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _column(name: str, values: list[Any]) -> list[str]:
-    """Header, rule and cells of one column, all of one width; numbers to the right."""
+    """Return header, rule and cells of one column, padded to one width; numbers are aligned to the right."""
     cells = [_cell(value) for value in values]
     width = max(3, *map(len, [name, *cells]))
     if all(isinstance(value, str) for value in values):

@@ -41,7 +41,7 @@ class ThrottledServer(ThreadingHTTPServer):
         self.server_close()
 
     def handle_error(self, request, client_address) -> None:
-        """Ignored: browsers close connections at any time."""
+        """Ignore errors: browsers close connections at any time."""
 
     @property
     def address(self) -> str:
@@ -58,7 +58,7 @@ class ThrottledServer(ThreadingHTTPServer):
         return sum(size for file, _, size in self.log if file == name)
 
     def wait(self, size: int) -> None:
-        """Sleeps until `size` more bytes may be sent."""
+        """Sleep until `size` more bytes may be sent."""
         if self.rate is None:
             return
         with self._lock:

@@ -134,7 +134,7 @@ def format_line(name: str, data: bytes, results: dict[str, str], reason: str) ->
 
 
 def checksum_of(data: bytes, item: str, answer: bytes) -> str:
-    """RESULT of an answer to an item of a file."""
+    """Return RESULT of an answer to an item of a file."""
     if item in NO_ANSWER:
         return "ok" if not answer else "bytes where none are asked for"
     if item.isdecimal():
@@ -144,7 +144,7 @@ def checksum_of(data: bytes, item: str, answer: bytes) -> str:
 
 @lru_cache(maxsize=8)
 def positions_type(data: bytes) -> str:
-    """That of a file whose front is whole."""
+    """Return the type of the positions of a file whose front is whole."""
     return "<f8" if rules.read_front(data)[0].is_float64 else "<f4"
 
 
@@ -236,7 +236,7 @@ def tolerance(deepest: np.ndarray, max_error: float) -> float:
 
 @contextmanager
 def profile(name: str) -> Iterator[None]:
-    """The code of FORMAT.md with the limits of a profile."""
+    """Return the code of FORMAT.md with the limits of a profile."""
     kept, rules.limit = rules.limit, limits_of(name).__getitem__
     try:
         yield
@@ -267,7 +267,7 @@ def items(data: bytes) -> list[str]:
 
 
 def result(ask: Callable[..., bytes], data: bytes, item: str, mesh: bytes | None = None) -> str:
-    """RESULT of one item, by a function that raises Refused."""
+    """Return RESULT of one item, by a function that raises Refused."""
     try:
         return checksum_of(data, item, ask(data, item, mesh))
     except Refused as error:

@@ -148,7 +148,8 @@ def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
 
 
 def _local(text: str, called: str) -> Iterator[tuple[str, str]]:
-    """called: the name of a plain file without its suffix."""
+    """Yield the files of a path, each with what it is called. `called` is the name of a plain file without its
+    suffix."""
     if os.path.isdir(text):
         yield from _below(
             text,
@@ -216,7 +217,7 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
+    """Return fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
     try:
         import fsspec
 

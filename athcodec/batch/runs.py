@@ -311,8 +311,11 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Threads that begin in the block, and processes that they start at any time, never see Ctrl-C, which a terminal
-    sends to all: this thread ends them. It sees one that came meanwhile at the end."""
+    """Keep Ctrl-C from threads that begin in the block, and from processes that they start at any time.
+
+    A terminal sends Ctrl-C to all processes, but this thread ends them. It sees a Ctrl-C that came meanwhile when the
+    block ends.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -194,7 +194,7 @@ def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:
 
 
 def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
-    """One after the other into a file that is there whole or not at all, also where two workers write it."""
+    """Write one object after the other into a file that appears whole or not at all, even if two workers write it."""
     temporary = f"{path}.{os.getpid()}.{time.monotonic_ns()}"
     with open(temporary, "wb") as file:
         for item in objects:

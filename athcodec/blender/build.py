@@ -83,7 +83,7 @@ def _toml(texts: Sequence[str]) -> str:
 
 
 def platform(wheel: Path) -> str:
-    """Blender's name of the platform that a wheel is for. Raises ValueError."""
+    """Return Blender's name of the platform that a wheel is for. Raises ValueError."""
     tag = wheel.stem.split("-")[-1].split(".")[0]
     system = next((name for start, name in PLATFORMS.items() if tag.startswith(start)), None)
     machine = next((name for end, name in MACHINES.items() if tag.endswith(end)), None)

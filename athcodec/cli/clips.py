@@ -249,7 +249,7 @@ def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
 
 
 def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
-    """Frames A to B - 1 of A:B, where None is the clip's end; LevelUnavailable beyond it."""
+    """Return frames A to B - 1 of A:B, where None is the clip's end. Raises LevelUnavailable beyond it."""
     start = 0 if bounds[0] is None else bounds[0]
     stop = frame_count if bounds[1] is None else bounds[1]
     if not start < stop <= frame_count:

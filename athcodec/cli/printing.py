@@ -145,7 +145,7 @@ def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
 
 
 def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
-    """Smoothness and shape, each with the columns that the clip has something for."""
+    """Print smoothness and shape, with the columns for which the clip has values."""
     shape = levels[0]["shape"]
     captions = {
         "smoothness": "second differences over frames, of the error in bounds; tick ratio: those of the motion near "

@@ -309,7 +309,7 @@ def _blurs(args: argparse.Namespace) -> bool:
 
 
 def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Namespace) -> Written:
-    """In the format that is asked for; several are those of a GLB, to go back into it."""
+    """Write a decoder in the format that is asked for. Several decoders are those of a GLB, into which they go back."""
     from athcodec import exporters
     from athcodec.files.gltf.motion import GltfMotion
 

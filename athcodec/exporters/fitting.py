@@ -190,7 +190,7 @@ def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Shorter ranges: what bends is off by the square of its length."""
+    """Cut ranges of vertices into shorter ones: the error of what bends grows with the square of its length."""
     wanted = count if excess is None else np.ceil(np.sqrt(np.minimum(excess, 1e12)))
     pieces = np.clip(wanted, 2, count).astype(np.int64)
     number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)

@@ -140,7 +140,7 @@ def _writer(
 
 
 def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
-    """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
+    """Write the rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | left_out})

@@ -36,7 +36,7 @@ class Movers:
 
     @classmethod
     def all_of(cls, movers: list[Movers]) -> Movers | None:
-        """Concatenate the arrays of several; None of none."""
+        """Return the arrays of several movers as one; None if there are none."""
         if not movers:
             return None
         return cls(
@@ -195,7 +195,8 @@ def _hold(motion: Motion, copies: Copies, allowed: float) -> None:
 
 
 def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies | None:
-    """None where copies have materials, texture coordinates or colours of their own."""
+    """Return the meshes as copies of one; None if copies have materials, texture coordinates or colours of their
+    own."""
     copy, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
     if (np.bincount(copy) * obj.copies != len(copy)).any():
         return None

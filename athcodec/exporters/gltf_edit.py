@@ -98,7 +98,7 @@ def prune(gltf: dict[str, Any], before: dict[str, set[int]], needless: set[int])
 
 
 def _remove(gltf: dict[str, Any], kind: str, dead: set[int]) -> None:
-    """Entries of an array, to which nothing that remains refers; the others get new numbers."""
+    """Remove entries of an array to which nothing that remains refers; the others get new numbers."""
     if not dead:
         return
     place = np.cumsum([index not in dead for index in range(len(gltf[kind]))]) - 1

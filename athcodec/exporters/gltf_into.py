@@ -272,7 +272,7 @@ class Into:
         return np.arange(part.first, part.first + part.count) if self._vertex is None else self._vertex[part.vertices]
 
     def _move_mesh(self, index: int) -> None:
-        """Its mesh to a node of its own, in the motion's space."""
+        """Move the mesh of a node to a new node, in the motion's space."""
         gltf, node = self._json, self._json["nodes"][index]
         matrix = self._placement.space
         if not self._placement.is_always_shown(index):
@@ -292,7 +292,7 @@ def _drawn(binary: Binary, faces: np.ndarray) -> dict[str, int]:
 
 
 def _named(clip: MotionClip) -> MotionClip:
-    """With the name of the animation where it is a single one."""
+    """Return the clip under the name of its animation if it has a single one."""
     played = clip.metadata.get("animations", [])
     if clip.clip_ranges[1:] or len(played) != 1:
         return clip

@@ -65,7 +65,7 @@ def _count_polygons(motion: Motion) -> int:
 
 
 def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
-    """Texture coordinates of two numbers, and whether they are per corner; None: there are none."""
+    """Return texture coordinates of two numbers, and whether they are per corner; None if there are none."""
     uv = motion.attributes.get("uv")
     if uv is None or uv.ndim != 2 or uv.shape[1] != 2 or uv.dtype.kind != "f":
         return None, False
@@ -236,7 +236,8 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
 
 
 def _ply_scene(motion: Motion) -> dict[str, Any]:
-    """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
+    """Return what the comment of a PLY file holds. Materials of faces are runs: meshio does not read a property of
+    faces beside their corners."""
     scene = names_and_scene(motion)
     if face_materials(motion) is not None:
         labels = motion.attributes[FACE_MATERIAL]

@@ -45,7 +45,7 @@ def _counted(motion: Motion, start: float, step: float) -> tuple[int, float, flo
 
 
 def check_counts(motion: Motion) -> None:
-    """ClipError where a motion has more frames or vertices than a cache can count."""
+    """Raise ClipError if a motion has more frames or vertices than a cache can count."""
     if max(motion.vertex_count, motion.frame_count) > LARGEST_COUNT:
         raise ClipError(f"got {motion.frame_count} frames of {motion.vertex_count} vertices, expected fewer than 2^31")
 

@@ -229,7 +229,7 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
 
 
 def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
-    """For each object its vertices per curve, empty where it is none."""
+    """Yield the vertices per curve of each object, empty for an object without curves."""
     stated = motion.attributes.get("curve_vertex_counts")
     totals = [
         int(end - start) if kind == "curves" else 0 for end, start, kind in zip(ends, np.append(0, ends[:-1]), kinds)

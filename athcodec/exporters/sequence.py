@@ -44,7 +44,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def write_frames(motion: Motion, writer: Any, paths: Sequence[str], report: Progress) -> None:
-    """A file for each frame, by writer.write(file, points)."""
+    """Write a file for each frame by `writer.write(file, points)`."""
     for start, frames in motion.blocks():
         for frame, points in enumerate(frames, start):
             with open(paths[frame], "wb") as file:

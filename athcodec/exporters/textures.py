@@ -38,7 +38,7 @@ def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
 
 
 def write_png(path: str, pixels: np.ndarray) -> None:
-    """(height, width, 3) uint16, without loss."""
+    """Write (height, width, 3) uint16 without loss."""
     height, width, _ = pixels.shape
     rows = np.ascontiguousarray(pixels.astype(">u2")).view(np.uint8).reshape(height, -1)
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)

@@ -104,7 +104,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 @contextmanager
 def _saying(path: str) -> Iterator[None]:
-    """USD's errors become OSErrors of one line: all that can fail here is writing a file."""
+    """Turn USD's errors into OSErrors of one line: only the writing of the file can fail here."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -337,7 +337,7 @@ def _mark_guess(attribute: Usd.Attribute) -> None:
 
 
 def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], names_used: Iterable[str]) -> None:
-    """The materials by their names, without contents, and the faces that have them."""
+    """Define the materials by their names, without contents, and bind the faces that have them."""
     labels_and_names = face_materials(motion)
     if labels_and_names is None or not labels_and_names[1]:
         return
@@ -363,7 +363,7 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
 
 
 def _define_instanced(stage: Usd.Stage, place: str, obj: SceneObject, copies: Copies) -> None:
-    """A PointInstancer, and below it the shape of one copy, which is the object's target."""
+    """Define a PointInstancer, and below it the shape of one copy, which becomes the object's target."""
     instancer = UsdGeom.PointInstancer.Define(stage, place)
     one, name = one_copy(obj), place.rpartition("/")[2]
     obj.target = _define(stage, f"{place}/{name}", one)
@@ -379,7 +379,7 @@ def _vec3(points: Any) -> Vt.Vec3fArray:
 
 
 def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
-    """Where the copies are in each frame. USD's older programs know rotations in half precision only."""
+    """Write where the copies are in each frame. USD's older programs know rotations in half precision only."""
     for obj, copies in instanced:
         instancer = obj.instancer
         turned = [(instancer.CreateOrientationsAttr(), Vt.QuathArray, np.float16)]

@@ -76,7 +76,7 @@ def mark_root(root: Usd.Prim) -> None:
 
 
 def _apply(prim: Usd.Prim, schema: str) -> None:
-    """By name, because USD itself does not know these schemas."""
+    """Apply a schema by its name, because USD itself does not know it."""
     prim.AddAppliedSchema(schema)
 
 
@@ -93,7 +93,7 @@ def define_part(stage: Usd.Stage, place: str, name: str) -> str:
 
 
 def place_part(stage: Usd.Stage, place: str, name: str, obj: SceneObject, part: Part, joints: Joints) -> None:
-    """Where the instances are at rest, and what they hang on; obj.target is the prototype's mesh."""
+    """Place the instances at rest, and name what they hang on; `obj.target` is the prototype's mesh."""
     instancer, prototype = UsdGeom.PointInstancer(stage.GetPrimAtPath(place)), f"{place}/Prototypes/{name}"
     copies, count = part.copies, len(part.joint)
     instancer.CreatePrototypesRel().SetTargets([prototype])

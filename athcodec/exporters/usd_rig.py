@@ -48,7 +48,7 @@ def _shifted(place: list[float]) -> Gf.Matrix4d:
 
 
 def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndarray], codes: np.ndarray) -> None:
-    """Samples of translations and rotations; the scales are 1 throughout."""
+    """Write samples of translations and rotations; the scales are 1 throughout."""
     animation.CreateJointsAttr(paths)
     animation.CreateScalesAttr(Vt.Vec3hArray(len(paths), Gf.Vec3h(1)))
     places, turns = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()

@@ -131,7 +131,7 @@ class Source:
     # ---- joins, corrections ----
 
     def join(self, bodies: np.ndarray, positions: np.ndarray, matrices: np.ndarray) -> None:
-        """Adds to them what is left of the jumps at the segment's seam."""
+        """Add to the terms what is left of the jumps at the segment's seam."""
         frames = self.head["join_frames"]
         joined = self.frames < frames
         if not joined.any():
@@ -251,7 +251,7 @@ class Passes:
         return section(self._level, self._of_level["bases"] + at, "<f4", modes * count).reshape(modes, count)
 
     def _finish_matrices(self) -> None:
-        """From R and c of x = c + R (x0 - a) to what is added to R x0."""
+        """Turn R and c of x = c + R (x0 - a) into what is added to R x0."""
         points = self._bodies["rest_point"][(self._bodies["flags"] & NODE) != 0]
         self.matrices[:, :, :, 3] -= np.einsum("tmij,mj->tmi", self.matrices[:, :, :, :3], points)
 

@@ -92,7 +92,7 @@ class ShapeMeter(Meter):
         self._add_turns(is_face, normal, shown_normal)
 
     def _add_turns(self, is_face: np.ndarray, normal: np.ndarray, shown: np.ndarray) -> None:
-        """How the normals turn from frame to frame, from the last one added on."""
+        """Add how far the normals turn from frame to frame, from the last frame added on."""
         frames = is_face, normal, shown
         if self._last is not None:
             is_face, normal, shown = (np.concatenate([last, new]) for last, new in zip(self._last, frames))

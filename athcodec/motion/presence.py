@@ -23,7 +23,7 @@ def frame_runs(shown: np.ndarray) -> list[list[int]]:
 
 
 def stated_presence(metadata: Mapping[str, Any]) -> dict[str, list[list[int]]]:
-    """metadata["presence"], without entries that are no list of [first, stop] frames."""
+    """Return metadata["presence"], without entries that are no list of [first, stop] frames."""
     stated = metadata.get(PRESENCE)
     return {name: runs for name, runs in stated.items() if _are_runs(runs)} if isinstance(stated, dict) else {}
 

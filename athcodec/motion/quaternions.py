@@ -6,7 +6,7 @@ import numpy as np
 
 
 def normalized(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
+    """Return quaternions (..., 4) at length 1; a quaternion of length 0 becomes the one without a rotation."""
     length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
 

@@ -391,7 +391,7 @@ def _follow_ids(obj: _Object) -> None:
 
 
 def _topology(obj: _Object) -> None:
-    """Fills in faces or curves."""
+    """Fill in faces or curves."""
     if obj.kind == "curves":
         sample = obj.schema.getValue()
         obj.curve_counts = _fixed(obj, obj.schema.getNumVerticesProperty())
@@ -424,7 +424,7 @@ def _name_unread(obj: _Object) -> None:
 
 
 def _bind_materials(obj: _Object) -> None:
-    """By the names of face sets, in which programs write those of materials."""
+    """Take materials from the names of face sets, where programs write them."""
     for name in obj.schema.getFaceSetNames():
         face_set = obj.schema.getFaceSet(name).getSchema()
         obj.left_out += [f"{name} (a face set that changes)"] * (not face_set.isConstant())

@@ -18,7 +18,7 @@ COMPRESSED = (0, 4, 0)  # the version since which the sections are compressed
 
 
 def check_crates(path: str) -> None:
-    """ClipError where `path` is a crate, or a zip of crates, whose counts do not fit its size."""
+    """Raise ClipError if `path` is a crate, or a zip of crates, whose counts do not fit its size."""
     with open_plain(path) as file:
         head = file.read(8)
         if head == MAGIC:

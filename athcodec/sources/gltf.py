@@ -480,7 +480,7 @@ def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motio
 
 
 def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
+    """Return vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
     extras = file.json["asset"].get("extras")
     entry_of_athcodec = extras.get("athcodec") if isinstance(extras, dict) else None
     parent = (

@@ -111,7 +111,7 @@ class Track:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """From quaternions a to b (..., 4), the shorter way, by `fraction`."""
+    """Return quaternions on the shorter way from a to b (..., 4), at a `fraction` of it."""
     cosine = (a * b).sum(axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)

@@ -217,7 +217,8 @@ def list_of(path: Path) -> Path | None:
 
 
 def _candidate(file: Path, path: Path, allow_outside: bool, max_memory: int) -> Index | None:
-    """None where a file is no usable index; a GuessWarning says why one that names this path is not."""
+    """Return the index of a file, or None if it is not usable; a GuessWarning says why an index that names this path
+    is not."""
     try:
         return read_index(file, path.parent, allow_outside, Budget(max_memory))
     except (ClipError, OSError) as error:

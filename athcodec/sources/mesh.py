@@ -142,7 +142,7 @@ def with_polygons(counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray |
 
 
 def _checked(subject: str, indices: np.ndarray, count: int) -> np.ndarray:
-    """int32 indices; ClipError for any outside of 0 to count - 1."""
+    """Return int32 indices. Raises ClipError for any outside of 0 to count - 1."""
     bad = np.flatnonzero((indices < 0) | (indices >= count))
     if bad.size:
         raise ClipError(f"{subject}: got the number {indices[bad[0]]}, counted from 0, expected below {count}")
@@ -161,7 +161,7 @@ class _Names:
     numbers: dict[str, int] = field(default_factory=dict)
 
     def switch(self, name: str) -> None:
-        """The faces that follow have this name."""
+        """Let this be the name of the faces that follow."""
         if name not in self.numbers:
             self.numbers[name] = len(self.names)
             self.names.append(name)
@@ -361,7 +361,7 @@ def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int)
 
 
 def _add_parts(mesh: Mesh, labels: np.ndarray, names: Sequence[str]) -> None:
-    """Objects whose vertices lie together in the file; where any do not, the whole file is one."""
+    """Add the objects if the vertices of each lie together in the file; else the whole file is one object."""
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
     if len(set(labels[starts])) != len(starts):
         return
@@ -513,7 +513,7 @@ class _Binary:
 
 
 def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, np.ndarray]:
-    """{property: (count,) values, or (counts, values) of a list}."""
+    """Return {property: (count,) values, or (counts, values) of a list}."""
     none = dict.fromkeys(element.lists, 0)
     if not element.properties or not element.count:
         return {}

@@ -495,7 +495,7 @@ def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tu
 
 
 def _without_empty(branch: np.ndarray, branch_parent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Without branches that have no vertices; what hangs on one hangs on the next below that has some."""
+    """Remove branches that have no vertices; what hangs on one hangs on the next below that has some."""
     used = np.bincount(branch, minlength=len(branch_parent)) > 0
     parent = branch_parent.astype(np.int64)
     while True:

@@ -50,7 +50,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 @contextmanager
 def _naming_array(name: str) -> Iterator[None]:
-    """Errors of the block say which array they are about."""
+    """Let errors of the block name the array that they are about."""
     try:
         yield
     except ClipError:

@@ -191,7 +191,7 @@ class _Decimals:
 
     @classmethod
     def of(cls, folder: Path, prefix: str, suffix: str, hyphen: str = "") -> _Decimals:
-        """hyphen: a sign behind the prefix that may be a hyphen; it is one where all files have it."""
+        """Return the decimals of a name. A `hyphen` before the number is a sign only if not all files have it."""
         form = re.compile(re.escape(prefix) + _DECIMAL + re.escape(suffix))
         matches = [(match, name) for name in os.listdir(folder) if (match := form.fullmatch(name))]
         if hyphen and all(match[1] for match, _ in matches):

@@ -58,7 +58,7 @@ def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
 
 
 def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes: int) -> None:
-    """ClipError unless a cache has frames and vertices, and as many bytes as that takes."""
+    """Raise ClipError unless a cache has frames and vertices, and as many bytes as they take."""
     if frame_count < 1 or vertex_count < 1:
         raise ClipError(f"header: got {frame_count} frames of {vertex_count} vertices, expected at least one of one")
     size, expected = os.fstat(file.fileno()).st_size, header_bytes + 12 * frame_count * vertex_count
@@ -121,7 +121,7 @@ def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions
 
 
 def _say_other_meshes(path: Path) -> None:
-    """A GuessWarning where files of the cache's name beside it may be its mesh, and are not looked at."""
+    """Give a GuessWarning if files of the cache's name beside it may be its mesh, and are not looked at."""
     known = {suffix for kind in FORMATS for suffix in kind.suffixes} - set(CACHE_SUFFIXES)
     beside = sorted(
         file.name

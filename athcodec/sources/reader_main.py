@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def limit_memory(size: int) -> None:
-    """From now on this process gets so many bytes besides those that it has; where the system can limit them."""
+    """Limit the further memory of this process to so many bytes, if the system can."""
     status = Path("/proc/self/status")
     if resource is None or not status.exists():
         return

@@ -421,7 +421,7 @@ def _topology(obj: PrimObject, codes: np.ndarray) -> None:
 
 
 def _bind_materials(obj: PrimObject) -> None:
-    """By the names of the materials that the mesh and subsets of its faces are bound to."""
+    """Take the names of the materials that the mesh and subsets of its faces are bound to."""
     binding = UsdShade.MaterialBindingAPI(obj.prim)
     material, _ = binding.ComputeBoundMaterial()
     if material:
@@ -492,7 +492,7 @@ def _statics(obj: PrimObject, codes: np.ndarray, matrix: np.ndarray) -> None:
 
 
 def _rename_first_uv(obj: PrimObject) -> None:
-    """Where no primvar is called st, the first texture coordinates are what a renderer takes."""
+    """Rename the first texture coordinates to those that a renderer takes if no primvar is called st."""
     if "uv" in obj.statics:
         return
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).GetPrimvars():

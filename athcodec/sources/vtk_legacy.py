@@ -183,7 +183,7 @@ class _Legacy:
             self._at += size + (head & ((1 << (8 * size - 2)) - 1))
 
     def _metadata(self) -> None:
-        """Names of components and other information, which end with an empty line."""
+        """Pass over names of components and other information, which end with an empty line."""
         while (line := self._line(or_blank=True)) != "":
             if line.upper().startswith("COMPONENT_NAMES"):
                 self._other["names of components"] = None

@@ -242,7 +242,7 @@ class VtkXml:
         return self._decoded(text[offset:].encode())
 
     def _decoded(self, text: bytes) -> bytes:
-        """Base64: the counts before packed data are encoded by themselves."""
+        """Return bytes from base64, in which the counts before packed data are encoded by themselves."""
         size = self._count.itemsize
         if self._unpack is None:
             length = self._numbers(_from_base64(text, size), 1)[0]

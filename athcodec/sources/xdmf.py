@@ -362,7 +362,8 @@ class _Selection:
         return False
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:
-        """Of several series those that are read: with the field, or that move, at the same times."""
+        """Return the series that are read of several: those with the field, or those that move, all at the same
+        times."""
         wanted = self._scene.options.field
         if wanted is not None:
             moving = [track for track in groups if wanted in self._fields(track)]
@@ -499,7 +500,8 @@ class _Part:
         return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
 
     def is_static(self, name: str, center: str) -> bool:
-        """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
+        """Return whether a field is the same in all steps, by reference or by value. The last step is compared
+        first: what moves is far from its start there."""
         elements = [step.get((name, center)) for step in self._attributes]
         if any(element is None for element in elements):
             return False

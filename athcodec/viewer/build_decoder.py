@@ -141,7 +141,7 @@ def pack(template: str, wasm: bytes) -> str:
 
 
 def _lean(text: str) -> str:
-    """Text without comments and indentation, none of whose strings goes over several lines."""
+    """Return text without comments and indentation. No string in it may go over several lines."""
     text = re.sub(r"^/\*\*.*?\*/\n", "", text, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"^ +|^ *//.*\n|^\n|^export (?=function)", "", text, flags=re.MULTILINE)
 

@@ -56,7 +56,7 @@ _DRAWN = """async (seconds) => {
 
 
 def browser_path() -> str | None:
-    """Chromium's program; None where none is found."""
+    """Return the path of Chromium's program, or None."""
     return os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -139,7 +139,7 @@ def can_draw() -> bool:
 
 
 def _packages() -> Any:
-    """Pillow's module of images, once all that is needed is there."""
+    """Return Pillow's module of images if all packages that a picture needs are installed."""
     try:
         import playwright.sync_api  # noqa: F401
         from PIL import Image

@@ -283,7 +283,7 @@ def _check_server(path: FilePath) -> None:
 
 
 def _refuse_other_urls(path: FilePath) -> None:
-    """The server passes on what http and https have; for others there is --export."""
+    """Refuse URLs of other kinds than http and https, which the server cannot pass on; for others there is --export."""
     if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
         scheme = urlsplit(path).scheme
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")

@@ -43,7 +43,7 @@ class Source:
         return hierarchy_of(self.clip)
 
     def part(self, vertices: int) -> Source:
-        """About so many vertices: some runs of branches, evenly spaced, with all that carries them."""
+        """Return a clip of about so many vertices: some runs of branches, evenly spaced, with all that carries them."""
         hierarchy, count = self.hierarchy, self.positions.shape[1]
         run = max(1, vertices // RUNS)
         is_taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
@@ -100,7 +100,7 @@ def blocks(values: np.ndarray) -> Iterator[slice]:
 
 
 def largest_error(positions: np.ndarray, decoded: np.ndarray) -> float:
-    """Largest Euclidean distance of any vertex in any frame; infinite where something is not a number."""
+    """Return the largest Euclidean distance of any vertex in any frame; infinite if something is not a number."""
     largest = 0.0
     for block in blocks(positions):
         difference = decoded[block].astype(np.float64) - positions[block]

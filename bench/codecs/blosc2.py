@@ -74,7 +74,7 @@ class Blosc2(Program):
 
 
 def _rounded(values: np.ndarray, bits: int) -> np.ndarray:
-    """To so many bits of mantissa, to the nearest."""
+    """Return values rounded to the nearest with so many bits of mantissa."""
     cut = MANTISSA - bits
     if cut == 0:
         return values

@@ -75,7 +75,7 @@ def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
 
 @cache
 def library(writes: bool) -> ctypes.CDLL:
-    """coder.c for one direction; compiled once per process."""
+    """Return coder.c for one direction; compiled once per process."""
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
@@ -153,7 +153,7 @@ def _blocks(frames: int) -> range:
 
 
 def _join(streams: list[bytes]) -> bytes:
-    """Concatenated streams; all but the last have their length in front."""
+    """Return concatenated streams; all but the last have their length in front."""
     return b"".join(varint(len(stream)) + stream for stream in streams[:-1]) + streams[-1]
 
 

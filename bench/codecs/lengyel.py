@@ -133,7 +133,7 @@ class Parts:
         self.pose, self.around = pose, pose - self.centre[of_vertex]
 
     def sum_of(self, values: np.ndarray) -> np.ndarray:
-        """Per part, of (N, ...)."""
+        """Return the sums of (N, ...) values over each part."""
         by_part = np.argsort(self.of_vertex, kind="stable")
         return np.add.reduceat(values[by_part], np.cumsum(self.sizes) - self.sizes, axis=0)
 

@@ -69,7 +69,7 @@ class Trajectories:
     frames: int
 
     def rows(self, motion: np.ndarray) -> np.ndarray:
-        """Of (N, 3, T)."""
+        """Return the rows of (N, 3, T) motion."""
         return motion.reshape(-1, 3 * self.frames if self.joint else self.frames)
 
     def motion(self, rows: np.ndarray) -> np.ndarray:
@@ -90,7 +90,7 @@ class Trajectories:
 
 
 def principal(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Singular values, descending, and orthonormal rows (min(shape), length)."""
+    """Return singular values, descending, and orthonormal rows (min(shape), length)."""
     values, vectors = np.linalg.eigh(rows.T @ rows)
     count = min(rows.shape)
     return np.sqrt(np.maximum(values[::-1][:count], 0)), np.ascontiguousarray(vectors[:, ::-1][:, :count].T)
@@ -161,7 +161,7 @@ def write_coefficients(
 
 
 def _cost(q: np.ndarray) -> np.ndarray:
-    """About the bits of each component."""
+    """Return about the bits of each component."""
     return sum(np.log2(1 + np.abs(q[some])).sum(axis=(0, 1)) for some in blocks(q))
 
 
@@ -218,7 +218,8 @@ def write_group(
 
 
 def _inverse(normal: np.ndarray) -> np.ndarray:
-    """Of the normal matrix of least squares, regularised for components that are quantised to zero."""
+    """Return the inverse of the normal matrix of least squares, regularised for components that are quantised to
+    zero."""
     return np.linalg.inv(normal + max(1e-12 * np.trace(normal) / len(normal), 1e-30) * np.eye(len(normal)))
 
 

@@ -87,7 +87,7 @@ def from_planes(data: bytes, dtype: np.dtype | str) -> np.ndarray:
 
 
 def zigzag(values: np.ndarray) -> np.ndarray:
-    """Signed int32 as uint32: small ones of either sign are small."""
+    """Return signed int32 as uint32, in which small integers of either sign are small."""
     return ((values << 1) ^ (values >> 31)).view(np.uint32)
 
 
@@ -149,7 +149,7 @@ def from_arrays(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int
 
 
 def _difference(values: np.ndarray, axis: int) -> np.ndarray:
-    """Modulo 2**32, the first ones as they are."""
+    """Return differences modulo 2**32; the first rows stay as they are."""
     first = np.take(values, [0], axis=axis)
     return np.concatenate([first, np.diff(values, axis=axis)], axis=axis)
 
@@ -177,7 +177,7 @@ def _predictor_axes(predictor: str) -> list[int]:
 
 
 def ordered_bits(values: np.ndarray) -> np.ndarray:
-    """float32 as int32 in the same order; its own inverse but for the types."""
+    """Return float32 as int32 in the same order; the inverse is the same function with the types exchanged."""
     bits = np.ascontiguousarray(values, np.float32).view(np.int32)
     return np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits)
 
@@ -260,14 +260,14 @@ class Case:
             return None
 
     def integers(self, bound: float, search: bool) -> np.ndarray:
-        """On the grid, or the bits of the floats where all must come back."""
+        """Return positions on the grid, or the bits of the floats if all must come back."""
         if "integers" not in self._known:
             turn = ordered_bits if self.exact else self.grid(bound, search).integers
             self._known["integers"] = turn(self.positions)
         return self._known["integers"]
 
     def piece(self, values: int) -> Case:
-        """Neighbouring vertices and frames, about so many numbers."""
+        """Return neighbouring vertices and frames, about so many numbers."""
         frames, vertices, _ = self.positions.shape
         length = min(frames, SAMPLE_FRAMES)
         width = min(vertices, max(64, values // (3 * length)))
@@ -279,7 +279,7 @@ class Case:
 
 
 def cases_of(source: Source, exact: bool) -> dict[str, Case]:
-    """By order; the hierarchy's only where it is another."""
+    """Return a case for each order of vertices; the hierarchy's order only if it differs from the source's."""
     cases = {"source": Case(source.positions, source.rest, exact)}
     order = np.asarray(source.hierarchy.vertex_source)
     if not np.array_equal(order, np.arange(len(order))):

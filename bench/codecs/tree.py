@@ -153,7 +153,7 @@ def read_pose(reader: Reader, order: VertexOrder) -> np.ndarray:
 
 
 def _lags(order: VertexOrder, pose: np.ndarray, step: float) -> list[np.ndarray]:
-    """Of all branches: beams, and what is best for the first branch of so many vertices."""
+    """Return the lags of all branches: those of beams, or the best one for the first branch of so many vertices."""
     counts = order.branches["count"]
     sizes, examples, kinds = np.unique(counts, return_index=True, return_inverse=True)
     stems = (pose[order.branches["first"][b] :][:size] for size, b in zip(sizes, examples))

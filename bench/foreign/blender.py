@@ -17,7 +17,8 @@ NODES, LEAVES = 110, 5  # Leaves: on each node that carries foliage.
 
 
 def armature(path: Path, seed: int) -> None:
-    """A tree of the skin modifier on the bones that Blender makes for it, each with noise on its keyed rotation."""
+    """Make a tree of the skin modifier on the bones that Blender makes for it, each with noise on its keyed
+    rotation."""
     rng = np.random.default_rng(seed)
     plant = grow(NODES, 2, 4.0, seed)
     tree = _tree(plant)

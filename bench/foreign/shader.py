@@ -90,7 +90,7 @@ def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames
 
 
 def willow(path: Path, seed: int, leaves: int, pairs: int, height: float, frames: int) -> None:
-    """The same of leaves alone."""
+    """Make the morphs of a willow's leaves alone."""
     _write(path, _Willow(leaves, pairs, height, seed), "leaves", frames)
 
 

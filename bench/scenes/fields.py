@@ -45,7 +45,7 @@ def _on(
 def _leaves(
     scene: Assembly, rng: np.random.Generator, stems: Stems, branch: np.ndarray, each: int, size: float
 ) -> None:
-    """Leaves of three pairs of vertices."""
+    """Return leaves of three pairs of vertices."""
     leaves, stem = _on(rng, stems, each, 2, np.radians(60), size, 3, 0.3)
     width = size * np.array([0.05, 0.3, 0.05])
     scene.add(*covers.ribbons(leaves, rng.uniform(0, 2 * np.pi, len(stem)), width), branch[stem])
@@ -78,7 +78,7 @@ def tubes(seed: int, plants: int, rings: int, sides: int) -> Scene:
 
 
 def hedge_ribbons(seed: int, plants: int, points: int) -> Scene:
-    """Wide leaves of a hedge that stand in the ground."""
+    """Make wide leaves of a hedge that stand in the ground."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, plants / 90, 0.3)
     blades = _field(rng, foot, 1.1, points, 0.25)

@@ -197,7 +197,7 @@ def ivy(seed: int) -> Scene:
 
 
 def _cards(scene: Assembly, rng: np.random.Generator, stems: Stems, branch: np.ndarray, each: int, size: float) -> None:
-    """Leaves of three pairs of vertices on points of stems, each with a flutter of its own."""
+    """Return leaves of three pairs of vertices on points of stems, each with a flutter of its own."""
     stem = np.repeat(np.arange(len(branch)), each)
     foot, base = stems.feet(stem, rng.integers(3, stems.centres.shape[2], len(stem)))
     time = np.arange(FRAMES) / FPS

@@ -66,7 +66,7 @@ def bend(
 
 
 def _clamped(numbers: np.ndarray) -> np.ndarray:
-    """Of the root, which is held, all are zero."""
+    """Return values with zeros for the root, which is held."""
     numbers[:6] = 0.0
     return numbers
 
@@ -148,7 +148,7 @@ def rayleigh(lowest: float, damping: float) -> tuple[float, float]:
 
 
 def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:
-    """Of the undamped plant at rest, rad/s."""
+    """Return the lowest frequency of the undamped plant at rest, rad/s."""
     from scipy.sparse.linalg import eigsh
 
     start = np.ones(len(mass))  # A fixed start makes every run equal.

@@ -243,13 +243,13 @@ def sheltered(points: np.ndarray, area: np.ndarray, cell: float) -> np.ndarray:
 
 
 def _minor(a: np.ndarray, b: np.ndarray, i: int) -> np.ndarray:
-    """Component i of the cross product of (3, L)."""
+    """Return component i of the cross product of (3, L)."""
     j, k = (i + 1) % 3, (i + 2) % 3
     return a[j] * b[k] - a[k] * b[j]
 
 
 def _turned_back(turn: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors (3, L) by the inverse of unit quaternions (4, L)."""
+    """Return vectors (3, L) turned by the inverse of unit quaternions (4, L)."""
     axis = turn[1:]
     first = np.stack([2 * _minor(vectors, axis, i) for i in range(3)])
     return vectors + turn[0] * first + np.stack([_minor(first, axis, i) for i in range(3)])
@@ -263,7 +263,7 @@ def _rotation_vectors(turn: np.ndarray) -> np.ndarray:
 
 
 def _advanced(turn: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Quaternions (4, L) after turns about their own axes by small rotation vectors (3, L)."""
+    """Return quaternions (4, L) after turns about their own axes by small rotation vectors (3, L)."""
     half = 0.5 * angle
     w, v = turn[0], turn[1:]
     moved = np.empty_like(turn)

@@ -115,7 +115,7 @@ class _Grower:
         self.shortening = 0.1 ** (1.0 / max(2, orders))
 
     def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int, order: int) -> None:
-        """A stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
+        """Grow a stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
         branch = len(self.branch_parent)
         self.branch_parent.append(below)
         count, budgets = self._share(budget, self.orders - order)

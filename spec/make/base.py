@@ -111,7 +111,7 @@ def still(stems: list[Stem], **fields) -> Plant:
 
 
 def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **fields) -> Plant:
-    """Random rows at all levels."""
+    """Return a plant with random rows at all levels."""
     scripts = {}
     for level in range(33):
         scripts[STEMS, level] = 100 * seed + level
@@ -150,7 +150,7 @@ UNTURNED = stems_of(
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:
-    """Three layers of random rows and rest poses."""
+    """Return three layers of random rows and rest poses."""
     plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
     plant.scripts |= {
         (STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
@@ -166,7 +166,7 @@ def header(title: str, **fields) -> None:
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
-    """Of each level and segment; a half more where they are sloped."""
+    """Return joins, one for each level and segment, from widths; the fraction 0.5 means that a join is sloped."""
     return tuple(Join(int(width), width % 1 > 0) for width in widths)
 
 
@@ -215,7 +215,7 @@ def forked_plan():
 
 
 def placed(stems: list[Stem], points: Sequence, seed: int, frames: int = 3, **fields) -> Plant:
-    """Random rows of stems that rest at any points, in binary64."""
+    """Return random rows of stems that rest at any points, in binary64."""
     rest = exact_rest(stems, np.array(points, float).ravel().tolist(), True)
     return moving(stems, seed, frames, **{"rest": rest, "heads": HEADS} | fields)
 

@@ -27,7 +27,7 @@ CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
 
 
 def clips(title: str, *entries: bytes, count: int = 2) -> None:
-    """The two clips with another CLIPS."""
+    """Declare a vector of the two clips with another CLIPS."""
     invalid(
         f"clips-{title}", lambda: two_clips().with_header(clip_count=count).change(CLIPS, content=b"".join(entries))
     )

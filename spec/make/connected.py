@@ -13,7 +13,7 @@ def connected(
     order: list | None = None,
     **fields,
 ) -> Plant:
-    """BY_VERTEX, by faces."""
+    """Return a plant with the stems of BY_VERTEX, whose rest pose is coded by faces."""
     content, branches, script = make_faces(), branches_of(BY_VERTEX), Chance(seed, large=6)
     count = sum(stem.count for stem in BY_VERTEX)
     mesh = mesh_of(content, order or list(range(count)), fields.get("places"))

@@ -60,7 +60,7 @@ def copies_turned() -> Plant:
 
 
 def copies_of_many() -> Plant:
-    """64 shapes of one vertex behind others, of which one has two vertices."""
+    """Return 64 shapes of one vertex behind others, of which one has two vertices."""
     random, counts, script = np.random.default_rng(165), [1, 1, 2, *[1] * 64], []
     for b, count in enumerate(counts):
         script += [[*([0] if b not in (0, 2) else []), 1, *by_chance(count, 166 + b)]]

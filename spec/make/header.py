@@ -54,7 +54,7 @@ def errors_by_chance(count: int) -> tuple[int, ...]:
 
 
 def of_memory(vertices: int) -> Draft:
-    """128 frames, whose first fault behind the front is a checksum."""
+    """Return a draft of 128 frames, whose first fault behind the front is a checksum."""
     return lone().with_header(place_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
 
 
@@ -283,7 +283,7 @@ invalid(
 
 
 def damaged_before_cut() -> bytes:
-    """STEMS of level 1 is damaged, and AFFINES behind it is missing."""
+    """Return a file whose STEMS of level 1 is damaged, and whose AFFINES behind it is missing."""
     draft = moving([Stem(-1, 3), Stem(0, 3, 2), Stem(1, 2, 1)], 302).draft()
     return cut(lambda d: end_of(d, AFFINES, 1) - 1, draft.change(STEMS, 1, checksum=0))
 

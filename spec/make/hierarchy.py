@@ -12,7 +12,7 @@ def interleaved(stems: list[Stem]) -> list[int]:
 
 
 def hierarchy(title: str, stems: list[Stem], **sources) -> None:
-    """Written for the five vertices and two branches of the fork, or as many branches as there are."""
+    """Declare a HIERARCHY for the five vertices and two branches of the fork, or for as many branches as there are."""
 
     def make() -> Draft:
         stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)

@@ -8,7 +8,7 @@ from spec.make.predicted import ROOTED, predicted, swayed
 
 
 def joined(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
-    """Random rows, in two segments of six frames."""
+    """Return random rows in two segments of six frames."""
     return moving(stems, seed, **{"frames": 12, "segments": 2, "heads": HEADS, "joins": joins(*widths)} | fields)
 
 

@@ -73,7 +73,7 @@ LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
 
 
 def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
-    """Other content for a chunk of level 3; a function gets what it has."""
+    """Declare a vector with other content for a chunk of level 3. A function as content gets the usual content."""
 
     def make() -> Draft:
         draft = layered().draft()
@@ -84,12 +84,12 @@ def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes],
 
 
 def scripted_refinement(place: tuple, title: str, *script) -> None:
-    """Another script for a stream of level 3, of which it is the last that is written."""
+    """Declare a vector with another script for the last stream that is written of level 3."""
     invalid(title, lambda: layered(2, scripts={place: list(script)}).draft(), item=3)
 
 
 def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
-    """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
+    """Declare a vector whose level 1 refines a rest pose that is exact, or does so by a changed chunk."""
     if change is None:
         exact = layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
         return exact.add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
@@ -122,7 +122,7 @@ STIFF = stems_of(  # in one, two or three layers, with others on them
 
 
 def stiff(seed: int, **fields) -> Plant:
-    """STIFF in three layers, of which the first has rotations of any size."""
+    """Return STIFF in three layers, of which the first has rotations of any size."""
     plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
     plant.scripts |= {(STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
     return plant

@@ -15,7 +15,7 @@ def detailed_rest() -> bytes:
 
 
 def bent(stems: list[Stem], script: list | Chance, rest: bytes | None = None) -> bytes:
-    """SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
+    """Return SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
     branches, reference = branches_of(stems), 0.25 * np.array(grown(stems), float)
     if rest is not None:
         reference = rules.decode_rest(rest[17:], branches, 0.25).rest

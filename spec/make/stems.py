@@ -7,7 +7,7 @@ NOT_A_NUMBER = [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)]
 
 
 def stems(*head, **fields) -> Callable[[], bytes]:
-    """STEMS of level 1 with another head."""
+    """Return STEMS of level 1 with another head."""
     return lambda: stems_head(*head, **fields) + fork().content(STEMS, 1, 0)[6:]
 
 

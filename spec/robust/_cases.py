@@ -82,7 +82,7 @@ def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, 
 
 
 def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messages) -> None:
-    """In the separate process: runs cases until one fails, all are done or time is up."""
+    """Run cases in the separate process until one fails, all are done or time is up."""
     for place in range(start, len(order)):
         if place > start and time.monotonic() > deadline:
             messages.put((place, "", ""))
@@ -105,7 +105,8 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
 
 
 def _peak() -> int:
-    """Bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is not."""
+    """Return the peak in bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is
+    not."""
     if _STATUS.exists():
         return int(re.search(r"VmHWM:\s+(\d+)", _STATUS.read_text())[1]) * 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT

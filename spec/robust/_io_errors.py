@@ -86,7 +86,7 @@ def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("i
 
 
 def _runs(verb: str, place: Place, sample: int, lasts: bool, deadline: float) -> Iterator[dict]:
-    """In the process with the library: a child for each call."""
+    """Run a child for each call, in the process with the library."""
     calls = _run(verb, place, 0, lasts)["calls"]
     numbers = list(range(1, calls + 1))
     if sample:

@@ -188,7 +188,7 @@ def obey_permissions() -> None:
 
 
 def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
-    """Into a read-only folder, and over a read-only file."""
+    """Write into a read-only folder, and over a read-only file."""
     row = Row("read-only target", 0)
     for verb in verbs:
         target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")

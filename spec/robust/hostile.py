@@ -40,7 +40,7 @@ LIMITS = Limits(memory_bytes=64 << 20, decoded_chunk_bytes=16 << 20)
 
 
 def valid_files() -> dict[str, bytes]:
-    """But those that play only with a mesh of the host."""
+    """Return the valid vectors, except those that play only with a mesh of the host."""
     paths = [path for path in sorted(VECTORS.glob("*.ath")) if not path.with_suffix(".mesh").exists()]
     vectors = {path.stem: path.read_bytes() for path in paths}
     return seeds.valid_files() | {name: data for name, data in vectors.items() if len(data) <= seeds.LARGEST}
@@ -222,7 +222,7 @@ def _too_slow(once: float, twice: float, size: int) -> str:
 
 
 def announces_too_much(_: bytes, name: str) -> int:
-    """Small files that announce much: refused, or played within the limits."""
+    """Play small files that announce much: each is refused, or played within the limits."""
     return within_limits(hostile_files.LYING[name]())
 
 

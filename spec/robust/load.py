@@ -81,7 +81,7 @@ def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
 
 
 def thread_program(folder: Path) -> Path:
-    """threads.c with the decoder's sources, under ThreadSanitizer."""
+    """Build threads.c with the decoder's sources, under ThreadSanitizer."""
     cmake = (CORE / "CMakeLists.txt").read_text()
     names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
@@ -147,7 +147,7 @@ def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Ran
 
 
 def resident_bytes() -> int:
-    """Resident memory of this process; its peak if the system does not report it."""
+    """Return the resident memory of this process; its peak if the system does not report it."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
@@ -238,7 +238,7 @@ class FailingAllocator:
             raise RuntimeError("NumPy: got another kind of memory handler, expected version 1")
 
     def fail(self, n: int) -> None:
-        """The n-th allocation from now on fails."""
+        """Let the n-th allocation from now on fail."""
         self._library.scarce_arm(n)
 
     def stop(self) -> bool:

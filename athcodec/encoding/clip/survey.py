@@ -409,7 +409,7 @@ class Survey:
         return _prune(self.hierarchy, thresholds, self.rest, accepted, self.max_depth)
 
     def _keeps_epsilon(self, thresholds: Thresholds) -> np.ndarray | bool:
-        """TAM's first condition: at most eta frames have a GAD above epsilon."""
+        """Return whether TAM's first condition holds: at most eta frames have a GAD above epsilon."""
         eta, surveyed = thresholds.eta, len(self.largest_gads) - 1
         if eta >= self.frame_count:
             return True
@@ -418,7 +418,7 @@ class Survey:
         return self.largest_gads[eta] <= thresholds.distances[0]
 
     def _keeps_xi(self, thresholds: Thresholds) -> np.ndarray:
-        """TAM's second condition: in every frame at most lam vertices are beyond xi."""
+        """Return whether TAM's second condition holds: in every frame at most lam vertices are beyond xi."""
         lam, (_, xi) = thresholds.lam, thresholds.distances
         if lam == 0:
             return self.largest_distance <= xi
