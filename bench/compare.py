@@ -58,7 +58,7 @@ athcodec / the best others: {} / {}{}.
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
-    """Point with a file whose error is within their bound."""
+    """Return the points with a file whose error is within their bound."""
     return [point for point in points if point["status"] == OK]
 
 
@@ -189,8 +189,7 @@ def _percent(one: int, other: int) -> str:
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """Return a row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are
-    none."""
+    """Return a row for each codec on one clip: its bytes at each bound and without loss, or why it has none."""
     points_of_clip = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
     columns = dict.fromkeys(
         exponent(bound) for bound in sorted({point["bound"] for point in points_of_clip}, reverse=True)

@@ -38,7 +38,7 @@ class Store:
         return result if is_right else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
-        """Add or replaces a result of this command and commit, and replaces the file in one step."""
+        """Add or replace a result of this command and commit, and replaces the file in one step."""
         result = result | {name: self._environment[name] for name in ("command", "commit")}
         self._results[name][self._key(name, result)] = result
         if self.file is not None:

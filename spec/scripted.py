@@ -593,7 +593,7 @@ def steady_times(*clips: tuple[float, float]) -> bytes:
 
 
 def whole_rates(*rates: int, method: int = 1) -> bytes:
-    """Rate of each clip."""
+    """Return the rate of each clip."""
     return bytes([method]) + b"".join(struct.pack("<H", rate) for rate in rates)
 
 

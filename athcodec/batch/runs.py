@@ -265,7 +265,7 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 
 
 def _cluster(workers: int) -> Any:
-    """Process on this machine, with one thread each. Raises SchedulerError."""
+    """Start processes on this machine, with one thread each. Raises SchedulerError."""
     import dask
     import distributed
 

@@ -78,7 +78,7 @@ class Streams:
 
 @contextmanager
 def standard_streams() -> Iterator[Streams]:
-    """Stream whose output is sent when the block ends without an error."""
+    """Yield streams whose output is sent when the block ends without an error."""
     with tempfile.TemporaryDirectory(prefix="athcodec-") as folder:
         streams = Streams(folder)
         yield streams

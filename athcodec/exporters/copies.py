@@ -109,7 +109,7 @@ class _Fit:
             copies.max_error = max(copies.max_error, error)
 
     def _placed(self, points: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
-        """Place, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
+        """Return places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
         middle = points.mean(axis=1)
         away = points - middle[:, None]
         linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / len(self._local))

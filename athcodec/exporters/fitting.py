@@ -203,8 +203,8 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 def _fitted(
     motion: Motion, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Place (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
-    that each part leaves (K,)."""
+    """Return places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest
+    distance that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
     starts, part = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
     local = np.einsum("nij,ni->nj", parts.axes[part], rest[rows] - parts.middle[part])

@@ -449,7 +449,7 @@ def _from_corners(values: np.ndarray, corner_place: np.ndarray, count: int) -> n
 
 
 def _objects(motion: Motion, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
-    """(name, first vertex, one past the last); one of all where objects do not hold together."""
+    """Return (name, first vertex, one past the last); one of all where objects do not hold together."""
     counts, names = motion.attributes.get("part_vertex_counts"), motion.metadata.get("part_names")
     whole = [(names[0] if isinstance(names, list) and len(names) == 1 else name, 0, motion.vertex_count)]
     if counts is None or not isinstance(names, list) or len(names) != len(counts) or np.min(counts, initial=1) < 1:

@@ -46,7 +46,7 @@ def has_mesh(motion: Motion) -> bool:
 
 
 def part_spans(motion: Motion) -> list[tuple[str, int, int]]:
-    """(name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
+    """Return (name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     whole = isinstance(names, list) and counts is not None and len(counts) == len(names)
     if not whole or int(np.sum(counts)) != motion.vertex_count or np.min(counts, initial=0) < 0:

@@ -169,7 +169,8 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
 
 
 def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
-    """Name, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
+    """Return names, vertices, kinds and further details of the objects: what the clip says where that fits, else
+    one."""
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count

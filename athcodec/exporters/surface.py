@@ -193,5 +193,5 @@ def _shared(start: np.ndarray, end: np.ndarray, sides: np.ndarray) -> tuple[np.n
 
 
 def _sums(vectors: np.ndarray, label: np.ndarray, count: int) -> np.ndarray:
-    """(count, 3) float64: the sums of the vectors of each label."""
+    """Return (count, 3) float64: the sums of the vectors of each label."""
     return np.stack([np.bincount(label, column, count) for column in vectors.T], axis=1, dtype=np.float64)

@@ -19,14 +19,14 @@ LAYOUT = "athcodec/exporters/vat.md"
 
 
 def facts_of(motion: Motion) -> dict[str, Any]:
-    """Rate, level and size of a MotionClip or ClipView."""
+    """Return rate, level and size of a MotionClip or ClipView."""
     level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}
 
 
 def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
-    """(height, width, channels) float16 or float32 by the names of channels, "RGB" or "RGBA", compressed without loss.
-    Raises OSError."""
+    """Write (height, width, channels) float16 or float32 by the names of channels, "RGB" or "RGBA", compressed without
+    loss. Raises OSError."""
     import OpenEXR  # only where it is needed: PNG does without
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

@@ -286,7 +286,7 @@ class _Http:
                 task.cancel()
 
     async def _fetch(self, offset: int, size: int) -> tuple[int, bytes]:
-        """(offset, bytes) of a range, or (0, the whole file) from a server without ranges."""
+        """Return (offset, bytes) of a range, or (0, the whole file) from a server without ranges."""
         for attempt in range(self._remote.retries + 1):
             try:
                 return await self._ask(offset, size)

@@ -31,7 +31,7 @@ def check_crates(path: str) -> None:
 
 
 def _members(file: BinaryIO) -> list[tuple[int, int]]:
-    """(start, size) of what a .usdz holds, which is stored without compression."""
+    """Return (start, size) of what a .usdz holds, which is stored without compression."""
     try:
         with zipfile.ZipFile(file) as archive:
             entries = [(member.header_offset, member.file_size) for member in archive.infolist()]

@@ -79,8 +79,11 @@ def is_index(path: Path) -> bool:
 
 
 def read_index(path: Path, folder: Path, allow_outside: bool, budget: Budget) -> Index:
-    """Return the files of an index. Raises ClipError where it is none, lists files outside of a folder or several that
-    are one part of one time, or where none of its files is there; OSError where it cannot be opened."""
+    """Return the files that an index lists, with their times.
+
+    Raises ClipError if the file is no index, if it lists a file outside of the folder or the same part of a time
+    twice, or if none of its files exists; OSError if it cannot be opened.
+    """
     data = read_plain(path, budget)
     with naming(path, ValueError, RecursionError):
         entries = _pvd(path, data, budget) if path.suffix.lower() == PVD else _series(path, data, budget)

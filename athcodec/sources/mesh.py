@@ -74,7 +74,7 @@ class Mesh:
         return polygons(self.faces, self.attributes)
 
     def same_topology(self, other: Mesh) -> str:
-        """ "" where both have as many vertices and the same faces and edges, else what is different."""
+        """Return "" if both have as many vertices and the same faces and edges, else what is different."""
         if len(self.points) != len(other.points):
             return f"got {len(other.points)} vertices, expected {len(self.points)}"
         for elements, first, second in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):

@@ -123,7 +123,7 @@ class SceneObject:
         self.face_materials[faces] = self.materials.index(name)
 
     def repeat(self, copies: int) -> None:
-        """Make so many copies, one after the other, of what it is. They have no rest pose but where they are. Raises
+        """Repeat the object as so many copies, one after the other. They have no rest pose but where they are. Raises
         ClipError for more vertices than make sense."""
         if self.count * copies > MOST_VERTICES:
             raise ClipError(
@@ -173,7 +173,7 @@ class SceneObject:
                 static.values = static.values[order]
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Transform normals to world space; removes them where they turn in time, or have no direction there."""
+        """Transform normals to world space; remove them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return

@@ -64,7 +64,7 @@ class Skeleton:
         return bool(np.linalg.det(bind[:3, :3]) * np.linalg.det(matrix[:3, :3]) < 0)
 
     def largest(self, count: int) -> np.ndarray:
-        """(count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
+        """Return (count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
         influences = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
         if not influences or count == 0:
             return np.full(count, -1, np.int32)

@@ -144,7 +144,7 @@ class _Legacy:
         return words[:count]
 
     def _array(self, kind: str, count: int, width: int = 1) -> np.ndarray:
-        """(count,) or (count, width) numbers of a type of VTK."""
+        """Return (count,) or (count, width) numbers of a type of VTK."""
         if count < 0 or width < 1:
             raise ClipError(f"got {count} rows of {width} numbers, expected some")
         name = _TYPES.get(kind.lower())
@@ -252,7 +252,7 @@ class _Legacy:
         return values.astype(np.int64)
 
     def _built(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Point, types, stops and nodes."""
+        """Return points, types, stops and nodes."""
         if not self._kind:
             raise ClipError("got no DATASET, expected one")
         if self._kind == "STRUCTURED_POINTS":

@@ -187,7 +187,7 @@ class VtkXml:
         return lattice_cells(size)
 
     def _cells(self, piece: ElementTree.Element, tag: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Type, ends and nodes of cells; none of what the file does not list."""
+        """Return types, ends and nodes of cells; none of what the file does not list."""
         cells = {element.get("Name"): element for element in piece.findall(f"{tag}/DataArray")}
         none = np.zeros(0, np.int64)
         types, stops, nodes = (

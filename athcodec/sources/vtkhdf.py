@@ -228,7 +228,7 @@ class _Part:
     # ---- reading ----
 
     def _read_cells(self, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Type (C,), where the nodes of each cell start and stop, and the nodes."""
+        """Return types (C,), where the nodes of each cell start and stop, and the nodes."""
         kinds = SURFACE_CELLS if self._is_surface else {"": ({}, 0)}
         pieces = self._pieces(step)
         points = np.cumsum([0, *self._counts("NumberOfPoints", pieces)])
@@ -244,7 +244,7 @@ class _Part:
     def _cells_of(
         self, step: int, prefix: str, column: int, pieces: range, piece: int, numbers: tuple[dict[int, int], int]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Type, numbers of nodes, and nodes of the cells of one kind in a piece."""
+        """Return types, numbers of nodes, and nodes of the cells of one kind in a piece."""
         within = f"{prefix}/" if prefix else ""
         if within and prefix not in self._group:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)

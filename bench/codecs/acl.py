@@ -207,7 +207,7 @@ class Bones:
         yield from np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def fitted(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Turn (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
+        """Return turns (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
         centre, turns = self.parts.rigid_maps(self.parts.fit_rigid(positions))
         shifts = np.moveaxis(centre, 1, 2) - (turns @ self.parts.centre[:, None, :, None])[..., 0]
         hinges = self.parts.centre.copy()

@@ -297,6 +297,7 @@ class Reader:
         self._data, self.at = data, at
 
     def count(self) -> int:
+        """Read a number, 7 bits a byte."""
         value, self.at = read_varint(self._data, self.at)
         return value
 

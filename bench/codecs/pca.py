@@ -243,7 +243,7 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
 def write_front(
     writer: Writer, source: Source, bound: float, settings: Settings
 ) -> tuple[VertexOrder, Trajectories, np.ndarray, np.ndarray, float]:
-    """Order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
+    """Write order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
     order = vertex_order(source, settings.get("order", "hierarchy"))
     write_order(writer, order)
     positions = ordered(source, order)
@@ -254,7 +254,7 @@ def write_front(
 
 
 def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, float]:
-    """Order, kind of trajectories, mean pose (N, 3) and step."""
+    """Return order, kind of trajectories, mean pose (N, 3) and step."""
     order, frames = read_order(reader), reader.count()
     return order, Trajectories(bool(reader.count()), frames), read_pose(reader, order), reader.single()
 

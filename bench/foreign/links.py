@@ -48,7 +48,8 @@ def bush(path: Path, seed: int, stems: int, nodes: int, height: float) -> None:
 
 
 def _moved(plant: Plant, rest: np.ndarray, wind: Wind) -> tuple[np.ndarray, np.ndarray]:
-    """Place (T, N, 3) and rotations (T, N, 3, 3) of the ends of a plant's elements; the lowest one stands still."""
+    """Return places (T, N, 3) and rotations (T, N, 3, 3) of the ends of a plant's elements; the lowest one stands
+    still."""
     below = plant.parent
     piece = rest - rest[np.maximum(below, 0)]
     lengths = np.linalg.norm(piece, axis=1)

@@ -22,7 +22,7 @@ class Stems:
     heading: np.ndarray
 
     def feet(self, stem: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Place (T, M, 3) and rotations (T, M, 3, 3) at points of stems, on which others grow."""
+        """Return places (T, M, 3) and rotations (T, M, 3, 3) at points of stems, on which others grow."""
         return self.centres[:, stem, point], self.turns[:, stem, point]
 
 

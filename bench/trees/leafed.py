@@ -112,7 +112,7 @@ _LEAF = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
 
 
 def _spray() -> Species:
-    """Leave along a short twig, one at its end, lying about in one plane as light lets them."""
+    """Return the species of leaves along a short twig, one at its end, lying about in one plane as light lets them."""
     points, quads = _LEAF
     cards = []
     for number in range(LEAVES_OF_SPRAY):

@@ -97,7 +97,7 @@ def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
 
 
 def bark_uv(skeleton: Skeleton, tubes: Tubes) -> np.ndarray:
-    """(count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
+    """Return (count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
     below = skeleton.rest[np.maximum(skeleton.parent, 0)]
     length = np.linalg.norm(skeleton.rest - below, axis=1)
     girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])

@@ -71,7 +71,8 @@ def copies_of_many() -> Plant:
 
 
 def copies_of_lengths() -> Plant:
-    """Shape, copies and branches that are neither: whether one is, is expected of others of its length up to 16."""
+    """Return shapes, copies and branches that are neither: whether one is, is expected of others of its length up to
+    16."""
     counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
     shapes: list[int] = []
     for b, (count, kind) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):

@@ -75,7 +75,7 @@ def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subpro
 
 
 def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
-    """(exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
+    """Return (exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
     process = spawn(words, prepare)
     try:
         _, err = process.communicate(timeout=TIMEOUT)

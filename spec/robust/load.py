@@ -43,7 +43,7 @@ GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
 
 
 def job(name: str, *words: object) -> tuple[int, dict]:
-    """(exit code, result) of one job of this file in a process of its own."""
+    """Return (exit code, result) of one job of this file in a process of its own."""
     root = str(HERE.parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
@@ -91,7 +91,7 @@ def thread_program(folder: Path) -> Path:
 
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
-    """(exit code, stderr, result) of one run of threads.c."""
+    """Return (exit code, stderr, result) of one run of threads.c."""
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
         done = ended([program, *map(str, words)], env=environment, timeout=TIMEOUT)
@@ -188,7 +188,7 @@ ALLOWED_GROWTH = 4 << 20
 
 
 def open_many(path: str, count: int) -> dict:
-    """Open many decoders at once and reads from each, before and after others are closed in random order."""
+    """Open many decoders at once and read from each, before and after others are closed in random order."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = count + 100
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -368,7 +368,7 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Limit.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
+    """Try Limits.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()

@@ -92,8 +92,8 @@ class _Steady:
         self._length = np.concatenate([self._length, length[is_steady]])[once]
 
     def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how much the distance of each pair changes, over the motion of the two against each other, and its
-        mean."""
+        """Return the change of the distance of each pair, as a share of the motion of one point relative to the other,
+        and the mean distance."""
         change, length = np.empty(len(pairs)), np.empty(len(pairs))
         for start in range(0, len(pairs), PAIRS_AT_ONCE):
             some = slice(start, start + PAIRS_AT_ONCE)
