@@ -1,4 +1,4 @@
-"""Meshes in OBJ and PLY files, vertex for vertex and face for face as the files have them.
+"""Reads meshes in OBJ and PLY files, vertex for vertex and face for face as the files have them.
 
 OBJ: v (with colours where there are six or seven numbers), vt, f, l, o, g and usemtl; polygons of any size, relative
 indices, lines continued by a backslash. PLY: ascii and binary of both byte orders; vertices with any scalar properties,

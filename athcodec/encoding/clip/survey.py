@@ -111,7 +111,7 @@ class Ath:
         return result
 
     def table1(self) -> dict[str, float | int]:
-        """Table 1 of the paper: depth (levels of nodes), nodes, leaves, and the thresholds.
+        """Return table 1 of the paper: depth (levels of nodes), nodes, leaves, and the thresholds.
 
         Returns
         -------
