@@ -142,4 +142,4 @@ def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) 
     branches = checked_branches(label, parent, place, moving.method)
     if moving.stem_index is None and standing.stem_index is None:
         branches = replace(branches, stem_index=None)
-    return replace(branches, taken=moving.taken)
+    return replace(branches, array_name=moving.array_name)
