@@ -86,7 +86,7 @@ class Lengyel(Baseline):
 
 
 def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Settings) -> np.ndarray:
-    """Write tracks (parts, k, 3, T) by athcodec's waves or a learned basis in time; return what a reader will decode."""
+    """Write tracks (parts, k, 3, T) by athcodec's waves or a learned basis; return what a reader will decode."""
     parts, count, _, frames = exact.shape
     writer.count(count)
     if writer.count(settings["learned"]):

@@ -368,7 +368,7 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Try Limits.memory_bytes from 1 to enough: each gives LimitExceeded before large allocations, or the right frames."""
+    """Try Limits.memory_bytes from 1 to enough: each gives LimitExceeded before it allocates much, or right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()
