@@ -41,7 +41,7 @@ vertices in all frames are left out unless they are named; `scene` are those of 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("clips", nargs="*", metavar="CLIP", default=[], help="files, names of clips, or of scenes")
-    parser.add_argument("--suite", choices=SUITES, help="the clips of a suite (default: of all, and all scenes)")
+    parser.add_argument("--suite", choices=SUITES, help="suite of clips (default: all suites, and all scenes)")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_rel_error(parser)
 

@@ -227,7 +227,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or clips by path",
     )
-    parser.add_argument("--suite", choices=tuple(SUITES), help="a set of clips (quick, where nothing is named)")
+    parser.add_argument(
+        "--suite", choices=tuple(SUITES), help="suite of clips to make (default: quick, if nothing is named)"
+    )
     parser.add_argument(
         "--folder",
         type=Path,

@@ -71,7 +71,7 @@ Order = tuple[tuple[str, ...], tuple[str, ...]]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--learning", nargs="+", metavar="CLIP", help="clips that the order is learned on")
-    parser.add_argument("--judging", nargs="+", metavar="CLIP", help="clips that it is judged on")
+    parser.add_argument("--judging", nargs="+", metavar="CLIP", help="clips that the order is judged on")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_rel_error(parser)
 

@@ -77,13 +77,19 @@ bases, the sheet's own rotation, ends first and copies in predicted motion, both
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", help="files, or names of clips; none: print what is saved")
+    parser.add_argument(
+        "clips", nargs="*", metavar="CLIP", help="files, or names of clips (default: print the figures that are kept)"
+    )
     parser.add_argument("--suite", choices=SUITES, help="all clips of a suite")
     parser.add_argument(
         "--bounds", type=float, nargs="+", default=list(BOUNDS), metavar="FRACTION", help="error bounds"
     )
     parser.add_argument(
-        "--features", nargs="+", type=_features, metavar="NAME", help="these alone; A+B leaves out both at once"
+        "--features",
+        nargs="+",
+        type=_features,
+        metavar="NAME",
+        help="features to leave out (default: each of all); A+B leaves out both at once",
     )
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_ladder(parser, "none")

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--suite",
         choices=SUITES,
         default="quick",
-        help="which clips and bounds, where none are named (default %(default)s)",
+        help="suite whose clips and bounds are measured if none are named (default %(default)s)",
     )
     parser.add_argument(
         "--bounds", type=float, nargs="+", metavar="FRACTION", help="error bounds over the bounding box's diagonal"
@@ -92,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help=f"processor time of others for a file (default %(default)s; athcodec has {OUR_SECONDS})",
     )
-    parser.add_argument("--again", action="store_true", help="repeat what failed or was too slow")
+    parser.add_argument("--again", action="store_true", help="repeat measurements that failed or were too slow")
     parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
 
 

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"by default all: {', '.join(SCENES)}")
     add_rel_error(parser)
     add_effort(parser)
-    parser.add_argument("--short", action="store_true", help="no files of parts and of default options")
+    parser.add_argument("--short", action="store_true", help="leave out the files of parts and of default options")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

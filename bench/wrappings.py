@@ -37,7 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument(
-        "--joints", type=int, default=JOINTS, metavar="NUMBER", help="of the skins (default %(default)s)"
+        "--joints",
+        type=int,
+        default=JOINTS,
+        metavar="NUMBER",
+        help="largest number of joints of a skin (default %(default)s)",
     )
 
 

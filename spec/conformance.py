@@ -517,7 +517,7 @@ def main(words: list[str] | None = None) -> int:
     )
     parser.add_argument("--own", choices=OWN | OWN_APPROXIMATE, help="a decoder of this repository")
     parser.add_argument("--approximate", action="store_true", help="a decoder of the approximate class")
-    parser.add_argument("--profile", choices=PROFILES, default="full", help="that of the decoder (default: full)")
+    parser.add_argument("--profile", choices=PROFILES, default="full", help="profile of the decoder (default: full)")
     parser.add_argument("--only", metavar="GLOB", default="*", help="vectors whose name matches")
     parser.add_argument(
         "--without",

@@ -416,7 +416,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         "are sampled, or that of a source that does not say its own",
     )
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
-    source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
+    source.add_argument("--field", metavar="NAME", help="name of the displacement in a finite-element result")
     source.add_argument(
         "--dataset", metavar="/PATH", help="of HDF5, NumPy and MATLAB files, the array with the positions, or its group"
     )
@@ -468,7 +468,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ_OR_PIPED)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
-    verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
+    verb.add_argument("--format", metavar="NAME", help="name of the format to write, whatever the suffix")
     verb.add_argument(
         "--clip",
         metavar="NAME",
@@ -613,7 +613,7 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(_whole),
         help="a vertex of the trunk (default: of a large branch that moves least)",
     )
-    verb.add_argument("--save", metavar="FILE.json", help="write the branches there, for encode --hierarchy")
+    verb.add_argument("--save", metavar="FILE.json", help="file to write the branches to, for encode --hierarchy")
     _source_arguments(verb)
 
 
@@ -668,9 +668,9 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     verb.add_argument(
-        "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
+        "--port", metavar="PORT", type=_argument(_whole), default=0, help="port of the address (default: a free one)"
     )
-    verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
+    verb.add_argument("--clip", metavar="NAME", help="clip to begin with (default: the file's first)")
     _host_mesh_argument(verb)
     verb.add_argument(
         "--floor",
@@ -743,7 +743,7 @@ def _demo_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--sample", choices=SAMPLES, default=SAMPLES[0], help="a tree in wind, or one that grows (default: %(default)s)"
     )
-    verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded level there")
+    verb.add_argument("--keep", metavar="DIR", help="folder to keep the .ath file and every decoded level in")
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
