@@ -41,7 +41,7 @@ OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 
 
 @contextmanager
-def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
+def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
     """Give a source as a clip, and a sentence on how its numbers were converted, empty if they were not.
 
     The options are OF_ARRAYS, OF_FILES and OF_PATHS, as far as they are given. A file that is opened here is closed
@@ -49,45 +49,45 @@ def clip_of(source: Source, **given: Any) -> Iterator[tuple[MotionClip, str]]:
     """
     is_path, is_view = isinstance(source, (str, os.PathLike)), isinstance(source, (Decoder, ClipView))
     allowed = OF_PATHS if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
-    for name in given.keys() - set(allowed):
+    for name in options.keys() - set(allowed):
         raise ValueError(f"{name}: got it beside {type(source).__name__} {source!r:.80}, which states its own")
     if is_path:
         from athcodec.sources import read  # The sources take long to import.
 
-        with read(source, **given) as clip:
+        with read(source, **options) as clip:
             yield clip, ""
     elif is_view:
         view = ClipView(source) if isinstance(source, Decoder) else source
         with keeping(view.inputs):
             yield MotionClip(**{name: getattr(view, name) for name in OF_VIEWS}), ""
     else:
-        with nullcontext((source, "") if isinstance(source, MotionClip) else _clip_of_array(source, given)) as made:
-            yield made
+        with nullcontext((source, "") if isinstance(source, MotionClip) else _clip_of_array(source, options)) as opened:
+            yield opened
 
 
-def _clip_of_array(source: Source, given: dict[str, Any]) -> tuple[MotionClip, str]:
+def _clip_of_array(source: Source, options: dict[str, Any]) -> tuple[MotionClip, str]:
     if isinstance(source, np.ma.MaskedArray) and np.ma.is_masked(source):
         raise ClipError("positions: got an array with masked items, expected a number for each; fill them first")
     if hasattr(source, "keys") and not hasattr(source, "shape"):
         raise ClipError(f"positions: got a {type(source).__name__}, expected one of its arrays: {_held(source)}")
     is_sliced = hasattr(source, "shape") and isinstance(getattr(source, "dtype", None), np.dtype)
     array = source if is_sliced else np.asarray(source)
-    axes, facts = given.pop("axes", None), facts_of(given)
+    axes, facts = options.pop("axes", None), facts_of(options)
     order = order_of_labels(_labels(source)) if axes is None else parse_order(axes)
     order = order_of(array.shape, facts, order)
     positions, converted = in_floats(ordered(array, order))
     if axes is None and looks_turned(positions, facts):
         warnings.warn(turned_advice(positions.shape), GuessWarning, stacklevel=2)
     stated = {name: value for name, value in dict(getattr(source, "attrs", {})).items() if name in OF_FILES}
-    time = _seconds(source, order, positions.shape[0]) if "fps" not in given else None
-    given = stated | given
-    rate = frame_rate({"fps": given.pop("fps", DEFAULT_FPS)})
-    metadata: dict[str, Any] = {name: given.pop(name) for name in OF_FILES if name in given}
+    time = _seconds(source, order, positions.shape[0]) if "fps" not in options else None
+    options = stated | options
+    rate = frame_rate({"fps": options.pop("fps", DEFAULT_FPS)})
+    metadata: dict[str, Any] = {name: options.pop(name) for name in OF_FILES if name in options}
     for name, checked in (("unit", checked_unit), ("up_axis", checked_axis)):
         if name in metadata:
             metadata[name] = checked(metadata[name])
     time = np.arange(positions.shape[0]) / rate if time is None else time
-    return MotionClip(positions, time, metadata=metadata, **given), converted
+    return MotionClip(positions, time, metadata=metadata, **options), converted
 
 
 def _held(source: Source) -> str:

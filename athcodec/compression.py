@@ -124,11 +124,11 @@ def encode(
         raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
     if isinstance(target, (str, PathLike)):
         check_ath_name(target)
-    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
-    of_source = {name: given.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in given}
+    settings: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    of_source = {name: settings.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in settings}
     out = io.BytesIO() if target is None else target
     with clip_of(source, **of_source) as (clip, converted):
-        summary = replace(encode_clip(clip, out, **given), converted=converted)
+        summary = replace(encode_clip(clip, out, **settings), converted=converted)
     return out.getvalue() if isinstance(out, io.BytesIO) and target is None else summary
 
 

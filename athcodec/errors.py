@@ -39,10 +39,10 @@ class AthError(Exception):
         super().__init__(f"{message}; {python}" if python else message)
         self.for_shell = f"{message}; {shell}" if shell else str(self)
 
-    def about(self, what: str) -> Self:
+    def about(self, subject: str) -> Self:
         """Return the same error with a name before its messages."""
-        error = type(self)(f"{what}: {self}")
-        error.for_shell = f"{what}: {self.for_shell}"
+        error = type(self)(f"{subject}: {self}")
+        error.for_shell = f"{subject}: {self.for_shell}"
         return error
 
 

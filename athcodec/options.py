@@ -26,16 +26,16 @@ HOST = "host"
 """The word for a rest pose that whoever plays the file has: `--rest host`."""
 
 
-def whole(what: str, number: SupportsIndex, hint: str = "") -> int:
+def whole(name: str, number: SupportsIndex, hint: str = "") -> int:
     """Return the number as an int, NumPy's integers too. Raises TypeError for any other, such as 3.5 or 3.0; its
     message ends with the hint."""
     try:
         return operator.index(number)
     except TypeError:
-        raise TypeError(f"{what}: got {number!r}, expected a whole number of type int{hint}") from None
+        raise TypeError(f"{name}: got {number!r}, expected a whole number of type int{hint}") from None
 
 
-def real(what: str, number: SupportsFloat, hint: str = "") -> float:
+def real(name: str, number: SupportsFloat, hint: str = "") -> float:
     """Return the number as a float: an int, a NumPy scalar of any real type, an array without dimensions, or anything
     else that `float` takes. Raises TypeError for truth values, text, complex numbers, and arrays with dimensions; its
     message ends with the hint."""
@@ -45,7 +45,7 @@ def real(what: str, number: SupportsFloat, hint: str = "") -> float:
             return float(number)
         except TypeError:
             pass
-    raise TypeError(f"{what}: got {number!r:.80}, expected a number{hint and ' ' + hint}")
+    raise TypeError(f"{name}: got {number!r:.80}, expected a number{hint and ' ' + hint}")
 
 
 def set_numbers(record: Any, *, reals: Iterable[str] = (), wholes: Iterable[str] = ()) -> None:

@@ -41,7 +41,7 @@ vertices in all frames are left out unless they are named; `scene` are those of 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("clips", nargs="*", metavar="CLIP", default=[], help="files, names of clips, or of scenes")
-    parser.add_argument("--suite", choices=SUITES, help="the clips of a suite (default: of all, and all scenes)")
+    parser.add_argument("--suite", choices=SUITES, help="suite of clips (default: all suites, and all scenes)")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_rel_error(parser)
 
@@ -51,8 +51,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     names: list[str] = []
     for name, depends, clip in _clips(args):
         names.append(name)
-        for given, without in _given(clip).items():
-            key = {"clip": name, "given": given, "bound": args.rel_error}
+        for knowledge, without in _given(clip).items():
+            key = {"clip": name, "given": knowledge, "bound": args.rel_error}
             if store.find("sizes", key, depends) is None:
                 store.add("sizes", key | _figures(clip, without, args.rel_error) | {"depends": depends})
                 print(store.find("sizes", key), file=sys.stderr, flush=True)
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], MotionClip]]:
-    """Clips that name branches, with what their figures depend on."""
+    """Yield clips that name branches, with what their figures depend on."""
     codec = fingerprint_of_athcodec()
     chosen = args.clips or (() if args.suite else SCENES)
     for name in (name for name in chosen if name in SCENES):
@@ -72,15 +72,15 @@ def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], Moti
         yield f"scene {name}", codec | {"clip": name}, scene
     words = [word for word in args.clips if word not in SCENES]
     suites = (() if args.clips else ALL) if args.suite is None else (args.suite,)
-    found = cases(words, "quick") if words else [case for suite in suites for case in cases((), suite)]
-    for case in {case.name: case for case in found if case.path is not None}.values():
+    listed = cases(words, "quick") if words else [case for suite in suites for case in cases((), suite)]
+    for case in {case.name: case for case in listed if case.path is not None}.values():
         with athcodec.read(case.path) as clip:
             if clip.has_branches and (args.clips or clip.frame_count * clip.vertex_count <= LARGEST):
                 yield case.name, codec | {"clip": digest(case.path)}, clip
 
 
 def _given(clip: MotionClip) -> dict[str, MotionClip]:
-    """The clip without branches, by what else it gives."""
+    """Return the clip without branches, by what else it gives."""
     if clip.polygons is not None:
         return {"faces": bare(clip).replace(edges=None)}
     points = {"points": bare(clip).replace(edges=None)}
@@ -89,8 +89,8 @@ def _given(clip: MotionClip) -> dict[str, MotionClip]:
 
 def _figures(clip: MotionClip, without: MotionClip, rel_error: float) -> dict[str, Any]:
     figures: dict[str, Any] = {}
-    for name, own in (("true", clip), ("found", without)):
-        data, seconds = file_and_seconds(own, rel_error=rel_error, **POSITIONS)
+    for name, variant in (("true", clip), ("found", without)):
+        data, seconds = file_and_seconds(variant, rel_error=rel_error, **POSITIONS)
         with athcodec.open(data) as decoder:
             parent = decoder.file.hierarchy.branch_parent
             branches = [int((parent < 0).sum()), len(parent)]
@@ -105,17 +105,17 @@ def _shown(rows: Results) -> Results:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """What the figures show, in sentences for a document."""
+    """Return what the figures show, in sentences for a document."""
     rows = [row for row in contents["sizes"] if row["true"] >= LEAST_BYTES and row["bound"] == REL_ERROR]
     parts = []
-    for given, what in (("faces", "meshes"), ("edges", "skeletons with edges"), ("points", "points alone")):
-        ratios = {row["clip"]: row["found"] / row["true"] for row in rows if row["given"] == given}
+    for knowledge, subject in (("faces", "meshes"), ("edges", "skeletons with edges"), ("points", "points alone")):
+        ratios = {row["clip"]: row["found"] / row["true"] for row in rows if row["given"] == knowledge}
         if ratios:
             more = sum(ratio > LIMIT for ratio in ratios.values())
             worst = max(ratios, key=lambda clip: ratios[clip])
             parts.append(
-                f"{len(ratios)} {what}: {_percent(median(ratios.values()))} in the median, {_percent(ratios[worst])} "
-                f"at most (`{worst}`), above {100 * LIMIT - 100:.0f} % in {more}"
+                f"{len(ratios)} {subject}: {_percent(median(ratios.values()))} in the median, "
+                f"{_percent(ratios[worst])} at most (`{worst}`), above {100 * LIMIT - 100:.0f} % in {more}"
             )
     made_by = f"`python -m bench branches`, commits {commits(rows)}"
     return f"More bytes on branches that are found than on true ones ({made_by}): {'; '.join(parts)}.\n"

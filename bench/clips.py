@@ -34,7 +34,7 @@ class Encoded:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
+    """Return the files that a clip lies in: `path`, the other frames of a sequence, the arrays beside an XDMF file."""
     beside = path.parent.glob(f"{path.stem}.h5") if path.suffix == ".xdmf" else ()
     frames = numbered_files(path).paths if path.suffix in FRAME_SUFFIXES else ()
     return sorted({path, *frames, *beside})
@@ -51,12 +51,12 @@ def add_clips(parser: argparse.ArgumentParser, kinds: str = "motion clips") -> N
     )
 
 
-def add_number(parser: argparse.ArgumentParser, name: str, default: Any, what: str, metavar: str = "N") -> None:
+def add_number(parser: argparse.ArgumentParser, name: str, default: Any, text: str, metavar: str = "N") -> None:
     """Add an option that takes a number, or several where its default is several."""
     several = {"nargs": "+"} if isinstance(default, tuple) else {}
     kind = type(default[0] if several else default)
     parser.add_argument(
-        name, type=kind, default=default, metavar=metavar, help=f"{what} (default %(default)s)", **several
+        name, type=kind, default=default, metavar=metavar, help=f"{text} (default %(default)s)", **several
     )
 
 
@@ -79,7 +79,7 @@ def add_effort(parser: argparse.ArgumentParser, default: str = "default") -> Non
 
 
 def file_and_seconds(clip: athcodec.MotionClip, **options: Any) -> tuple[bytes, float]:
-    """The file of a clip, and seconds of the processor."""
+    """Return the file of a clip, and seconds of the processor."""
     start = time.process_time()
     data = athcodec.encode(clip, **options)
     return data, time.process_time() - start
@@ -94,12 +94,12 @@ def encoded(
     host_rest: bool = False,
     segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
-    """The clip at `path`, encoded without attributes into a file that is deleted with the context."""
+    """Encode the clip at `path` without attributes into a file that is deleted with the context."""
     with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
-        given = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
-        summary = athcodec.encode(clip, file, **given | settings)
+        options = {"rel_error": rel_error, "rest_error": "bound", "segment_frames": segment_frames}
+        summary = athcodec.encode(clip, file, **options | settings)
         with athcodec.open(file, strict=True, host_mesh=clip) as decoder:
             yield Encoded(clip, summary, decoder)
 
@@ -107,7 +107,7 @@ def encoded(
 def measure(
     clip: athcodec.MotionClip, decoder: athcodec.Decoder, level: int | None = None, frames: slice | None = None
 ) -> ErrorMeter:
-    """Errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
+    """Return errors of the positions decoded at a level (default: the deepest), in the file's own float type."""
     meter = ErrorMeter(clip.rest)
     for start, block in decoder.blocks(level, frames=frames):
         meter.add(clip.block(start, start + len(block)), block)

@@ -37,7 +37,7 @@ INCLUDE = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 
 
 def all_codecs() -> Iterator[Codec]:
-    """Every codec of this benchmark, athcodec first, lossless ones last; modules are imported one by one."""
+    """Yield every codec of this benchmark, athcodec first, lossless ones last; modules are imported one by one."""
     for module, attribute in SOURCES:
         yield from _codecs_of(importlib.import_module(module), attribute)
     yield from lossless()
@@ -60,7 +60,7 @@ def is_lossless(codec: Codec) -> bool:
 
 
 def chosen(names: Iterable[str]) -> dict[str, Codec]:
-    """Codecs by name or as MODULE:NAME; without names all that are not lossless.
+    """Return codecs by name or as MODULE:NAME; without names all that are not lossless.
 
     Raises SystemExit for an unknown name.
     """
@@ -76,18 +76,18 @@ def _named(name: str) -> Codec:
     if ":" in name:
         module, _, attribute = name.partition(":")
         return _instance(getattr(importlib.import_module(module), attribute))
-    found = next((codec for codec in all_codecs() if codec.name == name), None)
-    if found is None:
+    codec_of_name = next((codec for codec in all_codecs() if codec.name == name), None)
+    if codec_of_name is None:
         known = "; ".join(codec.name for codec in all_codecs())
         raise SystemExit(f"codec: got {name!r}; expected MODULE:NAME or one of: {known}")
-    return found
+    return codec_of_name
 
 
 # ---- which code made a result ----
 
 
 def fingerprint(codec: Codec) -> dict[str, str]:
-    """Versions and digests of what can change this codec's results."""
+    """Return versions and digests of what can change this codec's results."""
     package = getattr(codec, "package", None)
     versions = {name: _version(name) for name in (*DISTRIBUTIONS, *([package] if package else []))}
     versions["source"] = _digest(tuple(sorted(_bench_files(type(codec).__module__))))
@@ -95,7 +95,7 @@ def fingerprint(codec: Codec) -> dict[str, str]:
 
 
 def fingerprint_of_athcodec() -> dict[str, str]:
-    """Its version, and a digest of its Python and of the compiled core."""
+    """Return its version, and a digest of its Python and of the compiled core."""
     return {"athcodec": f"{version('athcodec')} {_digest(tuple(sorted(_athcodec_files())))}"}
 
 
@@ -107,7 +107,7 @@ def _version(name: str) -> str:
 
 
 def _athcodec_files() -> set[Path]:
-    """Python of the encoder and decoder, and the compiled core, of the installed package."""
+    """Yield Python of the encoder and decoder, and the compiled core, of the installed package."""
     package = Path(athcodec.__file__).parent
     return {
         library_path(),
@@ -116,7 +116,7 @@ def _athcodec_files() -> set[Path]:
 
 
 def _bench_files(module: str) -> set[Path]:
-    """The file of a module and the C files that it compiles, and those of all codec modules that it imports."""
+    """Return the file of a module and the C files that it compiles, and those of all codec modules that it imports."""
     files: set[Path] = set()
     names = [module]
     while names:
@@ -131,7 +131,7 @@ def _bench_files(module: str) -> set[Path]:
 
 
 def _c_files(sources: Iterable[Path]) -> set[Path]:
-    """C files and what they include of the core, recursively."""
+    """Yield C files and what they include of the core, recursively."""
     files, waiting = set(), list(sources)
     while waiting:
         file = waiting.pop()
@@ -169,7 +169,7 @@ def _digest(files: tuple[Path, ...]) -> str:
 
 
 def _code(file: Path) -> bytes:
-    """The contents of a source file without comments, docstrings, imports and layout; of others, all of it."""
+    """Return the contents of a source file without comments, docstrings, imports and layout; of others, all of it."""
     if file.suffix in (".c", ".h", ".inl"):
         return "".join(re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(), flags=re.DOTALL).split()).encode()
     if file.suffix != ".py":

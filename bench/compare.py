@@ -98,17 +98,17 @@ files each made. Motion, rest pose: shares of our files that both take; the rest
 
 
 def measured(points: Iterable[Point]) -> list[Point]:
-    """Points with a file whose error is within their bound."""
+    """Return the points with a file whose error is within their bound."""
     return [point for point in points if point["status"] == OK]
 
 
 def sizes_of(points: Iterable[Point], clip: str) -> Sizes:
-    """A clip's measured points by codec and bound."""
+    """Return a clip's measured points by codec and bound."""
     return {(point["codec"], point["bound"]): point for point in measured(points) if point["clip"] == clip}
 
 
 def best_other(sizes: Sizes, bound: float) -> Point | None:
-    """The smallest file of another codec."""
+    """Return the smallest file of another codec."""
     others = [point for (_, at), point in sizes.items() if at == bound and point["kind"] != OURS]
     return min(others, key=lambda point: point["bytes"], default=None)
 
@@ -119,14 +119,14 @@ def exponent(bound: float) -> str:
 
 
 def short(codec: str) -> str:
-    """The name of a codec without what stands in brackets behind it."""
+    """Return the name of a codec without what stands in brackets behind it."""
     return codec.partition(" (")[0]
 
 
 def rows(
     clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]
 ) -> list[dict[str, Any]]:
-    """A row for each clip."""
+    """Return a row for each clip."""
     return [_row(clip, sizes_of(points, clip["clip"]), sorted(bounds, reverse=True)) for clip in clips]
 
 
@@ -137,17 +137,22 @@ def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict
     whole, layers = (sizes.get((kind.name, WHOLE_BOUND), {}) for kind in (WholeAthcodec, LayeredAthcodec))
     best = best_other(sizes, WHOLE_BOUND) or {}
     made_by = (commits(some) for some in _shown(sizes, bounds))
-    ours = {bound: size(Athcodec.name, bound) for bound in bounds}
-    shares = [(ours[bound], size(simple.NAME, bound)) for bound in bounds]
+    sizes_of_athcodec = {bound: size(Athcodec.name, bound) for bound in bounds}
+    shares = [(sizes_of_athcodec[bound], size(simple.NAME, bound)) for bound in bounds]
     return {
         "clip": clip["clip"],
         "program": clip.get("program"),
         "frames x vertices": f"{clip['frames']} x {clip['vertices']:,}" if "frames" in clip else clip["what"],
         "source": clip.get("source_bytes"),
         "all arrays": whole.get("bytes"),
-        **{f"ours {exponent(bound)}": ours[bound] for bound in bounds},
-        **{f"best other {exponent(bound)}": _beside(ours[bound], best_other(sizes, bound)) for bound in bounds},
-        "ours/simple": " ".join(f"{own / plain:.2f}" if own and plain else "-" for own, plain in shares),
+        **{f"ours {exponent(bound)}": sizes_of_athcodec[bound] for bound in bounds},
+        **{
+            f"best other {exponent(bound)}": _beside(sizes_of_athcodec[bound], best_other(sizes, bound))
+            for bound in bounds
+        },
+        "ours/simple": " ".join(
+            f"{of_athcodec / plain:.2f}" if of_athcodec and plain else "-" for of_athcodec, plain in shares
+        ),
         "processor s": " / ".join(_rounded(point.get("encode_cpu_s")) for point in (whole, best)),
         "levels": " / ".join(_rounded(layers.get(name)) for name in ("level_max_ratio", "level_rms_ratio")),
         "ticks": " / ".join(_rounded(layers.get(name)) for name in ("tick_ratio", "source_tick_ratio")),
@@ -156,21 +161,23 @@ def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict
 
 
 def _shown(sizes: Sizes, bounds: Collection[float]) -> tuple[list[Point], list[Point]]:
-    """The points of athcodec and the best ones of other codecs."""
-    ours = [point for (_, bound), point in sizes.items() if point["kind"] == OURS and bound in bounds]
-    return ours, [best for bound in bounds if (best := best_other(sizes, bound))]
+    """Return the points of athcodec and the best ones of other codecs."""
+    points_of_athcodec = [point for (_, bound), point in sizes.items() if point["kind"] == OURS and bound in bounds]
+    return points_of_athcodec, [best for bound in bounds if (best := best_other(sizes, bound))]
 
 
 def _rounded(value: float | None) -> str:
     return "-" if value is None else f"{value:.2f}" if value < 10 else f"{value:.0f}"
 
 
-def _beside(ours: int | None, best: Point | None) -> str | None:
-    """The size and name of a file, and its ratio to ours; bold where it is smaller."""
+def _beside(size_of_athcodec: int | None, best: Point | None) -> str | None:
+    """Return the size and name of a file, and its ratio to ours; bold where it is smaller."""
     if best is None:
         return None
-    text = f"{best['bytes']:,} {short(best['codec'])}" + (f" x{best['bytes'] / ours:.2f}" if ours else "")
-    return f"**{text}**" if ours and best["bytes"] < ours else text
+    text = f"{best['bytes']:,} {short(best['codec'])}" + (
+        f" x{best['bytes'] / size_of_athcodec:.2f}" if size_of_athcodec else ""
+    )
+    return f"**{text}**" if size_of_athcodec and best["bytes"] < size_of_athcodec else text
 
 
 def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]) -> str:
@@ -178,14 +185,14 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
     than the one before, on what has no file, and on the versions and time limits."""
     compared, smaller, larger, coarser = 0, [], [], []
     names = [clip["clip"] for clip in clips]
-    own = [point for point in points if point["clip"] in names and point["bound"] in bounds]
+    points_of_clips = [point for point in points if point["clip"] in names and point["bound"] in bounds]
     for clip in clips:
         sizes, name = sizes_of(points, clip["clip"]), f"`{clip['clip']}`"
         for bound in sorted(bounds, reverse=True):
-            ours, best = sizes.get((Athcodec.name, bound)), best_other(sizes, bound)
-            compared += bool(ours and best)
-            if ours and best and best["bytes"] < ours["bytes"]:
-                by = f"{short(best['codec'])} by {_percent(best['bytes'], ours['bytes'])}"
+            point_of_athcodec, best = sizes.get((Athcodec.name, bound)), best_other(sizes, bound)
+            compared += bool(point_of_athcodec and best)
+            if point_of_athcodec and best and best["bytes"] < point_of_athcodec["bytes"]:
+                by = f"{short(best['codec'])} by {_percent(best['bytes'], point_of_athcodec['bytes'])}"
                 smaller.append(f"{name} at {exponent(bound)} ({by})")
         whole = sizes.get((WholeAthcodec.name, WHOLE_BOUND))
         if whole and clip.get("source_bytes", whole["bytes"]) < whole["bytes"]:
@@ -193,9 +200,13 @@ def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: 
         growth = sizes.get((LayeredAthcodec.name, WHOLE_BOUND), {}).get("level_max_ratio") or 0
         if growth > 1:
             coarser.append(f"{name} ({growth:.2f} times)")
-    failed = Counter(f"{short(point['codec'])} {point['status']}" for point in own if point["status"] not in DONE)
-    versions = sorted({point["depends"]["athcodec"].split()[0] for point in own if "depends" in point})
-    limits = sorted({f"{point['limit_s']:g}" for point in own if point["kind"] != OURS and "limit_s" in point})
+    failed = Counter(
+        f"{short(point['codec'])} {point['status']}" for point in points_of_clips if point["status"] not in DONE
+    )
+    versions = sorted({point["depends"]["athcodec"].split()[0] for point in points_of_clips if "depends" in point})
+    limits = sorted(
+        {f"{point['limit_s']:g}" for point in points_of_clips if point["kind"] != OURS and "limit_s" in point}
+    )
     parts = {
         "Measured with athcodec": versions,
         "Processor seconds of other codecs for a file:": limits,
@@ -259,38 +270,40 @@ def _chunk_bytes(ours: Point) -> dict[str, int]:
 
 
 def _percent(one: int, other: int) -> str:
-    """How far a size is from another one, in per cent of that."""
+    """Return how far a size is from another one, in per cent of that."""
     return f"{100 * abs(one / other - 1):.1f} %"
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """A row for each codec on one clip: its bytes at each bound, the last one lossless, or why there are none."""
-    found = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
-    columns = dict.fromkeys(exponent(bound) for bound in sorted({point["bound"] for point in found}, reverse=True))
+    """Return a row for each codec on one clip: its bytes at each bound and without loss, or why it has none."""
+    points_of_clip = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
+    columns = dict.fromkeys(
+        exponent(bound) for bound in sorted({point["bound"] for point in points_of_clip}, reverse=True)
+    )
     table: dict[str, dict[str, Any]] = {}
-    for point in sorted(found, key=lambda point: -point["bound"]):
+    for point in sorted(points_of_clip, key=lambda point: -point["bound"]):
         name = point["codec"].removesuffix(", lossless")
         row = table.setdefault(name, {"bytes of": name} | columns)
         row[exponent(point["bound"])] = point["bytes"] if point["status"] == OK else point["status"]
     for name, row in table.items():
-        row["commit"] = commits(point for point in found if point["codec"].removesuffix(", lossless") == name)
+        row["commit"] = commits(point for point in points_of_clip if point["codec"].removesuffix(", lossless") == name)
     return list(table.values())
 
 
 def suite_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) -> str:
-    """Sentences and the table of a suite, for a document."""
+    """Return sentences and the table of a suite, for a document."""
     clips, points = contents["clips"], contents["points"]
     table, caption = markdown(rows(clips, points, bounds)), " ".join(CAPTION.split())
     return "\n\n".join([losses(clips, points, bounds), table, caption]) + "\n"
 
 
 def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) -> str:
-    """Sentences and a table of all codecs for each clip, for a document."""
+    """Return sentences and a table of all codecs for each clip, for a document."""
     clips, points = contents["clips"], contents["points"]
     parts = [losses(clips, points, bounds)]
     for clip in (clip for clip in clips if "frames" in clip):
-        what = f"`{clip['clip']}`, {clip['frames']} x {clip['vertices']:,}: {clip['what']}"
-        parts += [what, markdown(by_codec(points, clip["clip"], bounds))]
+        title = f"`{clip['clip']}`, {clip['frames']} x {clip['vertices']:,}: {clip['what']}"
+        parts += [title, markdown(by_codec(points, clip["clip"], bounds))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -326,8 +339,8 @@ def overview_text(suites: Sequence[Mapping[str, Any]]) -> str:
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]
         for clip in clips:
-            for own, more in zip(points, _shown(sizes_of(contents["points"], clip["clip"]), [WHOLE_BOUND])):
-                own += more
+            for columns, more in zip(points, _shown(sizes_of(contents["points"], clip["clip"]), [WHOLE_BOUND])):
+                columns += more
         for clip, row in zip(clips, rows(clips, contents["points"], [WHOLE_BOUND])):
             sizes = {"float32": 12 * clip["frames"] * clip["vertices"], "its file": row["source"]}
             sizes |= {"with all arrays": row["all arrays"]}

@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 @cache
 def constants() -> tuple[Constant, ...]:
     """Return all constants, by module."""
-    found = []
+    numbers = []
     for folder in FOLDERS:
         package = import_module(folder)
         root = Path(inspect.getfile(package)).parent
@@ -167,8 +167,8 @@ def constants() -> tuple[Constant, ...]:
             for name in _top_names(module):
                 value = getattr(module, name)
                 if name not in fixed and _is_number(value):
-                    found.append(Constant(module.__name__, name, value))
-    return tuple(found)
+                    numbers.append(Constant(module.__name__, name, value))
+    return tuple(numbers)
 
 
 def _is_number(value: Any) -> bool:
@@ -212,13 +212,13 @@ def changed(some: Iterable[Constant], factor: float) -> Iterator[None]:
 
 @cache
 def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
-    found = [(sys.modules[constant.module], constant.name)]
+    places = [(sys.modules[constant.module], constant.name)]
     for name, module in list(sys.modules.items()):
         if name.startswith("athcodec.") and getattr(module, "__file__", None):
             for node in ast.walk(_tree(module)):
                 if isinstance(node, ast.ImportFrom) and node.module == constant.module:
-                    found += [(module, one.asname or one.name) for one in node.names if one.name == constant.name]
-    return tuple(found)
+                    places += [(module, one.asname or one.name) for one in node.names if one.name == constant.name]
+    return tuple(places)
 
 
 @cache

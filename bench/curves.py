@@ -16,7 +16,8 @@ class Curve:
 
     @classmethod
     def of(cls, errors, sizes) -> Curve:
-        """From points in any order; those with an error or a size of 0 have no logarithm and are left out."""
+        """Return a curve through points in any order. Points with an error or a size of 0 have no logarithm and are
+        left out."""
         kept: list[tuple[float, float]] = []
         for error, size in sorted(zip(errors, sizes, strict=True)):
             if error > 0 and size > 0 and (not kept or size < kept[-1][1]):
@@ -27,7 +28,7 @@ class Curve:
         return len(self.errors)
 
     def size_at(self, error: float) -> float | None:
-        """The size at an error, on the straight line between its neighbours; None beyond the curve's ends."""
+        """Return the size at an error, on the straight line between its neighbours; None beyond the curve's ends."""
         if not len(self) or not self.errors[0] <= error <= self.errors[-1]:
             return None
         return float(np.exp(np.interp(np.log(error), np.log(self.errors), np.log(self.sizes))))

@@ -122,7 +122,7 @@ RECIPES["canopy_1k_60f"] = Canopy(120, 2, 60, 4.0, 8.0, 80, "broadleaf", seed=15
 
 
 def path_of(name: str, folder: Path | None = None) -> Path:
-    """The file of a clip by name, made if it is missing, or of any clip by its path.
+    """Return the file of a clip by name, made if it is missing, or of any clip by its path.
 
     Raises KeyError for a name that is neither, foreign.MissingProgram if the program that makes it is not installed.
     """
@@ -140,7 +140,7 @@ def default_folder() -> Path:
 
 
 def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
-    """The file, and the seconds it took to make; None if it existed."""
+    """Return the file, and the seconds it took to make; None if it existed."""
     if name == SAMPLE:
         return athcodec.sample_path(), None
     if name not in RECIPES:
@@ -182,7 +182,7 @@ def _make(name: str, path: Path) -> float:
 
 
 def digest(path: Path) -> str:
-    """Digest of positions, rest pose and branches: the input of a codec."""
+    """Return digest of positions, rest pose and branches: the input of a codec."""
     total = hashlib.sha256()
     with athcodec.read(path) as clip:
         for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
@@ -193,13 +193,13 @@ def digest(path: Path) -> str:
 
 
 def recipe_text(name: str) -> str:
-    """How the clip is made, as JSON."""
+    """Return how the clip is made, as JSON."""
     recipe = RECIPES[name]
     return json.dumps({"kind": type(recipe).__name__, "version": RECIPE_VERSION} | asdict(recipe), sort_keys=True)
 
 
 def _recipe_in(path: Path, name: str) -> str | None:
-    """The recipe by which a clip's file was made; None if it is not known."""
+    """Return the recipe by which a clip's file was made; None if it is not known."""
     try:
         if path.suffix != ".h5":
             return path.with_name(f"{name}.recipe").read_text()
@@ -210,7 +210,7 @@ def _recipe_in(path: Path, name: str) -> str | None:
 
 
 def tip_motion(clip: athcodec.MotionClip) -> float:
-    """RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
+    """Return the RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
     order = np.arange(clip.vertex_count) if clip.stem_index is None else clip.stem_index
     last = np.lexsort((order, clip.vertex_branch))
     ends = last[np.flatnonzero(np.diff(clip.vertex_branch[last], append=clip.branch_count))]
@@ -227,7 +227,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"clips to make or find: {', '.join([SAMPLE, *RECIPES])}; or clips by path",
     )
-    parser.add_argument("--suite", choices=tuple(SUITES), help="a set of clips (quick, where nothing is named)")
+    parser.add_argument(
+        "--suite", choices=tuple(SUITES), help="suite of clips to make (default: quick, if nothing is named)"
+    )
     parser.add_argument(
         "--folder",
         type=Path,

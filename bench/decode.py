@@ -128,7 +128,7 @@ class Case:
         return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
     def whole(self, rounds: int) -> dict[str, float]:
-        """Medians of whole decoding and of opening, each round a process of its own."""
+        """Return medians of whole decoding and of opening, each round a process of its own."""
         runs = [self.program("once") for _ in range(rounds)]
         return {name: median(run[name] for run in runs) for name in runs[0]}
 
@@ -139,7 +139,7 @@ class Case:
 
 
 def compile_program(folder: Path) -> Path:
-    """Compiles decode.c with the decoder's sources and flags of CMakeLists.txt."""
+    """Return compiles decode.c with the decoder's sources and flags of CMakeLists.txt."""
     sources = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
     if sources is None:
         raise SystemExit("CMakeLists.txt: got no ATH_DECODER_SOURCES, expected the decoder's source files")
@@ -226,7 +226,7 @@ def onward_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def sz3_rows(case: Case, rel_error: float, rounds: int) -> list[dict[str, Any]]:
-    """One row for a clip, whose file `case` has; none for an .ath file, which does not hold the source."""
+    """Return one row for a clip, whose file `case` has; none for an .ath file, which does not hold the source."""
     if case.path.suffix == ".ath":
         return []
     with athcodec.read(case.path) as clip:
@@ -265,7 +265,7 @@ def _sz3_job(positions: np.ndarray, bound: float, algorithm: str) -> Callable[[]
 
 
 def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Level 1 and the deepest, each with one segment and with two."""
+    """Return rows for level 1 and the deepest level, each with one segment and with two."""
     levels, rows = figures["levels"], []
     positions = 12 * figures["vertices"] * figures["longest_segment"]
     for level in sorted({min(1, len(levels) - 1), len(levels) - 1}):

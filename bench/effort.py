@@ -71,7 +71,7 @@ Order = tuple[tuple[str, ...], tuple[str, ...]]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--learning", nargs="+", metavar="CLIP", help="clips that the order is learned on")
-    parser.add_argument("--judging", nargs="+", metavar="CLIP", help="clips that it is judged on")
+    parser.add_argument("--judging", nargs="+", metavar="CLIP", help="clips that the order is judged on")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
     add_rel_error(parser)
 
@@ -97,8 +97,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _cases(words: Sequence[str] | None, usual: Mapping[str, Sequence[str]]) -> list[Case]:
-    found = cases(words or [name for names in usual.values() for name in names], "quick")
-    return [case for case in found if case.path is not None]
+    chosen = cases(words or [name for names in usual.values() for name in names], "quick")
+    return [case for case in chosen if case.path is not None]
 
 
 class _Searching(Exception):
@@ -167,10 +167,10 @@ class _Learner:
         return chosen, states
 
     def _first_states(self, clips: Sequence[Case], stack: ExitStack) -> list[_State]:
-        found = (
+        states = (
             _first_state(stack.enter_context(athcodec.read(case.path)), case.name, self._rel_error) for case in clips
         )
-        return [state for state in found if state is not None]
+        return [state for state in states if state is not None]
 
     def _applied(self, states: list[_State], done: tuple[str, ...], name: str) -> list[_State]:
         """Return the states after one more choice, whose figures are stored."""
@@ -199,8 +199,8 @@ def _first_state(clip: athcodec.MotionClip, name: str, rel_error: float) -> _Sta
     with patch.object(Search, "decide", noted):
         try:
             athcodec.encode(clip, io.BytesIO(), rel_error=rel_error, **POSITIONS)
-        except _Searching as found:
-            search: Search = found.args[0]
+        except _Searching as captured:
+            search: Search = captured.args[0]
             tried = search.of_sample or search
             allowed = allowed_work(clip.vertex_count, clip.frame_count, "default")
             return _State(name, tried.trials.apart(), tried.trials.start, allowed, search.makes_all_again)
@@ -253,18 +253,18 @@ def _file_rows(
 
     rows = []
     for case in chosen:
-        ours, other, best = file(case, of_encoder), file(case, learned), file(case, of_encoder, "best")
+        of_order, other, best = file(case, of_encoder), file(case, learned), file(case, of_encoder, "best")
         rows.append(
             {
                 "clip": case.name,
-                "encoder": ours["bytes"],
+                "encoder": of_order["bytes"],
                 "learned": other["bytes"],
                 "best": best["bytes"],
-                "learned / encoder": other["bytes"] / ours["bytes"],
-                "default / best": ours["bytes"] / best["bytes"],
-                "seconds": ours["seconds"],
+                "learned / encoder": other["bytes"] / of_order["bytes"],
+                "default / best": of_order["bytes"] / best["bytes"],
+                "seconds": of_order["seconds"],
                 "seconds, best": best["seconds"],
-                "untried": ", ".join(ours["untried"]),
+                "untried": ", ".join(of_order["untried"]),
             }
         )
     return rows

@@ -108,13 +108,19 @@ bases, the sheet's own rotation, ends first and copies in predicted motion, both
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", nargs="*", metavar="CLIP", help="files, or names of clips; none: print what is saved")
+    parser.add_argument(
+        "clips", nargs="*", metavar="CLIP", help="files, or names of clips (default: print the figures that are kept)"
+    )
     parser.add_argument("--suite", choices=SUITES, help="all clips of a suite")
     parser.add_argument(
         "--bounds", type=float, nargs="+", default=list(BOUNDS), metavar="FRACTION", help="error bounds"
     )
     parser.add_argument(
-        "--features", nargs="+", type=_features, metavar="NAME", help="these alone; A+B leaves out both at once"
+        "--features",
+        nargs="+",
+        type=_features,
+        metavar="NAME",
+        help="features to leave out (default: each of all); A+B leaves out both at once",
     )
     add_number(parser, "--alone", 0, "add each to a file of so many first frames that has no other; 0: leave each out")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
@@ -201,8 +207,8 @@ class _Files:
         return self._kept[key]
 
     def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> tuple[Draft, int]:
-        given = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
-        plan = draft(self._clip, rel_error=self._bound, **given)
+        settings = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
+        plan = draft(self._clip, rel_error=self._bound, **settings)
         coded = code_segments(self._clip, plan, range(plan.segment_count))
         summary = write(self._clip, plan, coded, self._path)
         with athcodec.open(self._path, strict=True, host_mesh=self._clip) as decoder:
@@ -229,12 +235,12 @@ class _Files:
             return of_all[feature]
         if choice.predicted:
             return False
-        learned = any(any(own.learned_bases) for own in both)
+        learned = any(any(settings_of_file.learned_bases) for settings_of_file in both)
         return {
-            Feature.ROTATIONS: any(any(own.rotation_step_factors) for own in both),
-            Feature.SHAPES: any(own.learned_pieces is not None for own in both),
+            Feature.ROTATIONS: any(any(settings_of_file.rotation_step_factors) for settings_of_file in both),
+            Feature.SHAPES: any(settings_of_file.learned_pieces is not None for settings_of_file in both),
             Feature.TIME_BASES: learned,
-            Feature.COMMON_BASIS: any(own.common_basis for own in both),
+            Feature.COMMON_BASIS: any(settings_of_file.common_basis for settings_of_file in both),
             Feature.WAVE_BASES: learned,
             Feature.SHEETS: bool((settings.forms == SHEET).any()),
             Feature.RINGS: bool((settings.forms > SHEET).any()),
@@ -255,12 +261,12 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each feature that was measured, in per cent of the bytes with it."""
     growth: dict[str, dict[str, float]] = {}
     makers: dict[str, set[str]] = {}
-    for own in sizes:
-        if own["with"] < LEAST_BYTES:
+    for row in sizes:
+        if row["with"] < LEAST_BYTES:
             continue
-        value = _growth(own)
-        growth.setdefault(own["feature"], {})[_file_name(own)] = value
-        makers.setdefault(own["feature"], set()).update({_maker(own["clip"])} if value >= LEAST else ())
+        value = _growth(row)
+        growth.setdefault(row["feature"], {})[_file_name(row)] = value
+        makers.setdefault(row["feature"], set()).update({_maker(row["clip"])} if value >= LEAST else ())
     rows = []
     titles = {feature.name.lower(): feature.value for feature in Feature} | GONE
     for name in [name for name in titles if name in growth] + sorted(growth.keys() - titles.keys()):

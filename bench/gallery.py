@@ -66,7 +66,7 @@ def captions() -> Iterator[tuple[str, str]]:
 
 
 def _encoded(folder: Path) -> dict[str, Path]:
-    """Files of the clips that do not ship as such."""
+    """Return files of the clips that do not ship as such."""
     made = {}
     for name, (source, bound) in MADE.items():
         made[name] = folder / f"{name}.ath"

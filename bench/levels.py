@@ -88,15 +88,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             for stored in result.decoder.levels:
                 case = {"clip": path.stem, "level": stored.level}
                 depth = file.tables.header.stages[stored.level]
-                meter, ours = meters[stored.level], meters[stored.level].error
+                meter, error = meters[stored.level], meters[stored.level].error
                 has_nodes = ath is not None and depth <= ath.height
                 paper = _measure_paper(result.clip, ath, depth) if has_nodes else None
-                row = case | _level_row(stored, ours, paper) | _better(file.levels, stored.level, meter)
+                row = case | _level_row(stored, error, paper) | _better(file.levels, stored.level, meter)
                 levels.append(row)
-                broken += _broken_lines(path, stored, ours, result.decoder)
+                broken += _broken_lines(path, stored, error, result.decoder)
                 broken += _worse_lines(path, row, file.tables.header.is_predicted)
                 if has_nodes:
-                    gaps.append(case | _gap_row(result, ath, stored.level, ours.diagonal))
+                    gaps.append(case | _gap_row(result, ath, stored.level, error.diagonal))
     return {
         "tables": [
             table(f"Levels, bound {args.rel_error:g}", levels, LEVELS_NOTE),
@@ -108,12 +108,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _same_nodes(result: Encoded) -> Ath:
-    """The paper's ATH with the thresholds of the file."""
+    """Return the paper's ATH with the thresholds of the file."""
     hierarchy = result.decoder.file.hierarchy
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
-    ours, theirs = result.decoder.file.table1(), ath.table1()
-    if any(ours[key] != theirs[key] for key in ("depth", "nodes", "leaves")):
-        raise RuntimeError(f"nodes of the ATH: got {ours} in the file, {theirs} from the clip")
+    stored, computed = result.decoder.file.table1(), ath.table1()
+    if any(stored[key] != computed[key] for key in ("depth", "nodes", "leaves")):
+        raise RuntimeError(f"nodes of the ATH: got {stored} in the file, {computed} from the clip")
     return ath
 
 
@@ -124,24 +124,24 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
     return meter
 
 
-def _level_row(stored: Level, ours: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
-    diagonal = ours.diagonal
+def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
+    diagonal = error.diagonal
     return {
         "nodes": stored.nodes,
         "bytes": stored.bytes,
-        "max": ours.max_error / diagonal,
-        "RMS": ours.rms_error / diagonal,
+        "max": error.max_error / diagonal,
+        "RMS": error.rms_error / diagonal,
         "paper max": paper and paper.max_error / diagonal,
         "paper RMS": paper and paper.rms_error / diagonal,
-        "ratio": ours.rms_error / paper.rms_error if paper and paper.rms_error else None,
+        "ratio": error.rms_error / paper.rms_error if paper and paper.rms_error else None,
     }
 
 
 def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, float | None]:
-    """How much worse than the level before, and than the source's own second differences, a level is."""
+    """Return how much worse than the level before, and than the source's own second differences, a level is."""
     before, this = levels[max(level - 1, 0)], levels[level]
     pairs = (this.max_error, before.max_error), (this.rms_error, before.rms_error)
-    worse = max(own / other if other else float(own > 0) for own, other in pairs)
+    worse = max(ratio / other if other else float(ratio > 0) for ratio, other in pairs)
     return {
         "of the one before": worse if level else None,
         "second difference": meter.figures()["smoothness"]["acceleration_ratio"],
@@ -149,7 +149,7 @@ def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, fl
 
 
 def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
-    """A line if a level is worse than the one before it, or jerks."""
+    """Return a line if a level is worse than the one before it, or jerks."""
     limits = {"of the one before": 1.0} | ({} if may_jerk else {"second difference": 2.0})
     return [
         f"{path.name}, level {row['level']}: got {row[name]:.3f} {name}; expected at most {limit:g}"
@@ -158,20 +158,20 @@ def _worse_lines(path: Path, row: dict[str, Any], may_jerk: bool) -> list[str]:
     ]
 
 
-def _broken_lines(path: Path, stored: Level, ours: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
-    """A line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
+def _broken_lines(path: Path, stored: Level, error: ErrorMeter, decoder: athcodec.Decoder) -> list[str]:
+    """Return a line if the decoded error exceeds the level's error in the file or, at the last level, the bound."""
     is_last = stored.level == decoder.file.level_count - 1
     allowed = decoder.file.max_error_bound if is_last else stored.max_error * (1 + ROUNDING)
-    if ours.max_error <= allowed:
+    if error.max_error <= allowed:
         return []
-    return [f"{path.name}, level {stored.level}: got an error of {ours.max_error:.9g}; expected at most {allowed:.9g}"]
+    return [f"{path.name}, level {stored.level}: got an error of {error.max_error:.9g}; expected at most {allowed:.9g}"]
 
 
 # ---- files ----
 
 
 def _file_row(name: str, result: Encoded) -> dict[str, Any]:
-    """What the levels of a file are worth in each of its clips."""
+    """Return what the levels of a file are worth in each of its clips."""
     decoder, last = result.decoder, result.decoder.levels[-1].bytes
     parts = [decoder.play(clip.name) for clip in decoder.file.clips]
     return {
@@ -186,7 +186,7 @@ def _file_row(name: str, result: Encoded) -> dict[str, Any]:
 
 
 def _worst_ratio(part: athcodec.Decoder) -> float:
-    """The largest ratio of the errors of a level to those of the level before."""
+    """Return the largest ratio of the errors of a level to those of the level before."""
     pairs = [
         (getattr(after, name), getattr(before, name))
         for before, after in pairwise(part.levels)
@@ -196,7 +196,8 @@ def _worst_ratio(part: athcodec.Decoder) -> float:
 
 
 def _foot_drift(result: Encoded) -> float | None:
-    """How far any foot that stands still moves at any level, over the extent of its plant; None: no foot does."""
+    """Return how far any foot that stands still moves at any level, over the extent of its plant; None: no foot
+    does."""
     hierarchy, clip, decoder = result.decoder.file.hierarchy, result.clip, result.decoder
     roots = np.flatnonzero(hierarchy.branch_parent < 0)
     starts = hierarchy.first_vertex[roots]
@@ -216,7 +217,7 @@ def _foot_drift(result: Encoded) -> float | None:
 
 
 def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
-    """A line for each thing that a file should have and has not."""
+    """Return a line for each thing that a file should have and has not."""
     lines = []
     if row["of the one before"] > 1:
         lines.append(f"{row['of the one before']:.3f} of the level before in a clip; expected at most 1")
@@ -237,13 +238,13 @@ def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
     paper = ath.attachment_gaps(source, result.decoder.file.tables.header.stages[level])
     joints = _Joints(result.decoder, level)
-    ours = joints.gaps(frames)
+    gaps = joints.gaps(frames)
     return {
         "joints": len(joints.branch),
         "measured": len(joints.measured),
         "loose": joints.loose,
-        "max": ours.max / diagonal,
-        "RMS": ours.rms / diagonal,
+        "max": gaps.max / diagonal,
+        "RMS": gaps.rms / diagonal,
         "paper max": paper.max / diagonal,
         "paper RMS": paper.rms / diagonal,
     }
@@ -271,7 +272,7 @@ class _Joints:
         return int((self.decoder.file.tables.branches["flags"][self.measured] & LOOSE > 0).sum())
 
     def gaps(self, frames: list[int]) -> Gaps:
-        """Largest and RMS gap over these frames and all joints."""
+        """Return largest and RMS gap over these frames and all joints."""
         if not len(self.measured):
             return Gaps(0.0, 0.0)
         squares = np.array([self._squares(frame) for frame in frames])

@@ -104,7 +104,7 @@ def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> 
 
 
 def _repeat(source: str, target: str, times: int) -> dict[str, int]:
-    """Writes the clip repeated `times` times, gzip-compressed."""
+    """Write the clip repeated `times` times, gzip-compressed."""
     with athcodec.read(source) as clip:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])
@@ -127,7 +127,7 @@ def _repeat(source: str, target: str, times: int) -> dict[str, int]:
 
 
 def peak_bytes() -> int:
-    """Largest resident memory of this process so far."""
+    """Return the largest resident memory of this process so far."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
 

@@ -166,10 +166,10 @@ def measured(case: Case, rel_error: float) -> dict[str, Any]:
     from time import perf_counter
 
     with tempfile.TemporaryDirectory() as folder:
-        skeleton, own = Path(folder, "skeleton.ath"), Path(folder, "mesh.ath")
+        skeleton, direct = Path(folder, "skeleton.ath"), Path(folder, "mesh.ath")
         athcodec.encode(case.skeleton, skeleton, rel_error=rel_error, exact_rest=True)
         bare = {key: case.mesh.attributes[key] for key in _FACES if key in case.mesh.attributes}
-        athcodec.encode(case.mesh.replace(attributes=bare, metadata=_SCENE), own, rel_error=rel_error)
+        athcodec.encode(case.mesh.replace(attributes=bare, metadata=_SCENE), direct, rel_error=rel_error)
         with athcodec.open(skeleton) as plant:
             start = perf_counter()
             moving = athcodec.onto(plant, case.mesh)
@@ -185,7 +185,7 @@ def measured(case: Case, rel_error: float) -> dict[str, Any]:
             "vertices": case.mesh.vertex_count,
             "frames": case.mesh.frame_count,
             "skeleton bytes": skeleton.stat().st_size,
-            "mesh bytes": own.stat().st_size,
+            "mesh bytes": direct.stat().st_size,
             "size": float(np.linalg.norm(np.ptp(case.mesh.rest, axis=0))),
             "far": report.far_count,
             "whole pieces": report.card_count,
@@ -216,11 +216,11 @@ class _Figures:
         self._apart = _lengths(case.mesh.rest[None], self._joints)[0]
         self._gaps = [0.0, 0.0]
 
-    def add(self, moved: np.ndarray, own: np.ndarray) -> None:
+    def add(self, moved: np.ndarray, direct: np.ndarray) -> None:
         for meter, some in zip(self._meters, (self._wood, ~self._wood)):
             if some.any():
-                meter.add(own[:, some], moved[:, some])
-        for number, frames in enumerate((moved, own)):
+                meter.add(direct[:, some], moved[:, some])
+        for number, frames in enumerate((moved, direct)):
             stretch = np.abs(_lengths(frames, self._edges) / self._rest - 1)
             self._stretch[number].append(stretch.astype(np.float32))
             if len(self._joints):
@@ -229,13 +229,13 @@ class _Figures:
 
     def row(self) -> dict[str, Any]:
         wood, leaves = self._meters
-        stretch, own = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
+        stretch, direct = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
         row: dict[str, Any] = {"wood max": wood.max_error, "wood RMS": wood.rms_error}
         has_leaves = not self._wood.all()
         row |= {"leaves max": leaves.max_error if has_leaves else None}
         row |= {"leaves RMS": leaves.rms_error if has_leaves else None}
         gaps = self._gaps if len(self._joints) else (None, None)
-        return row | {"stretch": stretch, "own stretch": own, "gap": gaps[0], "own gap": gaps[1]}
+        return row | {"stretch": stretch, "own stretch": direct, "gap": gaps[0], "own gap": gaps[1]}
 
 
 def _stretch(clip: athcodec.MotionClip) -> float:
@@ -243,8 +243,8 @@ def _stretch(clip: athcodec.MotionClip) -> float:
     edges = edges_of(clip)
     rest = _lengths(clip.rest[None], edges)[0]
     edges, rest = edges[rest > 0], rest[rest > 0]
-    found = [np.abs(_lengths(block, edges) / rest - 1).astype(np.float32) for _, block in clip.blocks(8)]
-    return float(np.quantile(np.concatenate(found), TAIL))
+    strains = [np.abs(_lengths(block, edges) / rest - 1).astype(np.float32) for _, block in clip.blocks(8)]
+    return float(np.quantile(np.concatenate(strains), TAIL))
 
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:

@@ -42,7 +42,7 @@ def _furthest_frame(result: Encoded) -> int:
 
 
 def _chains(result: Encoded) -> list[np.ndarray]:
-    """Vertices of each branch in source numbers, its attach point first."""
+    """Return vertices of each branch in source numbers, its attach point first."""
     hierarchy = result.decoder.file.hierarchy
     chains = []
     for first, count, attach in zip(hierarchy.first_vertex, hierarchy.stem_count, hierarchy.attach):

@@ -48,17 +48,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> dict[str, Any]:
     rows, at_errors, sizes = [], [], []
     for path in args.clips:
-        own = _own_files(path, args.rel_error)
-        found = {}
+        curves = _own_files(path, args.rel_error)
+        bytes_of = {}
         for name, ladder in (("none", ()), ("layers", args.ladder)):
             with encoded(path, args.rel_error, ladder=ladder) as result:
-                found[name], prefixes = result.summary.bytes, list(_prefixes(result, own))
+                bytes_of[name], prefixes = result.summary.bytes, list(_prefixes(result, curves))
             about = {"clip": path.stem, "ladder": name}
             rows += [about | row for row in prefixes]
-            at_errors += [about | row for row in _at_errors(prefixes, own)]
-        worst = max(_ratios(prefixes, own["max"]), default=None)
-        more = {"more %": 100 * (found["layers"] / found["none"] - 1), "worst /own": worst}
-        sizes.append({"clip": path.stem} | found | more)
+            at_errors += [about | row for row in _at_errors(prefixes, curves)]
+        worst = max(_ratios(prefixes, curves["max"]), default=None)
+        more = {"more %": 100 * (bytes_of["layers"] / bytes_of["none"] - 1), "worst /own": worst}
+        sizes.append({"clip": path.stem} | bytes_of | more)
     return {
         "tables": [
             table(f"Prefixes of files of {args.rel_error:g}", rows, NOTE),
@@ -70,14 +70,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _own_files(path: Path, rel_error: float) -> dict[str, Curve]:
-    """Sizes of files of their own by each measure of their error."""
+    """Return sizes of files of their own by each measure of their error."""
     rows = []
     for bound in _bounds(rel_error):
         with encoded(path, bound) as result:
             meter, scale = measure(result.clip, result.decoder), _diagonal(result)
             rows.append((result.summary.bytes, meter.max_error / scale, meter.rms_error / scale))
     sizes, *errors = zip(*rows, strict=True)
-    return {name: Curve.of(own, sizes) for name, own in zip(MEASURES, errors, strict=True)}
+    return {name: Curve.of(errors_of_kind, sizes) for name, errors_of_kind in zip(MEASURES, errors, strict=True)}
 
 
 def _diagonal(result: Encoded) -> float:
@@ -89,40 +89,41 @@ def _bounds(rel_error: float) -> list[float]:
     return [*np.geomspace(LOOSEST, rel_error, count).tolist(), rel_error * BELOW]
 
 
-def _prefixes(result: Encoded, own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+def _prefixes(result: Encoded, curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
     scale = _diagonal(result)
     for level in result.decoder.levels:
         row = {"level": level.level, "bytes": level.bytes}
         row |= {"max": level.max_error / scale, "RMS": level.rms_error / scale}
         for kind in MEASURES:
-            size = own[kind].size_at(row[kind])
+            size = curves[kind].size_at(row[kind])
             row |= {f"own at {kind}": size and round(size), f"/own at {kind}": size and level.bytes / size}
         yield row
 
 
-def _at_errors(prefixes: list[dict[str, Any]], own: dict[str, Curve]) -> Iterator[dict[str, Any]]:
-    """At 1e-2, 3e-3, 1e-3 and so on, by both measures."""
+def _at_errors(prefixes: list[dict[str, Any]], curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each of the errors 1e-2, 3e-3, 1e-3 and so on, by both measures."""
     for error in (digit * 10.0**-decade for decade in range(1, 9) for digit in (1, 0.3)):
         row: dict[str, Any] = {}
         for kind in MEASURES:
-            if found := _at(error, kind, prefixes, own[kind]):
-                prefix, size = found
+            if match := _at(error, kind, prefixes, curves[kind]):
+                prefix, size = match
                 row |= {f"level at {kind}": prefix["level"], f"bytes at {kind}": prefix["bytes"]}
                 row |= {f"own at {kind}": round(size), f"/own at {kind}": prefix["bytes"] / size}
         if row:
             yield {"error": error} | row
 
 
-def _ratios(prefixes: list[dict[str, Any]], own: Curve) -> Iterator[float]:
-    """Prefix over own file at the errors of ASKED that both have, and just below those of the prefixes."""
+def _ratios(prefixes: list[dict[str, Any]], curve: Curve) -> Iterator[float]:
+    """Yield the size of a prefix over that of a file encoded directly, at the errors of ASKED that both have and
+    just below those of the prefixes."""
     steps = {prefix["max"] for prefix in prefixes}
-    for error in {*own.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}:
-        if ASKED[0] <= error <= ASKED[1] and (found := _at(error, "max", prefixes, own)):
-            prefix, size = found
+    for error in {*curve.errors.tolist(), *steps, *(JUST_BELOW * step for step in steps)}:
+        if ASKED[0] <= error <= ASKED[1] and (match := _at(error, "max", prefixes, curve)):
+            prefix, size = match
             yield prefix["bytes"] / size
 
 
-def _at(error: float, kind: str, prefixes: list[dict[str, Any]], own: Curve) -> tuple[dict[str, Any], float] | None:
-    """The shortest prefix of at most this error, and the size of a file of its own of this error."""
-    prefix, size = next((row for row in prefixes if row[kind] <= error), None), own.size_at(error)
+def _at(error: float, kind: str, prefixes: list[dict[str, Any]], curve: Curve) -> tuple[dict[str, Any], float] | None:
+    """Return the shortest prefix of at most this error, and the size of a file of its own of this error."""
+    prefix, size = next((row for row in prefixes if row[kind] <= error), None), curve.size_at(error)
     return (prefix, size) if prefix and size else None

@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--suite",
         choices=SUITES,
         default="quick",
-        help="which clips and bounds, where none are named (default %(default)s)",
+        help="suite whose clips and bounds are measured if none are named (default %(default)s)",
     )
     parser.add_argument(
         "--bounds", type=float, nargs="+", metavar="FRACTION", help="error bounds over the bounding box's diagonal"
@@ -92,7 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help=f"processor time of others for a file (default %(default)s; athcodec has {OUR_SECONDS})",
     )
-    parser.add_argument("--again", action="store_true", help="repeat what failed or was too slow")
+    parser.add_argument("--again", action="store_true", help="repeat measurements that failed or were too slow")
     parser.add_argument("--list", action="store_true", help="list codecs and clips, and measure nothing")
 
 
@@ -135,7 +135,7 @@ def _listing(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _about(store: Store, case: Case) -> dict[str, Any]:
-    """Facts about a clip, with a digest of its content."""
+    """Return facts about a clip, with a digest of its content."""
     program, colon, _ = case.description.partition(": ")
     row = {"clip": case.name, "what": case.description} | ({"program": program} if colon else {})
     if case.path is None:
@@ -187,7 +187,7 @@ def _point(job: _Job, store: Store, again: bool) -> None:
 
 
 def _was_measured(job: _Job, store: Store) -> bool:
-    """Whether there is a result of this clip, from another machine or time at which the codec could run."""
+    """Return whether there is a result of this clip, from another machine or time at which the codec could run."""
     known = store.find("points", job.identity)
     return known is not None and known["status"] == OK and known["depends"]["clip"] == job.digest
 
@@ -248,7 +248,8 @@ def _print_progress(job: _Job, result: dict[str, Any]) -> None:
 def summary(
     contents: dict[str, list[dict[str, Any]]], names: list[str], bounds: Collection[float], in_short: bool = False
 ) -> dict[str, Any]:
-    """Tables of the results of these clips and bounds; `in_short`: the one of all clips, and what has no file."""
+    """Return tables of the results of these clips and bounds; `in_short`: the one of all clips, and what has no
+    file."""
     clips = [row for row in contents["clips"] if row["clip"] in names]
     points = [point for point in contents["points"] if point["clip"] in names and point["bound"] in (0, *bounds)]
     note = compare.losses(clips, points, bounds)
@@ -261,14 +262,16 @@ def summary(
         rows = [{name: point[name] for name in columns} for point in without]
         return {"tables": tables + ([table("Without a file", rows)] if rows else []), "broken": list(_broken(points))}
     for name in names:
-        own = [point for point in points if point["clip"] == name]
-        if own:
-            tables.append(table(title(name), [_row(point) for point in own], POINTS_NOTE, _processors(own)))
+        points_of_clip = [point for point in points if point["clip"] == name]
+        if points_of_clip:
+            tables.append(
+                table(title(name), [_row(point) for point in points_of_clip], POINTS_NOTE, _processors(points_of_clip))
+            )
     return {"tables": tables, "broken": list(_broken(points))}
 
 
 def title(clip: str) -> str:
-    """Title of the table of a clip's points."""
+    """Return title of the table of a clip's points."""
     return f"Rate and distortion: {clip}"
 
 
@@ -298,7 +301,7 @@ def _processors(points: list[dict[str, Any]]) -> str:
 
 
 def _absent(points: list[dict[str, Any]]) -> list[str]:
-    """A note on the codecs without any measured point."""
+    """Return a note on the codecs without any measured point."""
     present = {point["codec"] for point in compare.measured(points)}
     absent = {point["codec"]: point["status"] for point in points if point["codec"] not in present}
     names = ", ".join(f"{name} ({why})" for name, why in absent.items())
@@ -306,7 +309,7 @@ def _absent(points: list[dict[str, Any]]) -> list[str]:
 
 
 def _broken(points: list[dict[str, Any]]) -> Iterator[str]:
-    """Faults of athcodec and the baselines; those of programs are only rows."""
+    """Yield faults of athcodec and the baselines; those of programs are only rows."""
     for point in points:
         if point["status"] in (BROKEN, FAILED) and point["kind"] != "program":
             yield (f"{point['clip']}, {point['codec']} at {point['bound']:g}: {point['status']}: {point['why']}")

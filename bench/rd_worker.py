@@ -62,9 +62,8 @@ def decode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: fl
 
 
 def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) -> athcodec.MotionClip:
-    """The clip as a codec gets it: where the source names no branches, other codecs are given those that athcodec
-    finds, so that none of them loses for want of an order. Finding them is not counted.
-    """
+    """Return the clip as a codec gets it: where the source names no branches, other codecs are given those that
+    athcodec finds, so that none of them loses for want of an order. Finding them is not counted."""
     if clip.has_branches or codec.kind == OURS:
         return clip
     option = BoundOption(rel_error=rel_bound) if rel_bound else BoundOption(lossless=True)
@@ -81,7 +80,7 @@ def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
-    """Errors over the diagonal; "broken" describes a wrong type, shape or error."""
+    """Return errors over the diagonal; "broken" describes a wrong type, shape or error."""
     shape = source.positions.shape
     if getattr(decoded, "shape", None) != shape or decoded.dtype != np.float32:
         is_array = isinstance(decoded, np.ndarray)
@@ -97,7 +96,8 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
 
 
 def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
-    """How much a level's error exceeds that of the level before, and how much the file jerks at its seams, at worst."""
+    """Return how much a level's error exceeds that of the level before, and how much the file jerks at its seams, at
+    worst."""
     with athcodec.open(data, strict=True) as decoder:
         meters = measured_levels(decoder, clip)
 
@@ -114,7 +114,7 @@ def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
 
 
 def _words(settings: Any) -> str:
-    """Settings on one line."""
+    """Return settings on one line."""
     if isinstance(settings, dict):
         return ", ".join(f"{name} {_words(value)}" for name, value in settings.items())
     if isinstance(settings, (list, tuple, np.ndarray)):

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def sections() -> Iterator[tuple[Path, str, str]]:
-    """Every part of a document that comes from a file of results that is there: document, name and text."""
+    """Yield every part of a document that comes from a file of results that is there: document, name and text."""
     texts = {"features": features.table_text, "rd": compare.clips_text} | dict.fromkeys(rd.KEPT, compare.suite_text)
     for name, text in texts.items():
         file = rd.RESULTS / f"{name}.json"
@@ -57,7 +57,7 @@ def sections() -> Iterator[tuple[Path, str, str]]:
 
 
 def picture_text() -> str:
-    """What the moving picture shows, by the file that it shows."""
+    """Return what the moving picture shows, by the file that it shows."""
     path = athcodec.sample_path("leafed")
     with athcodec.open(path) as decoder:
         raw, size = decoder.file.info()["frames"] * decoder.file.vertex_count * 12, path.stat().st_size
@@ -75,10 +75,10 @@ def put(document: Path, name: str, text: str) -> None:
 
 
 def parted(text: str, name: str) -> tuple[str, str, str]:
-    """What a document has up to the first marker of a name, between both, and from the second one on."""
+    """Return what a document has up to the first marker of a name, between both, and from the second one on."""
     first, last = f"<!-- {name}: written by python -m bench report -->\n", f"<!-- end of {name} -->\n"
-    before, found, rest = text.partition(first)
+    before, marker, rest = text.partition(first)
     inside, ended, after = rest.partition(last)
-    if not (found and ended):
+    if not (marker and ended):
         raise SystemExit(f"document: found no {first.strip()} with its end; expected both lines, each once")
     return before + first, inside, last + after

@@ -71,7 +71,7 @@ def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def _made(name: str, args: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
-    """The table of one plant's file, and what of it is not within its bound."""
+    """Return the table of one plant's file, and what of it is not within its bound."""
     clip, out = PLANTS[name](), args.out / athcodec.sample_path(name).name
     ladder = LADDERS.get(name, DEFAULT_LADDER)
     athcodec.encode(clip, out, rel_error=args.rel_error, rest_error="bound", effort=args.effort, ladder=ladder)

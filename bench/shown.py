@@ -42,11 +42,13 @@ def picked(title: str, clips: tuple[str, ...] = (), **columns: str) -> Callable[
 
 
 def _sizes(tables: dict[str, list[Row]]) -> list[Row]:
-    found: dict[str, Row] = {}
+    rows_of_clips: dict[str, Row] = {}
     for row in tables["Sizes"]:
-        shown = found.setdefault(row["clip"], {"clip": row["clip"], "float32": round(row["bytes"] * row["ratio"])})
+        shown = rows_of_clips.setdefault(
+            row["clip"], {"clip": row["clip"], "float32": round(row["bytes"] * row["ratio"])}
+        )
         shown[row["bound"] + {"none": "", "decades": " in layers"}[row["ladder"]]] = row["bytes"]
-    return list(found.values())
+    return list(rows_of_clips.values())
 
 
 def _levels(tables: dict[str, list[Row]]) -> list[Row]:
@@ -71,31 +73,33 @@ def _prefixes(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _ladders(tables: dict[str, list[Row]]) -> list[Row]:
-    found: dict[float, Row] = {}
+    rows_of_errors: dict[float, Row] = {}
     names = {"layers": "default", "none": "--ladder none"}
     for row in tables["At an error"]:
         if row["clip"] == "tree_1k_120f" and "bytes at max" in row:
-            shown = found.setdefault(row["error"], {"largest error": row["error"]} | dict.fromkeys(names.values()))
+            shown = rows_of_errors.setdefault(
+                row["error"], {"largest error": row["error"]} | dict.fromkeys(names.values())
+            )
             shown[names[row["ladder"]]] = row["bytes at max"]
             shown["own file"] = row["own at max"]
-    return list(found.values())
+    return list(rows_of_errors.values())
 
 
 def _host(tables: dict[str, list[Row]]) -> list[Row]:
-    found: dict[str, Row] = {}
+    rows_of_clips: dict[str, Row] = {}
     for row in tables["Sizes"]:
         if row["ladder"] == "decades":
-            shown = found.setdefault(row["clip"], {"clip": row["clip"]})
+            shown = rows_of_clips.setdefault(row["clip"], {"clip": row["clip"]})
             shown |= {row["bound"]: row["bytes"], f"{row['bound']}, --rest host": row["rest host"]}
-    return list(found.values())
+    return list(rows_of_clips.values())
 
 
 def _decoding(tables: dict[str, list[Row]]) -> list[Row]:
-    found: dict[tuple[str, str], Row] = {}
+    rows_of_units: dict[tuple[str, str], Row] = {}
     for row in tables["Decoding"]:
-        shown = found.setdefault((row["what"], row["unit"]), {"": row["what"], "unit": row["unit"]})
+        shown = rows_of_units.setdefault((row["what"], row["unit"]), {"": row["what"], "unit": row["unit"]})
         shown[row["clip"]] = row["figure"]
-    return list(found.values())
+    return list(rows_of_units.values())
 
 
 def _structure(tables: dict[str, list[Row]]) -> list[Row]:
@@ -186,6 +190,6 @@ SHOWN = {
 
 
 def sections() -> Iterator[tuple[Path, str, str]]:
-    """Every table: document, name and text."""
+    """Yield every table: document, name and text."""
     for name, shown in SHOWN.items():
         yield ROOT / shown.document, name, shown.text()

@@ -48,7 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument("--all", action="store_true", help="all clips of all suites, made if they are missing")
-    parser.add_argument("--sample", action="store_true", help="also how choices made on a sample of the plant compare")
+    parser.add_argument(
+        "--sample",
+        action="store_true",
+        help="compare choices made on a sample of the plant with those made on all of it, too",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:

@@ -73,13 +73,13 @@ class Mesh:
     def without_faces(self) -> Mesh:
         return Mesh(self.positions, None, self.time)
 
-    def taken(self, vertices: np.ndarray, number: np.ndarray) -> Mesh:
-        """These vertices; number: (N,) of each vertex among them."""
+    def with_vertices(self, vertices: np.ndarray, number: np.ndarray) -> Mesh:
+        """Return the mesh with these vertices alone. `number` (N,) is the place of each vertex among them."""
         faces = None if self.faces is None else np.where(self.faces < 0, -1, number[self.faces]).astype(np.int32)
         return Mesh(np.ascontiguousarray(self.positions[:, vertices]), faces, self.time)
 
     def apart(self) -> Mesh:
-        """Each face with vertices of its own."""
+        """Return each face with vertices of its own."""
         is_there = self.faces >= 0
         corners = self.faces[is_there]
         faces = np.full(self.faces.shape, -1, np.int32)
@@ -88,12 +88,12 @@ class Mesh:
 
     def shuffled(self) -> Mesh:
         order = np.random.default_rng(SEED).permutation(self.positions.shape[1])
-        return self.taken(order, np.argsort(order))
+        return self.with_vertices(order, np.argsort(order))
 
 
 def places_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """The first vertex of each place, ascending, and the (N,) place of each vertex: found by sorting all coordinates,
-    not as the encoder does."""
+    """Return the first vertex of each place, ascending, and the (N,) place of each vertex: found by sorting all
+    coordinates, not as the encoder does."""
     rows = np.ascontiguousarray(mesh.positions.transpose(1, 0, 2)).reshape(mesh.positions.shape[1], -1) + 0.0
     whole = rows.view(np.dtype((np.void, rows.dtype.itemsize * rows.shape[1]))).ravel()
     _, first, place = np.unique(whole, return_index=True, return_inverse=True)
@@ -126,7 +126,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _meshes(name: str, mesh: Mesh) -> Iterator[tuple[str, Mesh]]:
-    """A clip with shared places as it is, another one split; each with its faces, if it has any, and without."""
+    """Yield a clip with shared places as it is, another one split; each with its faces, if it has any, and without."""
     first, _ = places_of(mesh)
     if len(first) == mesh.positions.shape[1]:
         if mesh.faces is None:
@@ -141,7 +141,7 @@ def _rows(mesh: Mesh, rel_error: float) -> Iterator[dict[str, Any]]:
     for order, split in (("own", mesh), ("shuffled", mesh.shuffled())):
         first, place = places_of(split)
         count = len(place)
-        welded = split.taken(first, place)
+        welded = split.with_vertices(first, place)
         files = [athcodec.encode(one.encoded(), rel_error=rel_error, ladder="none") for one in (split, welded)]
         share = np.bincount(place) / count
         entropy = -float((share * np.log2(share)).sum()) * count / 8
@@ -164,7 +164,7 @@ def _rows(mesh: Mesh, rel_error: float) -> Iterator[dict[str, Any]]:
 
 
 def _decoded(split: bytes, welded: bytes, place: np.ndarray) -> tuple[bool, float, float]:
-    """Whether both files give the same bits, the ratio of their times, and seconds of decoding the split one."""
+    """Return whether both files give the same bits, the ratio of their times, and seconds of decoding the split one."""
 
     def one(data: bytes) -> np.ndarray:
         with athcodec.open(data) as decoder:
@@ -179,8 +179,8 @@ def _decoded(split: bytes, welded: bytes, place: np.ndarray) -> tuple[bool, floa
         gathered = np.take(one(welded), place, axis=1)
         times.append((middle - start, time.process_time() - middle))
         same = same and whole.tobytes() == gathered.tobytes()
-    ours, theirs = (median(column) for column in zip(*times))
-    return same, ours / theirs, ours
+    split_seconds, welded_seconds = (median(column) for column in zip(*times))
+    return same, split_seconds / welded_seconds, split_seconds
 
 
 def _finding(vertices: int, places: int) -> dict[str, Any]:
@@ -202,12 +202,12 @@ def _find(vertices: int, places: int) -> dict[str, Any]:
 
     clip = MotionClip(Frames(read, FRAMES, vertices, np.float32), np.arange(FRAMES) / 30)
     before, begun = peak_bytes(), time.process_time()
-    found = find_places(clip)
+    merged = find_places(clip)
     seconds, peak = time.process_time() - begun, peak_bytes()
     begun = time.process_time()
     for _ in clip.blocks():
         pass
-    figures = {"vertices": vertices, "frames": FRAMES, "places": int(found.count), "seconds": seconds}
+    figures = {"vertices": vertices, "frames": FRAMES, "places": int(merged.count), "seconds": seconds}
     return figures | {"of which reading": time.process_time() - begun, "memory": (peak - before) / 1e6}
 
 

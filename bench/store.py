@@ -32,13 +32,13 @@ class Store:
         return tuple(result[key] for key in self._keys[name])
 
     def find(self, name: str, wanted: dict[str, Any], depends: dict[str, Any] | None = None) -> dict[str, Any] | None:
-        """The result with these keys, if it depends on exactly `depends` (None: on anything)."""
+        """Return the result with these keys, if it depends on exactly `depends` (None: on anything)."""
         result = self._results[name].get(self._key(name, wanted))
         is_right = result is not None and (depends is None or depends == result["depends"])
         return result if is_right else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
-        """Adds or replaces a result of this command and commit, and replaces the file in one step."""
+        """Add or replace a result of this command and commit, and replaces the file in one step."""
         result = result | {name: self._environment[name] for name in ("command", "commit")}
         self._results[name][self._key(name, result)] = result
         if self.file is not None:
@@ -55,7 +55,7 @@ class Store:
 
 
 def read(file: Path) -> dict[str, Any]:
-    """The JSON file of any verb; tables of a Store as lists of dictionaries."""
+    """Return the JSON file of any verb; tables of a Store as lists of dictionaries."""
     return {
         name: _results_of(value) if isinstance(value, dict) and "columns" in value else value
         for name, value in json.loads(file.read_text()).items()
@@ -63,7 +63,7 @@ def read(file: Path) -> dict[str, Any]:
 
 
 def commits(results: Iterable[Mapping[str, Any]]) -> str:
-    """The commits that made some results; in brackets those that stored a result which does not name its own."""
+    """Return the commits that made some results; in brackets those that stored a result which does not name its own."""
     names = sorted({result["commit"] for result in results if "commit" in result})
     return " ".join(f"({name.removeprefix(STORED_IN)})" if name.startswith(STORED_IN) else name for name in names)
 
@@ -97,7 +97,7 @@ def _results_of(table: dict[str, Any]) -> Results:
 
 
 def _layout(value: Any, newline: str = "\n") -> str:
-    """JSON with a line for each value of an object and each item of a list."""
+    """Return JSON with a line for each value of an object and each item of a list."""
     if isinstance(value, dict):
         items = [f"{json.dumps(name)}: {_layout(item, newline + ' ')}" for name, item in value.items()]
     elif isinstance(value, list):

@@ -43,26 +43,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"by default all: {', '.join(SCENES)}")
     add_rel_error(parser)
     add_effort(parser)
-    parser.add_argument("--short", action="store_true", help="no files of parts and of default options")
+    parser.add_argument("--short", action="store_true", help="leave out the files of parts and of default options")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
     if unknown := [name for name in args.scenes if name not in SCENES]:
         raise SystemExit(f"scene: got {', '.join(unknown)}; expected some of {', '.join(SCENES)}")
-    found, defaults, turning, segments = [], [], [], []
+    branches, defaults, turning, segments = [], [], [], []
     for name in args.scenes or SCENES:
         scene = SCENES[name].make()
         row = _found_row(scene, args.rel_error, args.effort, has_parts=not args.short)
-        found.append({"scene": name} | row)
+        branches.append({"scene": name} | row)
         if not args.short:
             defaults.append({"scene": name} | _default_row(scene, args.rel_error, args.effort))
         if scene.standing is not None:
             turning.append({"scene": name} | _turning_row(scene, row["found"], args.rel_error, args.effort))
         if name in SEGMENT_SCENES:
             segments += [{"scene": name} | _segment_row(scene, bound, args.effort) for bound in SEGMENT_BOUNDS]
-        print(f"{name}: {found[-1]}", flush=True)
+        print(f"{name}: {branches[-1]}", flush=True)
     tables = [
-        table(f"Found against true branches and against parts, bound {args.rel_error:g}", found, FOUND_NOTE),
+        table(f"Found against true branches and against parts, bound {args.rel_error:g}", branches, FOUND_NOTE),
         table("Default options", defaults, DEFAULT_NOTE),
         table("Turning against standing", turning, TURNING_NOTE),
         table("Segments", segments, SEGMENT_NOTE),
@@ -71,13 +71,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bound(scene: Scene, rel_error: float) -> float:
-    """In scene units: parts are held to that of the scene."""
+    """Return the bound of a scene, to which its parts are held too, in scene units."""
     low = np.min(scene.clip.positions, axis=(0, 1)).astype(np.float64)
     return rel_error * float(np.linalg.norm(np.max(scene.clip.positions, axis=(0, 1)) - low))
 
 
 def _branches(data: bytes) -> list[int]:
-    """Roots and branches of a file."""
+    """Return roots and branches of a file."""
     with athcodec.open(data) as decoder:
         parent = decoder.file.hierarchy.branch_parent
         return [int((parent < 0).sum()), len(parent)]
@@ -85,24 +85,24 @@ def _branches(data: bytes) -> list[int]:
 
 def _found_row(scene: Scene, rel_error: float, effort: str, has_parts: bool) -> dict[str, Any]:
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
-    found, seconds = file_and_seconds(scene.bare(), **options)
+    branches, seconds = file_and_seconds(scene.bare(), **options)
     true, true_seconds = file_and_seconds(scene.clip, **options)
     parent = scene.clip.branch_parent
     row = {
         "vertices": scene.clip.vertex_count,
         "frames": scene.clip.frame_count,
         "roots, branches": [int((parent < 0).sum()), len(parent)],
-        "found ones": _branches(found),
+        "found ones": _branches(branches),
         "true": len(true),
-        "found": len(found),
-        "found / true": len(found) / len(true),
+        "found": len(branches),
+        "found / true": len(branches) / len(true),
         "seconds": seconds,
         "seconds, true": true_seconds,
     }
     if not has_parts:
         return row
     parts = _parts(scene, options)
-    return row | {"parts": round(parts), "found / parts": len(found) / parts}
+    return row | {"parts": round(parts), "found / parts": len(branches) / parts}
 
 
 def _parts(scene: Scene, options: dict[str, Any]) -> float:

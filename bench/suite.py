@@ -22,7 +22,7 @@ class Case:
 
 
 def cases(words: Iterable[str], suite: str) -> list[Case]:
-    """The clips named, or those of the suite. Raises SystemExit for an unknown name."""
+    """Return the clips named, or those of the suite. Raises SystemExit for an unknown name."""
     return [_case(word) for word in list(words) or data.SUITES[suite]]
 
 

@@ -24,12 +24,12 @@ MISSING = "-"
 
 
 def table(title: str, rows: list[dict[str, Any]], *notes: str) -> dict[str, Any]:
-    """A table of a result; `notes` are printed below it, one paragraph each."""
+    """Return a table of a result; `notes` are printed below it, one paragraph each."""
     return {"title": title, "rows": rows, "notes": [" ".join(note.split()) for note in notes]}
 
 
 def environment(argv: Sequence[str]) -> dict[str, Any]:
-    """The command (paths by their last part only), commit, versions and machine."""
+    """Return the command (paths by their last part only), commit, versions and machine."""
     words = [Path(word).name if os.sep in word else word for word in argv]
     versions = {"python": platform.python_version()} | {name: version(name) for name in DISTRIBUTIONS}
     system = f"{platform.system()} {platform.machine()}"
@@ -42,8 +42,8 @@ def environment(argv: Sequence[str]) -> dict[str, Any]:
 
 @cache
 def commit(code: tuple[str, ...] = CODE) -> str:
-    """The commit of the clone that measures, with a mark if code at these paths has changed since; "unknown" outside a
-    clone."""
+    """Return the commit of the clone that measures, with a mark if code at these paths has changed since; "unknown"
+    outside a clone."""
 
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
@@ -57,7 +57,7 @@ def commit(code: tuple[str, ...] = CODE) -> str:
 
 
 def cpu_model() -> str:
-    """Of the first processor, as the system names it."""
+    """Return the name that the system gives the first processor."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
@@ -69,7 +69,7 @@ def write_json(result: dict[str, Any], file: Path) -> None:
 
 
 def as_text(result: dict[str, Any]) -> str:
-    """The output of a verb: tables, broken lines, commit, machine.
+    """Return the output of a verb: tables, broken lines, commit, machine.
 
     Notes that several tables have in common are printed below the first one.
     """
@@ -92,14 +92,14 @@ def _table_text(part: dict[str, Any]) -> str:
 
 
 def markdown(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A table in Markdown."""
+    """Return a table in Markdown."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = [_column(name, [row.get(name) for row in rows]) for name in names]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in zip(*columns, strict=True))
 
 
 def _column(name: str, values: list[Any]) -> list[str]:
-    """Header, rule and cells of one column, all of one width; numbers to the right."""
+    """Return header, rule and cells of one column, padded to one width; numbers are aligned to the right."""
     cells = [_cell(value) for value in values]
     width = max(3, *map(len, [name, *cells]))
     if all(isinstance(value, str) for value in values):

@@ -41,14 +41,14 @@ class ThrottledServer(ThreadingHTTPServer):
         self.server_close()
 
     def handle_error(self, request, client_address) -> None:
-        """Ignored: browsers close connections at any time."""
+        """Ignore errors: browsers close connections at any time."""
 
     @property
     def address(self) -> str:
         return f"http://127.0.0.1:{self.server_address[1]}/"
 
     def page(self, name: str | None = None, **more: str) -> str:
-        """The viewer's address with a file, which it shows without the story of its first seconds."""
+        """Return the viewer's address with a file, which it shows without the story of its first seconds."""
         query = ([f"file=/{name}"] if name else []) + [
             f"{key}={value}" for key, value in ({"intro": "off"} | more).items()
         ]
@@ -58,7 +58,7 @@ class ThrottledServer(ThreadingHTTPServer):
         return sum(size for file, _, size in self.log if file == name)
 
     def wait(self, size: int) -> None:
-        """Sleeps until `size` more bytes may be sent."""
+        """Sleep until `size` more bytes may be sent."""
         if self.rate is None:
             return
         with self._lock:

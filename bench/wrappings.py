@@ -37,7 +37,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument(
-        "--joints", type=int, default=JOINTS, metavar="NUMBER", help="of the skins (default %(default)s)"
+        "--joints",
+        type=int,
+        default=JOINTS,
+        metavar="NUMBER",
+        help="largest number of joints of a skin (default %(default)s)",
     )
 
 
@@ -92,10 +96,10 @@ class _Wrappings:
         return path.stat().st_size, self._error_of(path)
 
     def _error_of(self, path: Path) -> float:
-        said = {key: self._clip.metadata[key] for key in ("unit", "up_axis") if self._clip.metadata.get(key)}
-        with athcodec.read(path, **said) as again:
-            found = ((start, again.block(start, start + len(block))) for start, block in self._clip.blocks())
-            return _largest(self._clip, found) / self._diagonal
+        scene = {key: self._clip.metadata[key] for key in ("unit", "up_axis") if self._clip.metadata.get(key)}
+        with athcodec.read(path, **scene) as again:
+            blocks = ((start, again.block(start, start + len(block))) for start, block in self._clip.blocks())
+            return _largest(self._clip, blocks) / self._diagonal
 
     def _ours(self) -> Iterator[dict[str, Any]]:
         path, settings = self._folder / "ours.ath", {"rel_error": self._bound, "rest_error": "bound", "ladder": "none"}

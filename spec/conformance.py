@@ -117,7 +117,7 @@ Decoder = Callable[[list[tuple[Vector, str]]], Iterable[bytes | Exception]]
 
 
 def vectors() -> list[Vector]:
-    """The vectors listed in expected.txt."""
+    """Return the vectors listed in expected.txt."""
     lines = (FOLDER / "expected.txt").read_text("utf-8").splitlines()
     return [parse_line(line) for line in lines if line and not line.startswith("#")]
 
@@ -134,7 +134,7 @@ def format_line(name: str, data: bytes, results: dict[str, str], reason: str) ->
 
 
 def checksum_of(data: bytes, item: str, answer: bytes) -> str:
-    """RESULT of an answer to an item of a file."""
+    """Return RESULT of an answer to an item of a file."""
     if item in NO_ANSWER:
         return "ok" if not answer else "bytes where none are asked for"
     if item.isdecimal():
@@ -144,12 +144,12 @@ def checksum_of(data: bytes, item: str, answer: bytes) -> str:
 
 @lru_cache(maxsize=8)
 def positions_type(data: bytes) -> str:
-    """That of a file whose front is whole."""
+    """Return the type of the positions of a file whose front is whole."""
     return "<f8" if rules.read_front(data)[0].is_float64 else "<f4"
 
 
 def with_quiet_nans(answer: bytes, kind: str) -> bytes:
-    """The answer with all NaNs replaced by the quiet one, since sign and payload are not defined."""
+    """Return the answer with all NaNs replaced by the quiet one, since sign and payload are not defined."""
     if len(answer) % np.dtype(kind).itemsize:
         return answer
     numbers = np.frombuffer(answer, kind).copy()
@@ -161,7 +161,7 @@ def with_quiet_nans(answer: bytes, kind: str) -> bytes:
 
 
 def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
-    """A line for each item whose result differs from expected.txt."""
+    """Yield a line for each item whose result differs from expected.txt."""
     jobs = asked(chosen, without)
     for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
         yield from complaint(vector, item, result_of(vector.path.read_bytes(), item, answer))
@@ -192,7 +192,7 @@ class Approximately:
         self.largest = 0.0
 
     def failures(self, decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
-        """A line for each item whose result is not what it should be, positions within their tolerance."""
+        """Yield a line for each item whose result is not what it should be, positions within their tolerance."""
         jobs = [job for job in asked(chosen, without) if not is_position(*job) or is_measured(*job)]
         for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
             if not is_position(vector, item) or isinstance(answer, Exception):
@@ -204,7 +204,7 @@ class Approximately:
                 yield f"{vector.name}, {item}: got positions {got:.3g} tolerances from those of an exact decoder"
 
     def tolerances(self, vector: Vector, level: int, answer: bytes) -> float:
-        """How far the furthest vertex of an answer is from where it should be."""
+        """Return how far the furthest vertex of an answer is from where it should be."""
         data = vector.path.read_bytes()
         kind = positions_type(data)
         exact, deepest = (np.frombuffer(package(data, str(at), vector.mesh), kind) for at in (level, last_level(data)))
@@ -215,7 +215,7 @@ class Approximately:
 
 
 def is_position(vector: Vector, item: str) -> bool:
-    """Whether the expected answer to an item is positions or a rest pose."""
+    """Return whether the expected answer to an item is positions or a rest pose."""
     return needs_rest(item) and vector.results[item] not in ERRORS
 
 
@@ -228,14 +228,15 @@ def last_level(data: bytes) -> int:
 
 
 def tolerance(deepest: np.ndarray, max_error: float) -> float:
-    """How far positions may be off that are given with Origin added; deepest: those of the deepest level, (V, 3)."""
+    """Return how far positions may be off that are given with Origin added; deepest: those of the deepest level, (V,
+    3)."""
     diagonal = float(np.linalg.norm(np.ptp(deepest.astype(float), axis=0)))
     return max(max_error / 16, diagonal * 2.0**-18, float(np.abs(deepest).max()) * 2.0**-22)
 
 
 @contextmanager
 def profile(name: str) -> Iterator[None]:
-    """The code of FORMAT.md with the limits of a profile."""
+    """Return the code of FORMAT.md with the limits of a profile."""
     kept, rules.limit = rules.limit, limits_of(name).__getitem__
     try:
         yield
@@ -244,7 +245,7 @@ def profile(name: str) -> Iterator[None]:
 
 
 def of_profile(vector: Vector, name: str) -> Vector:
-    """The vector with the results that a decoder of a profile gives."""
+    """Return the vector with the results that a decoder of a profile gives."""
     jobs = [(vector, item) for item in ("open", "static") if item in vector.results]
     answers = one_by_one({"full": document, "small": small_document}[name])(jobs)
     beyond = {item for (_, item), answer in zip(jobs, answers) if str(answer) == "LIMIT_EXCEEDED"}
@@ -257,7 +258,7 @@ def result_of(data: bytes, item: str, answer: bytes | Exception) -> str:
 
 
 def items(data: bytes) -> list[str]:
-    """The items of a file; if it cannot be opened, only those without an answer."""
+    """Return the items of a file; if it cannot be opened, only those without an answer."""
     try:
         file = File(data)
     except rules.Invalid:
@@ -266,7 +267,7 @@ def items(data: bytes) -> list[str]:
 
 
 def result(ask: Callable[..., bytes], data: bytes, item: str, mesh: bytes | None = None) -> str:
-    """RESULT of one item, by a function that raises Refused."""
+    """Return RESULT of one item, by a function that raises Refused."""
     try:
         return checksum_of(data, item, ask(data, item, mesh))
     except Refused as error:
@@ -277,7 +278,7 @@ def result(ask: Callable[..., bytes], data: bytes, item: str, mesh: bytes | None
 
 
 def command(words: list[str]) -> Decoder:
-    """A program, called by the protocol above."""
+    """Yield a program, called by the protocol above."""
 
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
@@ -300,7 +301,7 @@ def ask_command(words: list[str | Path]) -> bytes | Exception:
 
 
 def one_by_one(ask: Callable[[bytes, str, bytes | None], bytes]) -> Decoder:
-    """A function that takes a file's bytes, an item and the host's mesh, and may raise Refused."""
+    """Yield a function that takes a file's bytes, an item and the host's mesh, and may raise Refused."""
 
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
@@ -322,7 +323,7 @@ def opened(data: bytes, strict: bool, mesh: bytes | None) -> File:
 
 
 def document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
-    """The code of FORMAT.md."""
+    """Return the code of FORMAT.md."""
     try:
         return opened(data, item == "strict", mesh if needs_rest(item) else None).answer(item)
     except rules.Invalid as error:
@@ -330,7 +331,7 @@ def document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
 
 
 def small_document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
-    """The code of FORMAT.md with the limits of the small profile."""
+    """Return the code of FORMAT.md with the limits of the small profile."""
     with profile("small"):
         opened.cache_clear()
         try:
@@ -340,7 +341,7 @@ def small_document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
 
 
 def package(data: bytes, item: str, mesh: bytes | None = None, is_small: bool = False) -> bytes:
-    """The C core through Python, and the package's reader of static data."""
+    """Return the C core through Python, and the package's reader of static data."""
     import athcodec
     from athcodec.decoding.container import Limits
     from athcodec.errors import FormatError, LevelUnavailable
@@ -372,7 +373,7 @@ def ask_package(decoder, item: str) -> bytes:
 
 
 def by_document(clip) -> SimpleNamespace:
-    """A clip of the package as the document has it."""
+    """Return a clip of the package as the document has it."""
     seams = clip.seam_errors if clip.loop else None
     return SimpleNamespace(frames=clip.frame_count, segments=clip.segment_count, name=clip.name, seams=seams)
 
@@ -439,7 +440,7 @@ console.log(JSON.stringify(answers));
 
 
 def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[bytes | Exception]:
-    """The decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
+    """Return the decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
     node = shutil.which("node")
     if node is None:
         raise OSError("node: got none on PATH; expected Node.js 18 or newer")
@@ -462,7 +463,7 @@ def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[
 
 
 def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
-    """The answer for a complete file: bytes that are missing are errors."""
+    """Return the answer for a complete file: bytes that are missing are errors."""
     if "bytes" in answer:
         return base64.b64decode(answer["bytes"])
     if "fault" in answer:
@@ -473,7 +474,8 @@ def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
 
 
 def gpu_form(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
-    """The passes of docs/gpu.md in float32, whose positions Origin is added to; all else is the package's answer."""
+    """Return the passes of docs/gpu.md in float32, whose positions Origin is added to; all else is the package's
+    answer."""
     from athcodec.gpu import GpuFile
     from athcodec.gpu.evaluate import Passes, Source
 
@@ -515,7 +517,7 @@ def main(words: list[str] | None = None) -> int:
     )
     parser.add_argument("--own", choices=OWN | OWN_APPROXIMATE, help="a decoder of this repository")
     parser.add_argument("--approximate", action="store_true", help="a decoder of the approximate class")
-    parser.add_argument("--profile", choices=PROFILES, default="full", help="that of the decoder (default: full)")
+    parser.add_argument("--profile", choices=PROFILES, default="full", help="profile of the decoder (default: full)")
     parser.add_argument("--only", metavar="GLOB", default="*", help="vectors whose name matches")
     parser.add_argument(
         "--without",

@@ -169,7 +169,7 @@ def run(text: str = TEXT) -> types.ModuleType:
     exec(compile(tree, str(FORMAT), "exec"), names)
     for name, size in KEPT.items():
         kept = lru_cache(size)(names[name])
-        names[name] = lambda *given, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in given))
+        names[name] = lambda *arguments, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in arguments))
     return module
 
 

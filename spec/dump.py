@@ -21,7 +21,7 @@ Part = tuple[int, str]  # A number of bytes, and what they say.
 
 
 def lines(data: bytes) -> Iterator[str]:
-    """The dump of a file, line by line."""
+    """Yield the dump of a file, line by line."""
     at = 0
     for size, text in parts(data):
         words = textwrap.wrap(text, TEXT_WIDTH)
@@ -50,7 +50,7 @@ def parts(data: bytes) -> Iterator[Part]:
     at = rules.u32(data, 16)
     for chunk in table:
         content = data[at : at + chunk[3]]
-        yield from said(file, chunk, content) if content else []
+        yield from described(file, chunk, content) if content else []
         at += chunk[3]
 
 
@@ -70,7 +70,7 @@ def front(header, table: list) -> str:
     )
 
 
-def said(file, chunk: tuple, content: bytes) -> Iterator[Part]:
+def described(file, chunk: tuple, content: bytes) -> Iterator[Part]:
     kind, level, segment, length = chunk
     title = name(*chunk)
     if kind == rules.HIERARCHY:
@@ -95,7 +95,7 @@ def said(file, chunk: tuple, content: bytes) -> Iterator[Part]:
 
 
 def rows(file, level: int, segment: int) -> str:
-    """The rows that STEMS of a level adds for the first piece."""
+    """Return the rows that STEMS of a level adds for the first piece."""
     plan = rules.plans_of(file, level)[0]
     motion = rules.decode_motion(file, plan, segment, level)
     piece = plan.pieces[0]

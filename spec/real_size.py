@@ -63,7 +63,7 @@ class Growing:
         return self.add(parent, joint, points.reshape(-1, 3), around)
 
     def leaf(self, parent: int, joint: np.ndarray, size: float, mirrored: bool) -> int:
-        """Quads and triangles; all leaves are the same shape, turned, scaled and mirrored."""
+        """Return quads and triangles; all leaves are the same shape, turned, scaled and mirrored."""
         rows = np.array([[0.0, 0.0], [0.3, 0.25], [0.6, 0.35], [0.8, 0.2]])
         shape = np.array([[x, y * side, 0.2 * x * x + 0.1 * side * y] for x, y in rows for side in (-1, 0, 1)])
         turn = np.linalg.qr(self.random.normal(size=(3, 3)))[0]
@@ -73,7 +73,7 @@ class Growing:
 
 
 def tree(seed: int = 3) -> Growing:
-    """A trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
+    """Return a trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
     plant = Growing(seed)
     random = plant.random
     trunk = plant.tube(-1, np.zeros(3), np.array([0.1, 0.0, 3.0]), 14, 0.08)
@@ -81,11 +81,11 @@ def tree(seed: int = 3) -> Growing:
         heading = 2.4 * limb
         joint = np.array([0.1 * (0.4 + 0.12 * limb), 0.0, 3.0 * (0.4 + 0.12 * limb)])
         end = joint + np.array([np.cos(heading), np.sin(heading), 0.5]) * (1.4 - 0.15 * limb)
-        own = plant.tube(trunk, joint, end, 9, 0.03)
+        twig_base = plant.tube(trunk, joint, end, 9, 0.03)
         for k in range(1):
             start = joint + (end - joint) * (0.5 + 0.5 * k)
             steps = 0.08 * (np.array([np.cos(heading), np.sin(heading), 0.2]) + random.normal(size=(8, 3)) * 0.3)
-            twig = plant.add(own, start, start + steps.cumsum(axis=0))
+            twig = plant.add(twig_base, start, start + steps.cumsum(axis=0))
             for i in range(5):
                 at = plant.points[twig][1 + i]
                 plant.leaf(twig, at, 0.12 + 0.03 * random.random(), bool(i % 2))
@@ -100,28 +100,28 @@ def tree(seed: int = 3) -> Growing:
 
 
 def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float, gust: float) -> np.ndarray:
-    """(frames, vertices, 3): branches turn about where they hang, and carry others along."""
+    """Return (frames, vertices, 3): branches turn about where they hang, and carry others along."""
     time = np.linspace(0.0, 1.0, frames, endpoint=False)
     gusts = plant.random.normal(size=frames) * gust
     turned: list[tuple[np.ndarray, np.ndarray]] = []  # For each branch: matrix and shift of each frame.
     positions = []
     for b, (points, parent, joint) in enumerate(zip(plant.points, plant.parents, plant.joints)):
         matrix, shift = (np.eye(3)[None], np.zeros((1, 3))) if parent < 0 else turned[parent]
-        own = matrix @ rotations(b, time, wind * (0.3 if parent < 0 else 1.0), turns, len(points) == LEAF)
-        shift = shift + (matrix @ joint) - (own @ joint)
-        turned.append((own, shift))
+        turn = matrix @ rotations(b, time, wind * (0.3 if parent < 0 else 1.0), turns, len(points) == LEAF)
+        shift = shift + (matrix @ joint) - (turn @ joint)
+        turned.append((turn, shift))
         x = points - joint
         if len(points) > LEAF:
             x = x + 0.1 * plant.random.normal(size=3)
         bend = (wind * 0.1 * np.sin(2 * np.pi * (turns * time + 0.1 * b)) + gusts + 0.2)[:, None] * (x**2).sum(axis=1)
         x = x + bend[:, :, None] * np.array([1.0, 0.4, -0.1])
-        positions.append((own @ joint + shift)[:, None, :] + x @ own.transpose(0, 2, 1))
-    found = np.concatenate(positions, axis=1)
-    return found + noise * plant.random.normal(size=found.shape)
+        positions.append((turn @ joint + shift)[:, None, :] + x @ turn.transpose(0, 2, 1))
+    noiseless = np.concatenate(positions, axis=1)
+    return noiseless + noise * plant.random.normal(size=noiseless.shape)
 
 
 def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: bool) -> np.ndarray:
-    """(frames, 3, 3) about two axes."""
+    """Return (frames, 3, 3) about two axes."""
     a, c = (
         wind * size * np.sin(2 * np.pi * (turns * k * time) + phase * b)
         for size, k, phase in ((0.08, 1, 0.7), (0.3 if flutters else 0.04, 3, 1.9))
@@ -133,7 +133,7 @@ def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: boo
 
 
 def clip(name: str) -> Any:
-    """A wind in which poses are held, at times of their own, and a loop."""
+    """Return a wind in which poses are held, at times of their own, and a loop."""
     import athcodec
     from athcodec.motion.clip import MotionClip
 
@@ -179,8 +179,8 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """As athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest pose,
-    and one moves about its exact rest pose."""
+    """Return as athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest
+    pose, and one moves about its exact rest pose."""
     import athcodec
     from athcodec.encoding.search import start
     from athcodec.encoding.search.search import Search
@@ -202,7 +202,7 @@ def encoded(name: str) -> bytes:
 
 
 def features(data: bytes) -> set[str]:
-    """What a file uses of the format."""
+    """Return what a file uses of the format."""
     opened = File(data, strict=True)
     file, header = opened.file, opened.header
     of_refinements = file.parts.height + 1  # above it STEMS begin with Ratio
@@ -237,4 +237,4 @@ def features(data: bytes) -> set[str]:
         "places": header.place_count < header.vertex_count,
     }
     kinds = {KIND_NAMES[kind] for kind, _, _ in file.chunks} | ({"ATTRIBUTE"} if file.attributes else set())
-    return {what for what, there in shown.items() if there} | kinds
+    return {feature for feature, there in shown.items() if there} | kinds

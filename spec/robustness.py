@@ -30,7 +30,7 @@ COUNTS = ("tried", "crashes", "hangs", "over_limit", "wrong")
 
 
 def classes() -> list[str]:
-    """Names of the modules of spec/robust that can be run."""
+    """Return names of the modules of spec/robust that can be run."""
     return sorted(module.name for module in pkgutil.iter_modules(robust.__path__) if not module.name.startswith("_"))
 
 

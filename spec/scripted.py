@@ -61,18 +61,19 @@ class Chance(Script):
 
 
 def row(*frequencies: tuple[int, int, int]) -> list[int]:
-    """Script of a row: the number of coded frequencies, then x, y, z of each."""
+    """Return script of a row: the number of coded frequencies, then x, y, z of each."""
     return [len(frequencies), *(n for xyz in frequencies for n in xyz)]
 
 
 def refined_row(*frequencies: tuple[int, int, int]) -> list[int]:
-    """Script of a refined row: differences from predictions that are 0; from others, a minus is against the sign."""
+    """Return script of a refined row: differences from predictions that are 0; from others, a minus is against the
+    sign."""
     numbers = [n for xyz in frequencies for n in xyz]
     return [len(frequencies), *(value for n in numbers for value in ((abs(n), int(n < 0)) if n else (0,)))]
 
 
 def magnitude_bits(magnitude: int, longest: int) -> list[int]:
-    """Decisions of a magnitude: its length in unary, and the bits after the leading one."""
+    """Return decisions of a magnitude: its length in unary, and the bits after the leading one."""
     length = magnitude.bit_length()
     assert length <= longest, "no stream can hold this number"
     return [1] * length + [0] * (length < longest) + [int(bit) for bit in f"{magnitude:b}"[1:]]
@@ -97,7 +98,7 @@ class ScriptedCoder(rules.RangeDecoder):
         return True
 
     def stream(self) -> bytes:
-        """A number of the interval with as many trailing zeros as possible; these are left out."""
+        """Return a number of the interval with as many trailing zeros as possible; these are left out."""
         last, zeros = self.low + self.range - 1, 0
         while zeros < 8 * self.length and last >> zeros + 1 << zeros + 1 >= self.low:
             zeros += 1
@@ -125,7 +126,7 @@ def scripted_count(original: Callable, coder, model, history, above, rank):
 
 
 def scripted_exact(original: Callable, coder, model, n, expected, before):
-    """The script has the number, or (magnitude, negative) of its difference from the predicted one."""
+    """Return the script has the number, or (magnitude, negative) of its difference from the predicted one."""
     value = coder.script.answer("exact", 0)
     if not isinstance(value, tuple):
         likely = rules.single(expected) if n == 32 else expected
@@ -149,7 +150,7 @@ def scripted_corner(original: Callable, coder, model, bound, corners, first, j, 
 
 
 def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[int]:
-    """Up to the number of a vertex that is said by its distance."""
+    """Return up to the number of a vertex that is said by its distance."""
     followed = [rules.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
     expected, bits = rules.repeated(corners, model.followed or followed[0], bound), []
     guesses = [rules.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
@@ -173,7 +174,7 @@ def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[
 
 
 def scripted_face_count(original: Callable, coder, model, before):
-    """The script has the number of corners."""
+    """Return the script has the number of corners."""
     count, script = coder.script.answer("unsigned", 8), coder.script
     coder.decisions.append(int(count == before))
     coder.script = Script(count)
@@ -215,7 +216,7 @@ def scripted(script: Script, decisions: bool = False) -> Iterator[list[ScriptedC
 def write(
     function: Callable, script: Script | list, *arguments, lowest: bool = False, decisions: bool = False
 ) -> bytes:
-    """The stream that `function` of FORMAT.md's code reads as the script.
+    """Return the stream that `function` of FORMAT.md's code reads as the script.
 
     It ends at a value that the function refuses; `lowest`: who goes on behind that reads ones. `decisions`: the script
     has bits alone, and no numbers."""
@@ -241,7 +242,7 @@ class Clip:
     periodic: bool = False  # a loop of one segment, in periodic waves
 
     def entry(self) -> bytes:
-        """What CLIPS says of it."""
+        """Return what CLIPS says of it."""
         flags = (self.seams is not None) | (self.periodic << 1)
         return clip_entry(self.frames, self.segments, self.name, self.seams, flags=flags)
 
@@ -281,7 +282,7 @@ class Entry:
 
 
 def _more_vertices(count: int) -> list[int]:
-    """Values of how many vertices there are beside one for each place."""
+    """Return values of how many vertices there are beside one for each place."""
     return [1, count - 1] if count else [0]
 
 
@@ -426,7 +427,7 @@ class Draft:
         return self.entries[self.index(kind, level, segment)].content
 
     def change(self, kind: int, level: int = NO_LEVEL, segment: int = 0, **fields) -> Draft:
-        """The file with another content, or another entry in the table, for one chunk."""
+        """Return the file with another content, or another entry in the table, for one chunk."""
         i = self.index(kind, level, segment)
         return replace(self, entries=(*self.entries[:i], replace(self.entries[i], **fields), *self.entries[i + 1 :]))
 
@@ -439,7 +440,7 @@ class Draft:
         return replace(self, entries=tuple(sorted(together, key=lambda e: e.key) if sort else together))
 
     def upto(self, level: int) -> Draft:
-        """The file without the levels after one."""
+        """Return the file without the levels after one."""
         header = self.header | {"level_count": level + 1}
         joins = self.joins and self.joins[: (level + 1) * header["segment_count"]]
         entries = tuple(e for e in self.entries if e.key[0] != 1 or e.level <= level)
@@ -490,7 +491,7 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
 
 
 def numbers_script(lags_and_numbers: list[tuple[int, int]]) -> list:
-    """Script of a number of each branch."""
+    """Return script of a number of each branch."""
     if not any(number for _, number in lags_and_numbers):
         return [0]
     script, last = [1], [0] * 16
@@ -502,7 +503,7 @@ def numbers_script(lags_and_numbers: list[tuple[int, int]]) -> list:
 
 
 def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
-    """Script of a permutation; None: the predicted one."""
+    """Return script of a permutation; None: the predicted one."""
     if source is None:
         return [0]
     runs = [(0, len(stems))]
@@ -575,7 +576,7 @@ def clip_entry(
     flags: int | None = None,
     length: int | None = None,
 ) -> bytes:
-    """A clip in CLIPS, a loop where it has seams."""
+    """Return a clip in CLIPS, a loop where it has seams."""
     name = name.encode() if isinstance(name, str) else name
     flags = int(seams is not None) if flags is None else flags
     head = struct.pack("<IIBB", frames, segments, flags, len(name) if length is None else length)
@@ -587,12 +588,12 @@ def steady_time(first: float = 0.0, step: float = 0.25) -> bytes:
 
 
 def steady_times(*clips: tuple[float, float]) -> bytes:
-    """First and Step of each clip."""
+    """Return first and Step of each clip."""
     return bytes(1) + b"".join(struct.pack("<dd", first, step) for first, step in clips)
 
 
 def whole_rates(*rates: int, method: int = 1) -> bytes:
-    """Rate of each clip."""
+    """Return the rate of each clip."""
     return bytes([method]) + b"".join(struct.pack("<H", rate) for rate in rates)
 
 
@@ -612,7 +613,7 @@ def predicted_head(step: float = 0.0625) -> bytes:
 
 
 def basis_stream(rows: list[list[int]]) -> bytes:
-    """A learned basis over time of these integers."""
+    """Return a learned basis over time of these integers."""
     script = []
     for integers in rows:
         before = slope = 0
@@ -623,7 +624,8 @@ def basis_stream(rows: list[list[int]]) -> bytes:
 
 
 def basis_in_waves(frames: int, *script: int, rank: int, known: list[list[float]] | None = None) -> bytes:
-    """A learned basis in waves: of three rows at a time the changes of their exponents, then the script of a row."""
+    """Return a learned basis in waves: of three rows at a time the changes of their exponents, then the script of a
+    row."""
     return write(rules.decode_basis, list(script), known or [], rank, frames, rules.waves_over_time(frames, False))
 
 
@@ -638,7 +640,7 @@ def _of_draft(name: str) -> Callable:
 
 
 def mesh_of(faces: bytes, place_of: list, places: list | None = None):
-    """The mesh of FACES as a connected rest pose takes it."""
+    """Return the mesh of FACES as a connected rest pose takes it."""
     places = list(range(len(place_of))) if places is None else places
     return rules.mesh_of_faces(faces, places, [place_of.index(place) for place in places])
 
@@ -761,7 +763,7 @@ class Plant:
         return rest_chunk(write(rules.decode_exact_rest, numbers, branches, self.is_float64), exact=1, **fields)
 
     def _decoded_rest(self, branches: list, chunk: bytes, place_of: list):
-        """The rest pose of REST; `rows` is None where it is exact or the host's."""
+        """Return the rest pose of REST; `rows` is None where it is exact or the host's."""
         origin, body, self.connectivity = struct.unpack_from("<3f", chunk, 1), chunk[17:], None
         if self.faces is not None and chunk[0] & REST_CONNECTED:
             self.connectivity = mesh_of(self.faces, place_of, self.places)
@@ -779,7 +781,7 @@ class Plant:
         return self._write(rules.decode_shapes, (rules.SHAPES, level, 0), self.plan, self.shapes[0], level)
 
     def _layer(self, branches: list, q: int, rests: list) -> list[Entry]:
-        """What all segments share of a refinement."""
+        """Return what all segments share of a refinement."""
         level, entries = self.plan.height + 1 + q, []
         if (rules.REFINED_REST, level, 0) in self.scripts:
             entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
@@ -795,7 +797,7 @@ class Plant:
         return entries
 
     def _refined_rest(self, branches: list, level: int, step: float, rests: list) -> Entry:
-        """The rest pose of a level, which is added to those before."""
+        """Return the rest pose of a level, which is added to those before."""
         arguments = branches, step, rests[-1], self.connectivity
         stream = self._write(rules.decode_rest, (rules.REFINED_REST, level, 0), *arguments)
         rests.append(rules.decode_rest(stream, *arguments))

@@ -84,7 +84,7 @@ def test_a_split_cube_has_the_places_of_its_corners():
     first, place = split.places_of(mesh)
     assert (mesh.positions.shape[1], len(first)) == (24, 8)
     assert np.array_equal(np.bincount(place), np.full(8, 3))
-    welded = mesh.taken(first, place)
+    welded = mesh.with_vertices(first, place)
     assert np.array_equal(welded.positions[:, place], mesh.positions)
     assert np.array_equal(welded.positions[:, welded.faces], mesh.positions[:, mesh.faces])
 

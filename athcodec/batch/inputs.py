@@ -104,7 +104,7 @@ def find(
         Where an input does not exist.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(given, f'["{pattern}"]') for pattern, given in (patterns or {}).items()}
+    patterns = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
@@ -129,7 +129,7 @@ def _target(output: str, name: str) -> str:
 
 
 def _stem(name: str, path: str) -> str:
-    """A name without its suffix, and without the place of the numbers of a series: walk_####.obj is walk."""
+    """Return a name without its suffix, and without the place of the numbers of a series: walk_####.obj is walk."""
     head, tail = posixpath.split(name)
     series = NUMBER_PATTERN.fullmatch(tail) if not is_url(path) and is_pattern(path) else None
     if series:  # prefix, place, width, and what is behind it with the suffix
@@ -138,37 +138,38 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
-    for given, called in each_once(map(os.fspath, inputs)):
-        pairs = list(_remote(given) if is_url(given) else _local(given, called))
+    for text, called in each_once(map(os.fspath, inputs)):
+        pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
         if not pairs:
             raise ClipError(
-                f"{given}: got no clips, expected a file, a directory with clips or a pattern that fits some"
+                f"{text}: got no clips, expected a file, a directory with clips or a pattern that fits some"
             )
 
 
-def _local(given: str, called: str) -> Iterator[tuple[str, str]]:
-    """called: the name of a plain file without its suffix."""
-    if os.path.isdir(given):
+def _local(text: str, called: str) -> Iterator[tuple[str, str]]:
+    """Yield the files of a path, each with what it is called. `called` is the name of a plain file without its
+    suffix."""
+    if os.path.isdir(text):
         yield from _below(
-            given,
+            text,
             (
                 os.path.join(folder, name)
-                for folder, folders, names in os.walk(given)
+                for folder, folders, names in os.walk(text)
                 for _ in [folders.sort()]
                 for name in sorted(names)
                 if _is_clip(name)
             ),
         )
-    elif os.path.exists(given) or is_pattern(given):
-        yield called + Path(given).suffix, os.path.abspath(given)
-    elif glob.has_magic(given):
+    elif os.path.exists(text) or is_pattern(text):
+        yield called + Path(text).suffix, os.path.abspath(text)
+    elif glob.has_magic(text):
         yield from _below(
-            _fixed_part(given, os.sep),
-            (path for path in sorted(glob.glob(given, recursive=True)) if os.path.isfile(path)),
+            _fixed_part(text, os.sep),
+            (path for path in sorted(glob.glob(text, recursive=True)) if os.path.isfile(path)),
         )
     else:
-        raise FileNotFoundError(f"{given}: No such file or directory")
+        raise FileNotFoundError(f"{text}: No such file or directory")
 
 
 def _below(folder: str, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
@@ -187,7 +188,7 @@ def _clip_suffixes() -> tuple[str, ...]:
 
 
 def _fixed_part(pattern: str, separator: str) -> str:
-    """The directory before the first wildcard."""
+    """Return the directory before the first wildcard."""
     parts = pattern.split(separator)
     first = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     return separator.join(parts[:first]) or (separator if pattern.startswith(separator) else "")
@@ -206,17 +207,17 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
         raise ClipError(f"{shown}: got a pattern in a chain of file systems, expected a single file")
     system, path = file_system(url)
     try:
-        found = system.find(path) if is_folder else system.glob(path)
+        paths = system.find(path) if is_folder else system.glob(path)
     except Exception as error:  # each file system has errors of its own
         raise RemoteError(f"{shown}: {type(error).__name__}: {_one_line(error)}") from None
     base = path.rstrip("/") if is_folder else _fixed_part(path, "/")
-    for found_path in sorted(found):
+    for found_path in sorted(paths):
         if not is_folder or _is_clip(posixpath.basename(found_path)):
             yield posixpath.relpath(found_path, base) if base else found_path, system.unstrip_protocol(found_path)
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
+    """Return fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
     try:
         import fsspec
 
@@ -229,7 +230,7 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def download(url: str, path: str) -> str:
-    """Fetches a file, whole; its SHA-256. Raises RemoteError, OSError."""
+    """Fetch a file, whole; its SHA-256. Raises RemoteError, OSError."""
     system, source = file_system(url)
     try:
         system.get_file(source, path)
@@ -241,7 +242,7 @@ def download(url: str, path: str) -> str:
 
 
 def upload(path: str, url: str) -> dict[str, Any]:
-    """Stores an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
+    """Store an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
     try:
         others = system.exists(target) and system.cat_file(target, start=0, end=len(MAGIC)) not in (b"", MAGIC)
@@ -261,8 +262,8 @@ def upload(path: str, url: str) -> dict[str, Any]:
 
 
 def identity(item: Item) -> dict[str, Any]:
-    """Size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats that
-    spread over several files, others than numbered series, only the named file counts. Raises OSError."""
+    """Return size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats
+    that spread over several files, others than numbered series, only the named file counts. Raises OSError."""
     if is_url(item.input):
         known = remote_identity(item.input)
     else:
@@ -272,7 +273,7 @@ def identity(item: Item) -> dict[str, Any]:
 
 
 def is_telling(known: dict[str, Any]) -> bool:
-    """Whether an identity would show that a file has changed, though not its size."""
+    """Return whether an identity would show that a file has changed, though not its size."""
     return any(name in known for name in ("mtime_ns", *TAGS))
 
 

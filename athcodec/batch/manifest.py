@@ -49,7 +49,7 @@ class Manifest:
             raise
 
     def add(self, record: Record) -> None:
-        """Appends a line, and waits until it is on the disk. Raises OSError, and the manifest is as before."""
+        """Append a line, and waits until it is on the disk. Raises OSError, and the manifest is as before."""
         line = json.dumps({"output": record["output"]} | record).encode() + b"\n"
         try:
             os.lseek(self._file, self._length, os.SEEK_SET)
@@ -98,7 +98,7 @@ class Manifest:
 
 
 def read_records(path: FilePath) -> dict[str, Record]:
-    """The last records by output, without a lock and without repair; none where there is no manifest."""
+    """Return the last records by output, without a lock and without repair; none where there is no manifest."""
     try:
         with open(path, "rb") as file:
             return _parse(os.fspath(path), file.read())[0]
@@ -107,7 +107,8 @@ def read_records(path: FilePath) -> dict[str, Record]:
 
 
 def _parse(path: str, content: bytes) -> tuple[dict[str, Record], int]:
-    """Records, and the length of the lines that are whole. Raises ManifestError for what no run can have left."""
+    """Return records, and the length of the lines that are whole. Raises ManifestError for what no run can have
+    left."""
     *lines, rest = content.split(b"\n")
     records, length = {}, 0
     for number, line in enumerate([*lines, rest] if rest else lines, 1):
@@ -129,7 +130,7 @@ def _record(line: bytes) -> Record | None:
 
 
 def _may_be_torn(line: bytes) -> bool:
-    """Whether it is the beginning of a line of `add`, or the zeros that some file systems leave in its place."""
+    """Return whether it is the beginning of a line of `add`, or the zeros that some file systems leave in its place."""
     return line.startswith(LINE_START) or LINE_START.startswith(line) or not line.strip(b"\0")
 
 

@@ -209,7 +209,7 @@ def _manifest_path(output: FilePath, manifest: FilePath | None) -> str:
 
 
 def _tidy(outputs: Iterable[str]) -> None:
-    """Removes the unfinished files of workers that were stopped."""
+    """Remove the unfinished files of workers that were stopped."""
     folders: dict[str, list[str]] = {}
     for output in outputs:
         folder, name = os.path.split(output)
@@ -265,7 +265,7 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 
 
 def _cluster(workers: int) -> Any:
-    """Processes on this machine, with one thread each. Raises SchedulerError."""
+    """Start processes on this machine, with one thread each. Raises SchedulerError."""
     import dask
     import distributed
 
@@ -311,8 +311,11 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Threads that begin in the block, and processes that they start at any time, never see Ctrl-C, which a terminal
-    sends to all: this thread ends them. It sees one that came meanwhile at the end."""
+    """Keep Ctrl-C from threads that begin in the block, and from processes that they start at any time.
+
+    A terminal sends Ctrl-C to all processes, but this thread ends them. It sees a Ctrl-C that came meanwhile when the
+    block ends.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -121,9 +121,9 @@ def check_settings(settings: Mapping[str, Any], where: str = "settings", folder:
             raise ClipError(f"{where}: {name}: got {value!r}: {error}") from None
         if name == "mesh" or name == "hierarchy" and value not in ("auto", *METHODS):
             checked[name] = os.path.abspath(os.path.join(folder, checked[name]))
-    given = [name for name in BOUNDS if name in checked]
-    if len(given) > 1:
-        raise ClipError(f"{where}: got {' and '.join(given)}, expected one of them")
+    bounds = [name for name in BOUNDS if name in checked]
+    if len(bounds) > 1:
+        raise ClipError(f"{where}: got {' and '.join(bounds)}, expected one of them")
     return checked
 
 
@@ -139,13 +139,13 @@ def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str
 
 
 def loop_frames(settings: Settings) -> int | None:
-    """How many frames of a clip are blended to make a loop of it; None where it is to be none."""
+    """Return how many frames of a clip are blended to make a loop of it; None where it is to be none."""
     blend = settings.get("loop_blend", 0)
     return blend if settings.get("loop", blend > 0) else None
 
 
 def reading_options(settings: Settings) -> dict[str, Any]:
-    """Keywords of athcodec.read."""
+    """Return keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
     if options.get("rest") == HOST:  # how it is stored
         del options["rest"]
@@ -155,7 +155,7 @@ def reading_options(settings: Settings) -> dict[str, Any]:
 
 
 def coding_options(settings: Settings) -> dict[str, Any]:
-    """Keywords of athcodec.encode."""
+    """Return keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:
         options["host_rest"] = True

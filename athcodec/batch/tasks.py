@@ -58,8 +58,8 @@ def _task(work: Callable[..., Result]) -> Callable[..., Result]:
 def begin(
     item: Item, folder: str, *, split: int, verify: bool, version: str, known: dict[str, Any] | None = None
 ) -> Result:
-    """A clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the scratch
-    folder. known: the record of an output that is up to date unless the content of its input has changed."""
+    """Return a clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the
+    scratch folder. known: the record of an output that is up to date unless the content of its input has changed."""
     if version != athcodec.__version__:
         raise AthError(f"worker: has athcodec {athcodec.__version__}, expected {version} as where the run was started")
     start = time.perf_counter()
@@ -82,7 +82,7 @@ def begin(
 
 @_task
 def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
-    """Some segments of a long clip."""
+    """Return some segments of a long clip."""
     start = time.perf_counter()
     path = os.path.join(folder, f"segments_{segments[0]}")
     if os.path.exists(path):
@@ -95,7 +95,7 @@ def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
 
 @_task
 def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) -> Result:
-    """The file of a long clip, from the results of `code`."""
+    """Return the file of a long clip, from the results of `code`."""
     if failed := [part for part in parts if "failed" in part]:
         return failed[0]
     start = time.perf_counter()
@@ -162,7 +162,7 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
 
 
 def _source(item: Item, folder: str) -> dict[str, Any]:
-    """The input's identity; of a URL, which is fetched, with its SHA-256."""
+    """Return the input's identity; of a URL, which is fetched, with its SHA-256."""
     source = identity(item)
     if is_url(item.input):
         source["sha256"] = download(item.input, _local_path(item, folder))
@@ -181,7 +181,7 @@ def _local_path(item: Item, folder: str) -> str:
 
 
 def _target(item: Item, folder: str) -> str:
-    """Where the file is made."""
+    """Return where the file is made."""
     return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
 
 
@@ -194,7 +194,7 @@ def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:
 
 
 def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
-    """One after the other into a file that is there whole or not at all, also where two workers write it."""
+    """Write one object after the other into a file that appears whole or not at all, even if two workers write it."""
     temporary = f"{path}.{os.getpid()}.{time.monotonic_ns()}"
     with open(temporary, "wb") as file:
         for item in objects:
@@ -218,7 +218,7 @@ def _coded(parts: Sequence[Result]) -> Iterator[CodedSegment]:
 
 
 def one_line(error: BaseException) -> str:
-    """The message of an error; one that is neither athcodec's nor the system's is named by its class too."""
+    """Return the message of an error; one that is neither athcodec's nor the system's is named by its class too."""
     if isinstance(error, OSError) and error.filename is not None:
         return redacted(f"{error.filename}: {error.strerror}")
     text = " ".join(redacted(error.for_shell if isinstance(error, AthError) else str(error)).split())

@@ -138,7 +138,7 @@ class OntoMesh(ArrayLike):
         pose: np.ndarray,
         mesh: MotionClip,
         plant: dict[str, str],
-        taken: dict[str, str],
+        assumed: dict[str, str],
         opened: ExitStack,
     ):
         self._view, self._mesh, self._opened = view, mesh, opened
@@ -151,7 +151,7 @@ class OntoMesh(ArrayLike):
             )
         marks, self._limit = Marks(chains), FAR * chains.diagonal
         rest = np.asarray(mesh.rest, np.float64)
-        _refuse_far_mesh(view, marks, rest, self._limit, plant, taken)
+        _refuse_far_mesh(view, marks, rest, self._limit, plant, assumed)
         points = MeshPoints(rest, mesh.polygons, mesh.edges)
         self._points, self._binding = points, bind(chains, points, marks)
         offset = rest - points.place[points.of_vertex]
@@ -307,7 +307,7 @@ class OntoMesh(ArrayLike):
 
 
 def _same_times(times: np.ndarray, others: np.ndarray) -> bool:
-    """Whether frames are at the same times, within half a frame."""
+    """Return whether frames are at the same times, within half a frame."""
     return len(times) == 1 or bool((np.abs(times - others) < 0.5 * np.abs(np.diff(others)).min()).all())
 
 
@@ -436,33 +436,33 @@ def _in_scene_of(
     What the caller states goes before what the mesh states. A plant that states none is in metres and y up, where the
     caller states those of the mesh; else the mesh is taken to be as the plant is.
     """
-    plant, taken = dict(DEFAULT_SCENE), dict(DEFAULT_SCENE)
+    plant, assumed = dict(DEFAULT_SCENE), dict(DEFAULT_SCENE)
     metadata = dict(mesh.metadata)
     for name, option in stated.items():
         known: dict[str, str] = {}
         with suppress(ClipError):  # A plant may have a unit that nothing can be brought to.
             known = stated_scene({name: view.metadata.get(name)})
         plant |= known
-        taken[name] = plant[name]
+        assumed[name] = plant[name]
         if option:
             metadata = {key: value for key, value in metadata.items() if key != METRES_PER_UNIT or name != "unit"}
             metadata[name] = option
         if known or option:
             mesh = mesh.replace(metadata=metadata)
-            taken |= stated_scene({name: metadata.get(name)})
+            assumed |= stated_scene({name: metadata.get(name)})
             mesh = in_scene(mesh, **{"unit": None, "up_axis": None} | {name: plant[name]})
             metadata = dict(mesh.metadata)
-    return mesh, plant, taken
+    return mesh, plant, assumed
 
 
 def _refuse_far_mesh(
-    view: ClipView, marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], taken: dict[str, str]
+    view: ClipView, marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], assumed: dict[str, str]
 ) -> None:
     """Raise ClipError if most vertices are far from the plant; the message names the pose, unit or axis that fits."""
     fit = Fit(marks, rest, limit)
     if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
         return
-    fitting: dict[str, Any] = fit.better_scene(plant, taken)
+    fitting: dict[str, Any] = fit.better_scene(plant, assumed)
     text = f"onto: {fit.mesh_far:.0%} of the mesh is further from the plant than {limit:.3g}, a tenth of its diagonal"
     if fit.mesh_far > MOST_FAR and _is_in_last_frame(view, rest):
         fitting = {"frame": -1}
@@ -484,7 +484,7 @@ def _refuse_far_mesh(
 
 
 def _is_in_last_frame(view: ClipView, rest: np.ndarray) -> bool:
-    """Whether a mesh lies on the plant as it is in the clip's last frame."""
+    """Return whether a mesh lies on the plant as it is in the clip's last frame."""
     last = view.decoder.at_level(None).positions(-1, dtype=np.float64)
     distance = scipy_module("spatial").cKDTree(last).query(rest)[0]
     return bool((distance > FAR * np.linalg.norm(np.ptp(last, axis=0))).mean() < FITS)

@@ -41,28 +41,28 @@ class Fit:
         there = self._marks.distance(points)
         return float((there > self._limit).mean()), float((back > self._limit).mean())
 
-    def better_scene(self, plant: dict[str, str], taken: dict[str, str]) -> dict[str, str]:
+    def better_scene(self, plant: dict[str, str], assumed: dict[str, str]) -> dict[str, str]:
         """Return the "unit" and the "up_axis" of the mesh with which it would lie on the plant, as far as they are not
         those that it was taken to have; empty for none. `plant` has those of the plant."""
         best, scene = np.inf, {}
-        for unit, factor in _factors(taken["unit"]):
-            for axis, turn in _turns(plant["up_axis"], taken["up_axis"]):
+        for unit, factor in _factors(assumed["unit"]):
+            for axis, turn in _turns(plant["up_axis"], assumed["up_axis"]):
                 mesh_far, plant_far = self._far_shares(factor * self._points @ turn.T)
                 if mesh_far < FITS and plant_far < COVERS and mesh_far + plant_far < best:
                     best, scene = mesh_far + plant_far, {"unit": unit, "up_axis": axis}
-        return {name: value for name, value in scene.items() if value != taken[name]}
+        return {name: value for name, value in scene.items() if value != assumed[name]}
 
 
-def _factors(taken: str) -> Iterator[tuple[str, float]]:
+def _factors(assumed: str) -> Iterator[tuple[str, float]]:
     """Yield units, and the factor on a mesh that was taken to be in another one."""
     for unit, length in METRES.items():
-        yield unit, length / METRES[taken]
+        yield unit, length / METRES[assumed]
 
 
-def _turns(up: str, taken: str) -> Iterator[tuple[str, np.ndarray]]:
+def _turns(up: str, assumed: str) -> Iterator[tuple[str, np.ndarray]]:
     """Yield up axes, and the turn of a mesh that was taken to have another one and turned from there to `up`."""
     if up not in AXES:  # An axis that points down is not converted.
-        yield taken, np.eye(3)
+        yield assumed, np.eye(3)
         return
     for axis in AXES:
-        yield axis, axis_turn(axis, up) @ axis_turn(taken, up).T
+        yield axis, axis_turn(axis, up) @ axis_turn(assumed, up).T

@@ -314,8 +314,8 @@ def _membrane(near: Any, weights: Any, free: np.ndarray, reach: float) -> Any:
     used = np.flatnonzero(np.diff(right.indptr))
     solved, columns = linalg.splu(matrix.tocsc()), []
     for some in np.split(used, np.arange(COLUMNS, len(used), COLUMNS)):
-        found = solved.solve(right[:, some].toarray())
-        columns.append(sparse.csc_matrix(np.where(found >= LEAST_WEIGHT / 2, found, 0.0)))
+        spread = solved.solve(right[:, some].toarray())
+        columns.append(sparse.csc_matrix(np.where(spread >= LEAST_WEIGHT / 2, spread, 0.0)))
     of_free = sparse.hstack(columns, format="coo")
     kept = weights.tocoo()
     rest = held[kept.row]

@@ -60,12 +60,12 @@ def _of_athcodec(wheels: Sequence[Path]) -> list[Path]:
 def pack(output: Path, wheels: Sequence[Path]) -> None:
     """Write the extension with these wheels. Raises ValueError as `check` does, OSError."""
     check(wheels)
-    own = _of_athcodec(wheels)
-    platforms = sorted({platform(wheel) for wheel in own})
+    built = _of_athcodec(wheels)
+    platforms = sorted({platform(wheel) for wheel in built})
     names = sorted({wheel.name: wheel for wheel in wheels})
     manifest = (EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8")
     for before, after in (
-        ('version = "0.0.0"', f'version = "{own[0].name.split("-")[1]}"'),
+        ('version = "0.0.0"', f'version = "{built[0].name.split("-")[1]}"'),
         ("platforms = []", f"platforms = {_toml(platforms)}"),
         ("wheels = []", f"wheels = {_toml([f'./wheels/{name}' for name in names])}"),
     ):
@@ -83,7 +83,7 @@ def _toml(texts: Sequence[str]) -> str:
 
 
 def platform(wheel: Path) -> str:
-    """Blender's name of the platform that a wheel is for. Raises ValueError."""
+    """Return Blender's name of the platform that a wheel is for. Raises ValueError."""
     tag = wheel.stem.split("-")[-1].split(".")[0]
     system = next((name for start, name in PLATFORMS.items() if tag.startswith(start)), None)
     machine = next((name for end, name in MACHINES.items() if tag.endswith(end)), None)
@@ -93,7 +93,7 @@ def platform(wheel: Path) -> str:
 
 
 def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
-    """Wheels of what is needed and not given, for each platform and Python, by pip."""
+    """Return wheels of what is needed and not given, for each platform and Python, by pip."""
     missing = [name for name in NEEDED if not any(wheel.name.startswith(f"{name}-") for wheel in wheels)]
     if not missing:
         return []

@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _messages_escaped() -> Iterator[None]:
-    """Warnings, and what libraries log, reach the terminal as all else does."""
+    """Let warnings, and what libraries log, reach the terminal as all else does."""
 
     def warned(message: Warning | str, *_: object) -> None:
         print(f"athcodec: warning: {shown(str(message))}".replace("\n", " "), file=sys.stderr)

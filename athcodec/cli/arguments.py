@@ -46,11 +46,11 @@ class _Parser(argparse.ArgumentParser):
     """Whose messages are shown as all others are: they quote arguments, such as names of files."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
-        """The arguments; of those that a verb does not know, it is the verb whose usage is shown."""
-        found, unknown = super().parse_known_args(args, namespace)
+        """Return the arguments; of those that a verb does not know, it is the verb whose usage is shown."""
+        known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
-        return found, unknown
+        return known, unknown
 
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(shown(message), file)
@@ -416,7 +416,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         "are sampled, or that of a source that does not say its own",
     )
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
-    source.add_argument("--field", metavar="NAME", help="the displacement of a finite-element result")
+    source.add_argument("--field", metavar="NAME", help="name of the displacement in a finite-element result")
     source.add_argument(
         "--dataset", metavar="/PATH", help="of HDF5, NumPy and MATLAB files, the array with the positions, or its group"
     )
@@ -468,7 +468,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="IN.ath", help=READ_OR_PIPED)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
-    verb.add_argument("--format", metavar="NAME", help="write this format whatever the suffix")
+    verb.add_argument("--format", metavar="NAME", help="name of the format to write, whatever the suffix")
     verb.add_argument(
         "--clip",
         metavar="NAME",
@@ -613,7 +613,7 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(_whole),
         help="a vertex of the trunk (default: of a large branch that moves least)",
     )
-    verb.add_argument("--save", metavar="FILE.json", help="write the branches there, for encode --hierarchy")
+    verb.add_argument("--save", metavar="FILE.json", help="file to write the branches to, for encode --hierarchy")
     _source_arguments(verb)
 
 
@@ -668,9 +668,9 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     verb.add_argument(
-        "--port", metavar="PORT", type=_argument(_whole), default=0, help="of the address (default: a free one)"
+        "--port", metavar="PORT", type=_argument(_whole), default=0, help="port of the address (default: a free one)"
     )
-    verb.add_argument("--clip", metavar="NAME", help="begin with it (default: the file's first)")
+    verb.add_argument("--clip", metavar="NAME", help="clip to begin with (default: the file's first)")
     _host_mesh_argument(verb)
     verb.add_argument(
         "--floor",
@@ -680,9 +680,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
         help="a plant for the forest's floor, so many around each tree (default: 4); may be given again",
     )
     verb.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
-    what = verb.add_mutually_exclusive_group()
-    what.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
-    what.add_argument(
+    subject = verb.add_mutually_exclusive_group()
+    subject.add_argument("--forest", action="store_true", help="show 10,000 plants in the wind, on WebGPU")
+    subject.add_argument(
         "--export",
         metavar="PAGE.html",
         help="write one page with the file and the viewer inside, in place of an older HTML page alone, and serve "
@@ -691,7 +691,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _counted(text: str) -> tuple[str, float]:
-    """A file and how many of it: FILE or FILE=COUNT."""
+    """Return a file and how many of it: FILE or FILE=COUNT."""
     file, equals, count = text.rpartition("=")
     return (file, _above_zero(count)) if equals else (text, 4.0)
 
@@ -743,7 +743,7 @@ def _demo_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--sample", choices=SAMPLES, default=SAMPLES[0], help="a tree in wind, or one that grows (default: %(default)s)"
     )
-    verb.add_argument("--keep", metavar="DIR", help="put the .ath file and every decoded level there")
+    verb.add_argument("--keep", metavar="DIR", help="folder to keep the .ath file and every decoded level in")
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
@@ -780,7 +780,7 @@ def _positive_length(text: str) -> Length:
 
 
 def _rest_error(text: str) -> float | str:
-    """A fraction, a length with its unit, or OF_BOUND."""
+    """Return a fraction, a length with its unit, or OF_BOUND."""
     from athcodec.encoding.options.shape import RestPrecision  # heavy, as all that encodes is
 
     option = float(text) if re.fullmatch(r"[\d.]+([eE][+-]?\d+)?", text) else text

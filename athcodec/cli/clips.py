@@ -41,7 +41,8 @@ ROUNDING = 1e-6
 def clip_to_encode(
     paths: Sequence[str], args: argparse.Namespace, read: Callable[[str], MotionClip] | None = None
 ) -> MotionClip:
-    """The clip in a file, or all of several files and of their takes, as one; `read` opens one (default read_clip)."""
+    """Return the clip in a file, or all of several files and of their takes, as one; `read` opens one (default
+    read_clip)."""
     with ExitStack() as opened:
         parts = []
         for path, called in each_once(paths):
@@ -62,7 +63,7 @@ def clip_to_encode(
 
 
 def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
-    """The GLB whose vertices --into gives a motion. ClipError for what says otherwise how to read it."""
+    """Return the GLB whose vertices --into gives a motion. ClipError for what says otherwise how to read it."""
     from athcodec.exporters.gltf_into import Into
 
     if len(paths) != 1 or args.output:
@@ -97,11 +98,12 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
 
 
 def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:
-    """Strength and heading of each clip; empty where none is given. ClipError where they do not fit the clips."""
-    given = {"--strength": args.strength, "--heading": args.heading}
+    """Return strength and heading of each clip; empty where none is given. ClipError where they do not fit the
+    clips."""
+    winds = {"--strength": args.strength, "--heading": args.heading}
     if args.strength is None and args.heading is not None:
         raise ClipError("--heading: got no strengths, expected some with --strength")
-    for option, numbers in given.items():
+    for option, numbers in winds.items():
         if numbers is not None and len(numbers) != clip_count:
             raise ClipError(f"{option}: got {len(numbers)}, expected {clip_count}, one for each clip")
     if args.strength is None:
@@ -136,7 +138,7 @@ def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
 def with_sources(
     decoder: Decoder, args: argparse.Namespace, opened: ExitStack
 ) -> list[tuple[Decoder, str, MotionClip]]:
-    """The clips to verify, and what to compare each with: a clip of a file."""
+    """Return the clips to verify, and what to compare each with: a clip of a file."""
     if not args.against:
         return []
     played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.file.clips]
@@ -151,7 +153,7 @@ def with_sources(
 
 
 def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionClip:
-    """The clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
+    """Return the clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
     from athcodec.files.gltf.motion import GltfMotion
 
     if not isinstance(decoder.file.source, GltfMotion) or find_format(path).name != "gltf":
@@ -168,7 +170,7 @@ def _gltf_options(args: argparse.Namespace) -> ReadOptions:
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
-    """The clip in `path`, read as the options of _source_arguments say."""
+    """Return the clip in `path`, read as the options of _source_arguments say."""
     rest = getattr(args, "rest", "auto")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below, with what is no shape
@@ -204,7 +206,7 @@ def _say_not_read(clip: MotionClip, path: str) -> None:
 
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:
-    """The names of the motions to open, one after the other; [None] where there is nothing to choose."""
+    """Return the names of the motions to open, one after the other; [None] where there is nothing to choose."""
     from athcodec.files.gltf.motion import motions_in
 
     if args.gltf_motion is not None or is_url(path):
@@ -237,16 +239,17 @@ def naming(path: str | Path) -> Iterator[None]:
 
 
 def with_branches(clip: MotionClip, hierarchy: str | None) -> MotionClip:
-    """The clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is missing."""
+    """Return the clip on the branches that --hierarchy asks for; as it is without it: encoding finds what is
+    missing."""
     if hierarchy is None:
         return clip
-    found = find_or_load(clip, hierarchy)
-    say("hierarchy", str(found))
-    return clip_with_branches(clip, found)
+    branches = find_or_load(clip, hierarchy)
+    say("hierarchy", str(branches))
+    return clip_with_branches(clip, branches)
 
 
 def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
-    """Frames A to B - 1 of A:B, where None is the clip's end; LevelUnavailable beyond it."""
+    """Return frames A to B - 1 of A:B, where None is the clip's end. Raises LevelUnavailable beyond it."""
     start = 0 if bounds[0] is None else bounds[0]
     stop = frame_count if bounds[1] is None else bounds[1]
     if not start < stop <= frame_count:
@@ -255,7 +258,7 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
 
 
 def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dict[str, Any]]:
-    """One entry per level: what it promises, and how far off the source it is."""
+    """Return one entry per level: what it promises, and how far off the source it is."""
     with naming(source), clip.watched(), progress() as report:
         if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
             clip = athcodec.looped(clip, blend)

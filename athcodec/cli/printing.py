@@ -98,7 +98,7 @@ def print_demo(facts: dict[str, Any], diagonal: float) -> None:
 
 
 def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> dict[str, Any]:
-    """The files that are there now, and what their format costs."""
+    """Return the files that are there now, and what their format costs."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
     facts = {
         name: written.facts[name]
@@ -145,7 +145,7 @@ def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
 
 
 def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
-    """Smoothness and shape, each with the columns that the clip has something for."""
+    """Print smoothness and shape, with the columns for which the clip has values."""
     shape = levels[0]["shape"]
     captions = {
         "smoothness": "second differences over frames, of the error in bounds; tick ratio: those of the motion near "

@@ -32,11 +32,11 @@ class Streams:
         return bool(self._output)
 
     def ath(self, path: str) -> str:
-        """The .ath file, or GLB, to read in place of `path`. Raises ClipError, OSError."""
+        """Return the .ath file, or GLB, to read in place of `path`. Raises ClipError, OSError."""
         return self._read(ATH) if path == STREAM else path
 
     def source(self, path: str, format: str | None) -> str:
-        """The source to read in place of `path`. Raises ClipError where nothing says its format, OSError."""
+        """Return the source to read in place of `path`. Raises ClipError where nothing says its format, OSError."""
         if path != STREAM:
             return path
         if format is not None or self._input:
@@ -48,7 +48,7 @@ class Streams:
         return self._read(kind.suffixes[0])
 
     def target(self, path: str, format: str | None) -> str:
-        """The file to write in place of `path`: format is None for .ath. Raises ClipError."""
+        """Return the file to write in place of `path`: format is None for .ath. Raises ClipError."""
         if path != STREAM:
             return path
         suffix = ATH if format is None else format_named(format, written_formats()).suffixes[0]
@@ -78,7 +78,7 @@ class Streams:
 
 @contextmanager
 def standard_streams() -> Iterator[Streams]:
-    """Streams whose output is sent when the block ends without an error."""
+    """Yield streams whose output is sent when the block ends without an error."""
     with tempfile.TemporaryDirectory(prefix="athcodec-") as folder:
         streams = Streams(folder)
         yield streams

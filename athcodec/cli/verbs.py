@@ -167,33 +167,33 @@ def batch(args: argparse.Namespace) -> int:
 
 
 def _listed(path: str) -> list[str]:
-    """Inputs from a file, one per line; "-" is stdin."""
+    """Return inputs from a file, one per line; "-" is stdin."""
     with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
         return [line.rstrip("\r\n") for line in file if line.strip()]
 
 
 def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a clip that options of the command line give."""
+    """Return the settings of a clip that options of the command line give."""
     from athcodec.batch.settings import BOUNDS, READING
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
-    given = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    given |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
-    given |= {
+    settings = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
+    settings |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
+    settings |= {
         name: getattr(args, name)
         for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
         if getattr(args, name) != usual
     }
     if args.ladder != ladder_of(DEFAULT_LADDER):
-        given["ladder"] = list(args.ladder)
-    if given.get("rest") == "auto":
-        del given["rest"]
+        settings["ladder"] = list(args.ladder)
+    if settings.get("rest") == "auto":
+        del settings["rest"]
     if args.max_error is not None:
-        given["max_error"] = str(args.max_error) if args.max_error.unit else args.max_error.value
+        settings["max_error"] = str(args.max_error) if args.max_error.unit else args.max_error.value
     if args.tam is not None:
         epsilon, eta, xi, lam = args.tam
-        given["tam"] = [str(epsilon), eta, str(xi), lam]
-    return given
+        settings["tam"] = [str(epsilon), eta, str(xi), lam]
+    return settings
 
 
 def hierarchy(args: argparse.Namespace) -> int:
@@ -202,26 +202,26 @@ def hierarchy(args: argparse.Namespace) -> int:
     with read_clip(args, args.input) as clip, naming(args.input), progress() as report:
         if report:
             report("branches", 0.0)
-        found = athcodec.find_branches(clip, args.method, args.root)
+        branches = athcodec.find_branches(clip, args.method, args.root)
     if args.save:
-        save(found, args.save)
-    sizes = np.bincount(found.vertex_branch)
-    orders = branch_orders(found.branch_parent)
+        save(branches, args.save)
+    sizes = np.bincount(branches.vertex_branch)
+    orders = branch_orders(branches.branch_parent)
     if args.json:
         print_json(
             {
                 "file": args.input,
-                "method": found.method,
-                "vertices": len(found.vertex_branch),
+                "method": branches.method,
+                "vertices": len(branches.vertex_branch),
                 "branches": len(sizes),
-                "roots": int((found.branch_parent < 0).sum()),
+                "roots": int((branches.branch_parent < 0).sum()),
                 "branches_per_order": np.bincount(orders).tolist(),
                 "vertices_per_order": np.bincount(orders, sizes).astype(int).tolist(),
                 "saved": args.save,
             }
         )
         return 0
-    echo(f"{args.input}: {found}")
+    echo(f"{args.input}: {branches}")
     rows = [
         [f"{order}", f"{(orders == order).sum():,}", f"{sizes[orders == order].sum():,}"]
         for order in range(orders.max() + 1)
@@ -247,7 +247,7 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
     check_output(args.output, args.input, args.host_mesh, args.onto, suffix="" if args.format else None)
     if args.onto is None:
         for name in ("onto_unit", "onto_up_axis", "onto_frame", "bind"):
-            if (given := getattr(args, name)) is not None and given is not False:
+            if (value := getattr(args, name)) is not None and value is not False:
                 raise ClipError(f"--{name.replace('_', '-')}: got no mesh, expected one with --onto")
     format_name = format_to_write(args.output, args.format).name  # An unknown one is refused before there is work.
     if args.bind and format_name != "gltf":
@@ -298,7 +298,7 @@ def _bound(moving: OntoMesh, path: str) -> Written:
 
 
 def _goes_back(args: argparse.Namespace) -> bool:
-    """Whether a GLB with motions is to be written as a copy of it, with morph targets."""
+    """Return whether a GLB with motions is to be written as a copy of it, with morph targets."""
     is_gltf = (args.format or Path(args.output).suffix.lower()) in ("gltf", ".glb")
     is_plain = args.animation != "joints" and args.rig is None and not args.instances and not _blurs(args)
     return is_gltf and args.onto is None and is_plain
@@ -309,7 +309,7 @@ def _blurs(args: argparse.Namespace) -> bool:
 
 
 def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Namespace) -> Written:
-    """In the format that is asked for; several are those of a GLB, to go back into it."""
+    """Write a decoder in the format that is asked for. Several decoders are those of a GLB, into which they go back."""
     from athcodec import exporters
     from athcodec.files.gltf.motion import GltfMotion
 
@@ -333,12 +333,12 @@ def info(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace, called: str) -> int:
-    found = []
+    rows = []
     for name in motions_of(args.file, args):
         with open_file(args.file, args.stats, host_mesh=args.host_mesh, gltf_motion=name) as decoder:
             ratios = tick_ratios(decoder) if args.motion else None
-            found.append(facts_of(_called(called, name), decoder, ratios))
-    print_files(found, args.json)
+            rows.append(facts_of(_called(called, name), decoder, ratios))
+    print_files(rows, args.json)
     return 0
 
 

@@ -17,9 +17,9 @@ PUBLIC = "ath.h", "ath_gpu.h"
 
 def listed(name: str) -> list[str]:
     """Return the C files of a list in CMakeLists.txt."""
-    found = re.search(rf"set\({name}([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
-    assert found is not None
-    return found.group(1).split()
+    match = re.search(rf"set\({name}([^)]*)\)", (CORE / "CMakeLists.txt").read_text())
+    assert match is not None
+    return match.group(1).split()
 
 
 def decoder_sources() -> list[str]:
@@ -41,7 +41,7 @@ def amalgamation(gpu: bool = False) -> str:
             return ""
         seen.add(name)
         return f"/* ---- {name} ---- */\n\n" + INCLUDE.sub(
-            lambda found: whole(found.group(1)), (CORE / name).read_text()
+            lambda match: whole(match.group(1)), (CORE / name).read_text()
         )
 
     return "\n".join(whole(name) for name in decoder_sources() + (listed("ATH_GPU_SOURCES") if gpu else []))

@@ -40,7 +40,7 @@ class Affines:
         return f"<Affines: {counted(len(self.branch), 'part')}, {int(self.is_stem.sum()):,} of them exact stems>"
 
 
-def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, what: str) -> Affines:
+def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, subject: str) -> Affines:
     """Return a frame of the file as matrices, from its segment as prepared at the level. Raises BadChunk."""
     core, parts, hierarchy = file.core, file.core.cut(level), file.hierarchy
     nodes, stems = parts[parts["branch"] >= 0], file.tables.exact_branches(parts)
@@ -54,7 +54,7 @@ def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, 
     except np.linalg.LinAlgError:  # Infinite positions lead some plants here.
         maps = np.array(np.nan)
     if not np.isfinite(maps).all():
-        raise BadChunk(f"{what}: got positions that no matrix fits; expected those of a plant")
+        raise BadChunk(f"{subject}: got positions that no matrix fits; expected those of a plant")
     first = np.concatenate([nodes["first"], file.tables.branches["first"][stems]])
     stop = first + np.concatenate([nodes["count"], file.tables.branches["count"][stems]])
     first, stop = file.static.place_starts[first], file.static.place_starts[stop]
@@ -65,11 +65,11 @@ def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, 
     return Affines(branch[order], first, count, is_stem[order], matrices[order])
 
 
-def residual_of(parts: Affines, positions: np.ndarray, vertex_source: np.ndarray, what: str) -> np.ndarray:
+def residual_of(parts: Affines, positions: np.ndarray, vertex_source: np.ndarray, subject: str) -> np.ndarray:
     """Return what the matrices leave out of positions in source order, (N, 3) float64. Raises BadChunk."""
     full = positions[vertex_source]
     if not np.isfinite(full).all():
-        raise BadChunk(f"{what}: got positions that are not finite; expected those of a plant")
+        raise BadChunk(f"{subject}: got positions that are not finite; expected those of a plant")
     out = np.empty_like(full)
     for first, count, matrix in zip(parts.first_vertex, parts.vertex_count, parts.matrices):
         rows = slice(first, first + count)

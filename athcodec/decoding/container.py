@@ -146,12 +146,13 @@ class Header:
 
 
 def is_prelude(kind: Any) -> Any:
-    """Whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
+    """Return whether chunks of a kind, or of an array of kinds, stand in front of those of the motion."""
     return (kind & KIND_ID) < 16
 
 
 def is_motion(kind: Any) -> Any:
-    """Whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved ones."""
+    """Return whether chunks of a kind, or of an array of kinds, are of a level and a segment: known and reserved
+    ones."""
     return (kind & KIND_ID) // 16 == 1
 
 
@@ -181,7 +182,7 @@ class Chunk:
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """All in front of the chunks; the header gets their count and File_Length.
+    """Return all in front of the chunks; the header gets their count and File_Length.
 
     errors: (levels, segments, 3) in scene units, of the measures in their order; they are rounded up.
     """
@@ -226,7 +227,7 @@ def short_floats(lengths: np.ndarray) -> np.ndarray:
 
 
 def from_short_float(stored: int) -> float:
-    """The length of which the error table stores this, scene units."""
+    """Return the length of which the error table stores this, scene units."""
     return float(np.uint32(stored << SHORT_SHIFT).view(np.float32))
 
 
@@ -265,73 +266,75 @@ _KIND_SIZES: dict[str, Container[int]] = {
 _MOST_DIMENSIONS = 32
 
 
-def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], what: str, limits: Limits) -> np.ndarray:
+def _decompress(data: bytes, dtype: np.dtype, shape: tuple[int, ...], subject: str, limits: Limits) -> np.ndarray:
     size = math.prod(shape) * dtype.itemsize
-    raw = np.frombuffer(zstd_decompress_exact(data, size, what, limits), np.uint8)
+    raw = np.frombuffer(zstd_decompress_exact(data, size, subject, limits), np.uint8)
     return np.frombuffer(raw.reshape(dtype.itemsize, -1).T.tobytes(), dtype).reshape(shape)
 
 
-def _check_window(data: bytes, expected: int, what: str) -> None:
+def _check_window(data: bytes, expected: int, subject: str) -> None:
     """Check Window_Descriptor (RFC 8878, 3.1.1.1.2), because zstd does not tell the largest windows from no frame, and
     max_window_size has no effect if all is decompressed in one call."""
     if data[:4] == zstandard.FRAME_HEADER and len(data) > 5 and not data[4] & _ZSTD_SINGLE_SEGMENT:
         exponent, mantissa = data[5] >> 3, data[5] & 7
         window = (8 + mantissa) << 7 + exponent
         if window > max(_ZSTD_WINDOW, expected):
-            raise LimitExceeded(f"{what}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
+            raise LimitExceeded(f"{subject}: got a zstd window of {window} bytes; the limit is {_ZSTD_WINDOW}")
 
 
-def zstd_decompress_exact(data: bytes, expected: int, what: str, limits: Limits) -> bytes:
+def zstd_decompress_exact(data: bytes, expected: int, subject: str, limits: Limits) -> bytes:
     """Return the content of a zstd frame that announces and holds `expected` bytes. Raises BadChunk, LimitExceeded."""
     if expected > limits.decoded_chunk_bytes:
-        raise LimitExceeded(f"{what}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
-    _check_window(data, expected, what)
+        raise LimitExceeded(f"{subject}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
+    _check_window(data, expected, subject)
     try:
         if expected == 0 or zstandard.frame_content_size(data) != expected:
-            raise BadChunk(f"{what}: got a zstd frame of another size; expected {expected} bytes")
+            raise BadChunk(f"{subject}: got a zstd frame of another size; expected {expected} bytes")
         return zstandard.ZstdDecompressor(max_window_size=_ZSTD_WINDOW).decompress(data, allow_extra_data=False)
     except (zstandard.ZstdError, MemoryError) as error:
-        raise BadChunk(f"{what}: got a zstd frame that does not decode ({error}); expected {expected} bytes") from None
+        raise BadChunk(
+            f"{subject}: got a zstd frame that does not decode ({error}); expected {expected} bytes"
+        ) from None
 
 
-def parse_array(data: bytes, what: str, limits: Limits) -> tuple[str, np.ndarray]:
+def parse_array(data: bytes, subject: str, limits: Limits) -> tuple[str, np.ndarray]:
     """Return the name and array of ATTRIBUTE."""
     if len(data) < ARRAY_HEAD.size:
-        raise BadChunk(f"{what}: got {len(data)} bytes; expected at least {ARRAY_HEAD.size}")
+        raise BadChunk(f"{subject}: got {len(data)} bytes; expected at least {ARRAY_HEAD.size}")
     code, dimensions, length, size = ARRAY_HEAD.unpack_from(data)
     start = ARRAY_HEAD.size + 4 * dimensions
     if start + length > len(data):
-        raise BadChunk(f"{what}: got a head of {start + length} bytes; expected at most what the chunk holds")
-    dtype = _array_type(code, size, what)
+        raise BadChunk(f"{subject}: got a head of {start + length} bytes; expected at most what the chunk holds")
+    dtype = _array_type(code, size, subject)
     shape, body = struct.unpack_from(f"<{dimensions}I", data, ARRAY_HEAD.size), data[start + length :]
-    name = _array_name(data[start : start + length], what, limits)
+    name = _array_name(data[start : start + length], subject, limits)
     if dimensions > _MOST_DIMENSIONS:
-        raise BadChunk(f"{what}: got {dimensions} dimensions; expected at most {_MOST_DIMENSIONS}")
+        raise BadChunk(f"{subject}: got {dimensions} dimensions; expected at most {_MOST_DIMENSIONS}")
     if math.prod(n or 1 for n in shape) * size > limits.decoded_chunk_bytes:
-        raise LimitExceeded(f"{what}: got shape {shape}; the limit is {limits.decoded_chunk_bytes} bytes")
+        raise LimitExceeded(f"{subject}: got shape {shape}; the limit is {limits.decoded_chunk_bytes} bytes")
     if math.prod(shape):
-        return name, _decompress(body, dtype, shape, what, limits)
+        return name, _decompress(body, dtype, shape, subject, limits)
     if body:
-        raise BadChunk(f"{what}: got {len(body)} bytes behind an array without elements; expected none")
+        raise BadChunk(f"{subject}: got {len(body)} bytes behind an array without elements; expected none")
     return name, np.zeros(shape, dtype)
 
 
-def _array_type(code: int, size: int, what: str) -> np.dtype:
+def _array_type(code: int, size: int, subject: str) -> np.dtype:
     """Return the dtype of Type and Item_Bytes."""
     if code >= len(ARRAY_KINDS) or size not in _KIND_SIZES[ARRAY_KINDS[code]]:
-        raise BadChunk(f"{what}: got type {code} of {size} bytes; expected numbers, booleans or texts")
+        raise BadChunk(f"{subject}: got type {code} of {size} bytes; expected numbers, booleans or texts")
     return np.dtype(f"<{ARRAY_KINDS[code]}{size}")
 
 
-def _array_name(text: bytes, what: str, limits: Limits) -> str:
+def _array_name(text: bytes, subject: str, limits: Limits) -> str:
     if len(text) > limits.string_bytes:
-        raise LimitExceeded(f"{what}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
+        raise LimitExceeded(f"{subject}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
     try:
         name = text.decode()
     except UnicodeDecodeError:
         name = ""
     if not name:
-        raise BadChunk(f"{what}: got name {brief(text)}; expected text")
+        raise BadChunk(f"{subject}: got name {brief(text)}; expected text")
     return name
 
 
@@ -355,14 +358,14 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
     return _parse_json(text, "METADATA")
 
 
-def _parse_json(text: bytes, what: str) -> dict:
+def _parse_json(text: bytes, subject: str) -> dict:
     try:
         value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
         json.dumps(value, ensure_ascii=False).encode()  # Raises for lone surrogates.
     except (ValueError, RecursionError):
         value = None
     if not isinstance(value, dict):
-        raise BadChunk(f"{what}: got {text[:40]!r}; expected a JSON object")
+        raise BadChunk(f"{subject}: got {text[:40]!r}; expected a JSON object")
     return value
 
 

@@ -149,13 +149,13 @@ class Segment:
     """One segment prepared at one level, in memory that another preparation may take over, and what a deeper level goes
     on from.
 
-    If the segment is `gone`, its positions went to an array of the caller's, and only its end may be used.
+    If `is_delivered`, the positions went to an array of the caller's, and only its end may be used.
     """
 
     kept = np.empty(0, np.uint8)
 
     def __init__(self, size: int):
-        self.memory, self.gone = aligned(size), False
+        self.memory, self.is_delivered = aligned(size), False
         self.pointer: int = self.memory.ctypes.data
 
     @property
@@ -403,7 +403,7 @@ class File:
 
     def goes_on(self, before: Segment, segment: int, level: int) -> bool:
         """Return whether a prepared segment is this one, at a level from which decoding can go on to this level."""
-        same = lib.ath_segment_index(before.pointer) == segment and not before.gone
+        same = lib.ath_segment_index(before.pointer) == segment and not before.is_delivered
         return same and bool(lib.ath_goes_on(self._file, before.pointer, before.kept_pointer, level))
 
     def joined_to(self, segment: int, level: int) -> int:
@@ -431,7 +431,7 @@ class File:
         """Decode a segment at a refined level, from the beginning or from a segment of which goes_on() is true.
 
         `joined_to` is the segment that it is joined to, if that is ready at the level. `to` is a contiguous array of
-        the file's type, which gets the positions if the core can write there (`into.gone`).
+        the file's type, which gets the positions if the core can write there (`into.is_delivered`).
         """
         fault, keeping = Fault(), self._room_to_keep(level, into)
         place, rooms = (work.pointer, len(work.memory), self._file), (into.pointer, len(into.memory))
@@ -444,7 +444,7 @@ class File:
                 self._check(lib.ath_keep(work.pointer, keeping.ctypes.data, len(keeping)))
             if joined_to is not None:
                 self._check(lib.ath_follow(work.pointer, joined_to.pointer))
-            into.gone = to is not None and lib.ath_prepare_to(work.pointer, to.ctypes.data) == OK
+            into.is_delivered = to is not None and lib.ath_prepare_to(work.pointer, to.ctypes.data) == OK
             result = lib.ath_prepare_step(work.pointer, MOST_STEPS)
         if result != OK:
             lib.ath_work_fault(work.pointer, byref(fault))

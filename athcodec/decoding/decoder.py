@@ -552,7 +552,7 @@ class Decoder(ArrayLike):
                 self.file.segments.show_all(segments, level, show, room)
             else:
                 with self._prepared(segments.start, level, room(segments.start)) as ready:
-                    if not ready.gone:
+                    if not ready.is_delivered:
                         show(segments.start, ready)
         return shown.astype(dtype, copy=False)[of_frames]
 
@@ -590,7 +590,7 @@ class Decoder(ArrayLike):
             yield ready
         finally:
             with self._lock:
-                self._last = (None if ready.gone else place), ready
+                self._last = (None if ready.is_delivered else place), ready
 
     def _segments_of(self, first: int, last: int) -> range:
         """Return the clip's segments that hold the frames first to last - 1."""

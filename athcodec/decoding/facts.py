@@ -93,7 +93,7 @@ def _presence(clip: dict[str, Any]) -> str:
 
 
 def _rest(facts: dict[str, Any]) -> str:
-    """Where it is, and what it takes."""
+    """Return where it is, and what it takes."""
     if facts["host_mesh"]:
         vertices = counted(facts["vertices"], "vertex", "vertices")
         return f"a mesh of {vertices} that the host has, checksum {facts['host_mesh']['checksum']}"
@@ -101,7 +101,7 @@ def _rest(facts: dict[str, Any]) -> str:
 
 
 def _clips(facts: dict[str, Any]) -> Table:
-    """Errors at the seam are those of the deepest stored level."""
+    """Return errors at the seam are those of the deepest stored level."""
     rows = [
         [
             clip["name"],
@@ -133,7 +133,7 @@ def _levels(facts: dict[str, Any]) -> Table:
 
 
 def level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """One row per level, ending in its `cells`, between what the file holds before and behind them."""
+    """Return one row per level, ending in its `cells`, between what the file holds before and behind them."""
     levels, total = facts["levels"], facts["bytes"]
 
     def row(level: str, name: str, nodes: str, size: int) -> list[str]:

@@ -95,11 +95,11 @@ class FileBytes:
         self.bytes_read += size
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
-    def read(self, offset: int, length: int, what: str) -> bytes:
+    def read(self, offset: int, length: int, subject: str) -> bytes:
         """Return `length` bytes from an offset on. Raises Truncated, which names `what` is read, if fewer are there."""
         data = self._read_some(offset, length)
         if len(data) < length:
-            raise Truncated(f"{what}: got {len(data)} bytes; expected {length}")
+            raise Truncated(f"{subject}: got {len(data)} bytes; expected {length}")
         return data
 
     def announce(self, ranges: list[tuple[int, int]]) -> None:
@@ -144,11 +144,11 @@ class FileBytes:
         return refused(f"{error}{getattr(self.source, 'change_hint', '') if refused is BadChecksum else ''}")
 
     @contextmanager
-    def fed(self, ranges: list[tuple[int, int]], what: str) -> Iterator[None]:
+    def fed(self, ranges: list[tuple[int, int]], subject: str) -> Iterator[None]:
         """Give the core these bytes, (offset, size), for as long as the context lasts. Raises as `prepare`."""
         if any(offset + size > self.available_length for offset, size in ranges):
             raise LevelUnavailable(
-                f"{what}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
+                f"{subject}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
             )
         self.announce(ranges)
         pieces = [as_bytes(self.read(offset, size, f"bytes from {offset} on")) for offset, size in ranges]

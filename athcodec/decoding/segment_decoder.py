@@ -55,7 +55,7 @@ class SegmentDecoder:
         Returns
         -------
         core_file.Segment
-            Argument for `core.positions` and `core.matrices`, unless it is `gone` to the array.
+            Argument for `core.positions` and `core.matrices`, unless `is_delivered`: then they are in the array.
 
         Raises
         ------
@@ -65,9 +65,9 @@ class SegmentDecoder:
             If it is damaged, or needs more memory than is allowed.
         """
         segment, level = whole("segment", segment), whole("level", level)
-        what = f"level {level}, segment {segment}"
+        subject = f"level {level}, segment {segment}"
         size = self._core.segment_size(level) if to is None else self._core.segment_size_to(segment, level)
-        needed = self._checked_need(level, what)
+        needed = self._checked_need(level, subject)
         before = joined_to = None
         if spare and needed + len(spare.memory) <= self._bytes.limits.memory_bytes:
             if self._core.goes_on(spare, segment, level):
@@ -76,7 +76,7 @@ class SegmentDecoder:
                 joined_to = spare
         is_free = spare and not before and not joined_to and len(spare.memory) >= size
         ready = spare if spare and is_free else core_file.Segment(size)
-        with self._bytes.lock, self._bytes.fed(self._missing(segment, level, before, joined_to), what):
+        with self._bytes.lock, self._bytes.fed(self._missing(segment, level, before, joined_to), subject):
             self._refine(level)
             self._core.prepare(self._work, segment, level, ready, before, joined_to, to)
         return ready
@@ -88,23 +88,23 @@ class SegmentDecoder:
         did not go there, threads call `show` with the number and the prepared segment, whose memory the next one takes
         over. Raises as `prepare`.
         """
-        what = f"level {level}, segments {segments.start} to {segments.stop - 1}"
-        with self._bytes.lock, self._bytes.fed(self._core.missing(level, segments[0], segments[-1]), what):
+        subject = f"level {level}, segments {segments.start} to {segments.stop - 1}"
+        with self._bytes.lock, self._bytes.fed(self._core.missing(level, segments[0], segments[-1]), subject):
             self._refine(level)
-            follows, runs = self._runs(segments, level, what)
+            follows, runs = self._runs(segments, level, subject)
             items = [(run, level, follows, show, room) for run in runs]
             faults = ThreadPool(len(runs)).map(self._show_run, items)
             for fault in filter(None, faults):
                 raise fault
 
-    def _checked_need(self, level: int, what: str) -> int:
+    def _checked_need(self, level: int, subject: str) -> int:
         """Return the bytes that preparing a segment takes. Raises LimitExceeded if they are not allowed."""
         needed, limit = self._core.segment_size(level) + self._core.work_size(), self._bytes.limits.memory_bytes
         if needed > limit:
-            raise LimitExceeded(f"{what}: got a need of {needed} bytes; the limit is {limit}")
+            raise LimitExceeded(f"{subject}: got a need of {needed} bytes; the limit is {limit}")
         return needed
 
-    def _runs(self, segments: range, level: int, what: str) -> tuple[bool, list[range]]:
+    def _runs(self, segments: range, level: int, subject: str) -> tuple[bool, list[range]]:
         """Return whether memory allows to go on from a segment to one joined to it, and one run for each thread.
 
         The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
@@ -113,7 +113,7 @@ class SegmentDecoder:
         size, limit, needed = (
             self._core.segment_size(level),
             self._bytes.limits.memory_bytes,
-            self._checked_need(level, what),
+            self._checked_need(level, subject),
         )
         follows = joined and needed + size <= limit
         room = limit // (needed + size if follows else needed)
@@ -135,7 +135,7 @@ class SegmentDecoder:
                 self._core.prepare(work, segment, level, ready, joined_to=joined_to, to=room(segment))
             except core_file.CoreError as fault:
                 return fault
-            if not ready.gone:
+            if not ready.is_delivered:
                 show(segment, ready)
         return None
 

@@ -65,7 +65,11 @@ SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a s
 
 @dataclass(frozen=True)
 class FileDecisions:
-    """Decides about a file, by what is known of its clip."""
+    """Decides what a file is made of: search or prediction, layers, and the length of segments.
+
+    These are one job because each decision is made by the bytes that the others give: segments of another length are
+    searched anew, and prediction stands against the file that the search has found.
+    """
 
     source: Source
     options: EncodingOptions

@@ -110,7 +110,7 @@ def draft(
     progress: Progress | None = None,
     **options: Any,
 ) -> Draft:
-    """The first step of `encode`, whose options it takes: branches, survey, and the search for settings.
+    """Return the first step of `encode`, whose options it takes: branches, survey, and the search for settings.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def draft(
 def code_segments(
     clip: MotionClip, draft: Draft, segments: Iterable[int], *, jobs: int | None = None
 ) -> Iterator[CodedSegment]:
-    """The second step: codes some of the segments 0 to draft.segment_count - 1.
+    """Yield the second step: codes some of the segments 0 to draft.segment_count - 1.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def write(
     *,
     progress: Progress | None = None,
 ) -> Summary:
-    """The third step: writes the file that `encode` would write.
+    """Return the third step: writes the file that `encode` would write.
 
     Parameters
     ----------

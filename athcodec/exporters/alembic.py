@@ -49,21 +49,25 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
         )
         try:
             samples = samples_of(motion, objects, options.velocities)
-            said = _send(process, (static, instanced), samples, lambda frame: report((frame + 1) / motion.frame_count))
+            answer = _send(
+                process, (static, instanced), samples, lambda frame: report((frame + 1) / motion.frame_count)
+            )
         finally:
             process.kill()
             process.wait()
             for pipe in (process.stdin, process.stdout):
                 with suppress(BrokenPipeError):
-                    pipe.close()
-        if said != b"done":
-            reason = said.decode("utf-8", "replace") or "Alembic's library has ended its process: is the disk full?"
+                    if pipe is not None:
+                        pipe.close()
+        if answer != b"done":
+            reason = answer.decode("utf-8", "replace") or "Alembic's library has ended its process: is the disk full?"
             raise OSError(errno.EIO, f"cannot be written: {reason}", path)
     return cost_of(instanced) | hidden_copies(objects, options.instances)
 
 
-def _send(process: subprocess.Popen, head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
+def _send(process: subprocess.Popen[bytes], head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
     """Return the final answer of the process."""
+    assert process.stdin is not None and process.stdout is not None
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)
         for sample in samples:

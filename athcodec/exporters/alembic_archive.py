@@ -63,23 +63,23 @@ Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
 
 def main() -> None:
-    """Takes a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
-    given = sys.stdin.buffer
-    motion, instanced = pickle.load(given)
+    """Take a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
+    pipe = sys.stdin.buffer
+    motion, instanced = pickle.load(pipe)
     try:
-        _write(motion, _samples(given), instanced, sys.argv[1])
+        _write(motion, _samples(pipe), instanced, sys.argv[1])
         gc.collect()  # an archive is complete when nothing refers to it
-        said = "done"
+        answer = "done"
     except (RuntimeError, TypeError, OSError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
-    print(said, end="")
+        answer = " ".join(str(error).split()) or type(error).__name__
+    print(answer, end="")
 
 
-def _samples(given: BinaryIO) -> Iterator[tuple[Any, ...]]:
-    """Frames as exporters.samples gives them."""
+def _samples(pipe: BinaryIO) -> Iterator[tuple[Any, ...]]:
+    """Yield frames as exporters.samples gives them."""
     with suppress(EOFError):
         while True:
-            yield pickle.load(given)
+            yield pickle.load(pipe)
 
 
 def _write(motion: Motion, samples: Iterator[tuple[Any, ...]], instanced: dict[int, Copies], name: str) -> None:
@@ -127,7 +127,7 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
 
 
 def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
-    """Writes the visibility of an object, or of each of its copies, to the transforms above them."""
+    """Write the visibility of an object, or of each of its copies, to the transforms above them."""
     if obj.shown is None or obj.shown.shape[1] > len(places):
         return
     for place, shown in zip(places, np.broadcast_to(obj.shown, (len(obj.shown), len(places))).T):
@@ -140,7 +140,7 @@ def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
 def _add_instanced(
     root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
 ) -> list[Any]:
-    """Writes the shape below the transform of the first copy, and an instance of it below that of each other one.
+    """Write the shape below the transform of the first copy, and an instance of it below that of each other one.
     Returns these transforms."""
     matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # Matrices act on row vectors.
     linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
@@ -153,11 +153,11 @@ def _add_instanced(
             place.getSchema().set(sample)
     one = one_copy(obj)
     obj.target = one.target = KINDS[obj.kind](places[0], name)
-    own = {
+    arrays = {
         key: (values if domain == "constant" else rows_of_one(values, obj), domain)
         for key, (values, domain) in _rows(statics, obj).items()
     }
-    _add(one, [copies.shape], own)
+    _add(one, [copies.shape], arrays)
     for place in places[1:]:
         place.addChildInstance(one.target, name)
     return places
@@ -168,8 +168,8 @@ def _bind_materials(motion: Motion, objects: list[SceneObject]) -> None:
     labels, names = face_materials(motion) or (np.empty(0), [])
     sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
     for obj in objects if sets else ():
-        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
-        for label, faces in material_runs(own, names) if obj.kind == "mesh" else ():
+        face_labels = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        for label, faces in material_runs(face_labels, names) if obj.kind == "mesh" else ():
             held = _filled(imath.IntArray, faces)
             face_set = obj.target.getSchema().createFaceSet(sets[label])
             face_set.getSchema().set(AbcGeom.OFaceSetSchemaSample(held))
@@ -189,7 +189,7 @@ def _filled(kind: Any, values: np.ndarray) -> Any:
 # ---- samples ----
 
 
-def _add(obj: SceneObject, values: list[np.ndarray], own: dict[str, tuple[np.ndarray, str]] | None) -> None:
+def _add(obj: SceneObject, values: list[np.ndarray], arrays: dict[str, tuple[np.ndarray, str]] | None) -> None:
     """A sample of the points, and of their velocities where there are any; the first one brings what does not move, the
     rows of the object."""
     points, *moving = (_filled(imath.V3fArray, each) for each in values)
@@ -200,7 +200,7 @@ def _add(obj: SceneObject, values: list[np.ndarray], own: dict[str, tuple[np.nda
             sample.setVelocities(velocities)
         schema.set(sample)
 
-    if own is None:
+    if arrays is None:
         kinds = {
             "mesh": AbcGeom.OPolyMeshSchemaSample,
             "curves": AbcGeom.OCurvesSchemaSample,
@@ -209,7 +209,9 @@ def _add(obj: SceneObject, values: list[np.ndarray], own: dict[str, tuple[np.nda
         set_sample(kinds[obj.kind](points))
         return
     order = turned_corners(obj.faces[0])
-    own = {name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in own.items()}
+    arrays = {
+        name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in arrays.items()
+    }
     # samples refer to arrays that somebody has to keep until they are written
     held = {
         "points": points,
@@ -218,27 +220,27 @@ def _add(obj: SceneObject, values: list[np.ndarray], own: dict[str, tuple[np.nda
         "curves": _filled(imath.IntArray, obj.curves),
         "indices": _filled(imath.IntArray, obj.faces[1][order]),
     }
-    set_sample({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, own))
-    for name, (values, domain) in own.items():
+    set_sample({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, arrays))
+    for name, (values, domain) in arrays.items():
         if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
             _write_param(schema.getArbGeomParams(), name, values, domain)
 
 
-def _mesh_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+def _mesh_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
     further = {}
     for name, row, array, keyword, kind in (
         ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
         ("normals", (3,), imath.V3fArray, "iNormals", AbcGeom.ON3fGeomParamSample),
     ):
-        values, domain = own.get(name, (None, ""))
+        values, domain = arrays.get(name, (None, ""))
         if values is not None and values.shape[1:] == row and values.dtype == np.float32:
-            del own[name]
+            del arrays[name]
             held[name] = _filled(array, values)
             further[keyword] = kind(held[name], SCOPES[domain])
     return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
 
 
-def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
+def _curve_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
     is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
     bases = {name: each for each, name in BASES.items()}
@@ -247,19 +249,19 @@ def _curve_sample(obj: SceneObject, held: dict, own: dict) -> Any:
     is_closed = obj.details.get("wrap") == "periodic"
     wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
     return AbcGeom.OCurvesSchemaSample(
-        held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis, **_widths(held, own, "iWidth")
+        held["points"], held["curves"], iType=kind, iWrap=wrap, iBasis=basis, **_widths(held, arrays, "iWidth")
     )
 
 
-def _point_sample(obj: SceneObject, held: dict, own: dict) -> Any:
-    return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, own, "iWidths"))
+def _point_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
+    return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, arrays, "iWidths"))
 
 
-def _widths(held: dict, own: dict, name: str) -> dict:
-    radius, domain = own.get("radius", (None, ""))
+def _widths(held: dict[str, Any], arrays: dict[str, Any], name: str) -> dict[str, Any]:
+    radius, domain = arrays.get("radius", (None, ""))
     if radius is None or radius.dtype != np.float32 or radius.ndim != 1:
         return {}
-    del own["radius"]
+    del arrays["radius"]
     held["widths"] = _filled(imath.FloatArray, 2 * radius)
     return {name: AbcGeom.OFloatGeomParamSample(held["widths"], SCOPES[domain])}
 

@@ -28,8 +28,11 @@ class Cells:
 
 
 def cells_of(motion: Motion) -> Cells:
-    """The cells that a motion's attributes, faces and edges are."""
-    kinds, counts, nodes, domains = [], [], [], []
+    """Return the cells that a motion's attributes, faces and edges are."""
+    kinds: list[np.ndarray] = []
+    counts: list[np.ndarray] = []
+    nodes: list[np.ndarray] = []
+    domains: list[str] = []
     volumes = {
         name.removeprefix("cells_"): values
         for name, values in motion.attributes.items()
@@ -51,11 +54,15 @@ def cells_of(motion: Motion) -> Cells:
     domains += ["cell"] * bool(volumes)
     if not kinds:
         _add(kinds, counts, nodes, "vertex", np.arange(motion.vertex_count)[:, None])
-    types, counts, nodes = (np.concatenate(parts).astype(np.int64) for parts in (kinds, counts, nodes))
-    return Cells(types, np.cumsum(counts), nodes, domains[0] if len(domains) == 1 else "")
+    types, sizes_of_cells, corners_of_cells = (
+        np.concatenate(parts).astype(np.int64) for parts in (kinds, counts, nodes)
+    )
+    return Cells(types, np.cumsum(sizes_of_cells), corners_of_cells, domains[0] if len(domains) == 1 else "")
 
 
-def _add(kinds: list, counts: list, nodes: list, kind: str, values: np.ndarray) -> None:
+def _add(
+    kinds: list[np.ndarray], counts: list[np.ndarray], nodes: list[np.ndarray], kind: str, values: np.ndarray
+) -> None:
     kinds.append(np.full(len(values), VTK_NUMBERS[kind]))
     counts.append(np.full(len(values), values.shape[1]))
     nodes.append(values.reshape(-1))
@@ -67,7 +74,7 @@ def arrays_in(motion: Motion, per_point: Collection[str], per_cell: Collection[s
 
 
 def cell_and_point_data(motion: Motion, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """(per point, per cell): the attributes with a row of numbers for each, at most nine."""
+    """Return (per point, per cell): the attributes with a row of numbers for each, at most nine."""
     per_point, per_cell = {}, {}
     for name, values in motion.attributes.items():
         fits = values.ndim in (1, 2) and values.dtype.kind in "fiu" and values.dtype.itemsize in (1, 2, 4, 8)

@@ -48,7 +48,7 @@ def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None
     for start, frames in portions(motion, motion.vertex_count) if fits else ():
         for fit in fits.values():
             fit.add(start, frames)
-    return {number: fit.found for number, fit in fits.items() if fit.found.max_error <= allowed}
+    return {number: fit.copies for number, fit in fits.items() if fit.copies.max_error <= allowed}
 
 
 def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
@@ -64,14 +64,14 @@ def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
 
 
 def one_copy(obj: SceneObject) -> SceneObject:
-    """The first copy as an object of its own."""
+    """Return the first copy as an object of its own."""
     (counts, indices), copies = obj.faces, obj.copies
     faces = counts[: len(counts) // copies], indices[: len(indices) // copies]
     return replace(obj, count=obj.count // copies, faces=faces, curves=obj.curves[: len(obj.curves) // copies])
 
 
 def rows_of_one(rows: np.ndarray, obj: SceneObject) -> np.ndarray | None:
-    """The rows of the first copy, of those of a static array; None where others have other ones."""
+    """Return the rows of the first copy, of those of a static array; None where others have other ones."""
     each = rows.reshape(obj.copies, -1, *rows.shape[1:])
     return each[0] if (each == each[:1]).all() else None
 
@@ -88,20 +88,28 @@ class _Fit:
         spread = np.tile((self._local**2).mean(axis=0), (obj.copies, 1))
         self._solver = Placed(SimpleNamespace(spread=spread, axes=np.tile(part.axes[0], (obj.copies, 1, 1))))
         room = (motion.frame_count, obj.copies)
-        values = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
-        still, _ = self._placed(rest.reshape(obj.copies, count, 3))
-        self.found = Copies(shape, *values, tuple(part.astype(np.float32) for part in still), 0.0, part.axes[0])
+        places, turns, scales = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
+        (place, turn, scale), _ = self._placed(rest.reshape(obj.copies, count, 3))
+        self.copies = Copies(
+            shape,
+            places,
+            turns,
+            scales,
+            (place.astype(np.float32), turn.astype(np.float32), scale.astype(np.float32)),
+            0.0,
+            part.axes[0],
+        )
 
     def add(self, start: int, frames: np.ndarray) -> None:
-        """Fits the next frames."""
-        found = self.found
-        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), found.places.shape[1], -1, 3)
-        for frame, own in enumerate(points, start):
-            (found.places[frame], found.turns[frame], found.scales[frame]), error = self._placed(own)
-            found.max_error = max(found.max_error, error)
+        """Fit the next frames."""
+        copies = self.copies
+        points = frames[:, self._rows].astype(np.float64).reshape(len(frames), copies.places.shape[1], -1, 3)
+        for frame, placed in enumerate(points, start):
+            (copies.places[frame], copies.turns[frame], copies.scales[frame]), error = self._placed(placed)
+            copies.max_error = max(copies.max_error, error)
 
     def _placed(self, points: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
-        """Places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
+        """Return places, turns and scales of copies at points (k, m, 3), and how far off that leaves one."""
         middle = points.mean(axis=1)
         away = points - middle[:, None]
         linear, (turns, scales) = self._solver(np.einsum("kmi,mj->kij", away, self._local) / len(self._local))

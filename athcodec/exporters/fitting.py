@@ -38,7 +38,8 @@ OF_CLIP = 1e-4  # Tolerance over the clip's size, for clips without levels.
 
 
 def allowed_error(motion: Motion) -> float:
-    """How far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its size."""
+    """Return how far transforms may be off, in scene units: as far as the level itself is; of a clip OF_CLIP of its
+    size."""
     size = float(np.linalg.norm(np.ptp(np.asarray(motion.rest, np.float64), axis=0)))
     return max(OF_LEVEL * float(motion.max_error), FINEST * size) if isinstance(motion, ClipView) else OF_CLIP * size
 
@@ -74,7 +75,7 @@ class Parts:
         return cls(order, first, count, middle, axes, spread, extent)
 
     def vertex_part(self) -> np.ndarray:
-        """(N,) the part of each vertex of the clip, 0 where none holds it."""
+        """Return (N,) the part of each vertex of the clip, 0 where none holds it."""
         out = np.zeros(len(self.order), np.int64)
         for part, (first, count) in enumerate(zip(self.first, self.count)):
             out[self.order[first : first + count]] = part
@@ -105,10 +106,10 @@ class Placed:
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
         rotation, scale = self.nearest(cross)
-        found = quaternions(rotation)
-        found *= np.where((found * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-        self._before = found
-        return rotation * scale[:, None, :], (found, scale)
+        turn = quaternions(rotation)
+        turn *= np.where((turn * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        self._before = turn
+        return rotation * scale[:, None, :], (turn, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         scale = self._scale  # The scale of the frame before is a close first guess.
@@ -144,8 +145,8 @@ class Mapped:
 def fit(
     motion: Motion, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Moving | None:
-    """The parts of a motion, cut until none is further off than `allowed`; None where that takes more than `most`.
-    chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
+    """Return the parts of a motion, cut until none is further off than `allowed`; None where that takes more than
+    `most`. chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
     rest = np.asarray(motion.rest, np.float64)
     order, first, count = _ranges(motion)
     if chosen is not None:
@@ -172,7 +173,7 @@ def fit(
 
 
 def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """An order of the vertices, and ranges of it that are the parts to begin with."""
+    """Return an order of the vertices, and ranges of it that are the parts to begin with."""
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return (
@@ -189,7 +190,7 @@ def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Shorter ranges: what bends is off by the square of its length."""
+    """Cut ranges of vertices into shorter ones: the error of what bends grows with the square of its length."""
     wanted = count if excess is None else np.ceil(np.sqrt(np.minimum(excess, 1e12)))
     pieces = np.clip(wanted, 2, count).astype(np.int64)
     number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -202,11 +203,11 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 def _fitted(
     motion: Motion, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest distance
-    that each part leaves (K,)."""
+    """Return places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest
+    distance that each part leaves (K,)."""
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
-    starts, own = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
-    local = np.einsum("nij,ni->nj", parts.axes[own], rest[rows] - parts.middle[own])
+    starts, part = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
+    local = np.einsum("nij,ni->nj", parts.axes[part], rest[rows] - parts.middle[part])
     places = np.empty((motion.frame_count, len(parts), 3))
     values = [np.empty((motion.frame_count, len(parts), width)) for width in solver.widths]
     error = np.zeros(len(parts))
@@ -216,24 +217,24 @@ def _fitted(
             continue
         points = frames[numbers - start][:, rows].astype(np.float64)
         middle = np.add.reduceat(points, starts, axis=1) / parts.count[:, None]
-        points -= middle[:, own]
+        points -= middle[:, part]
         places[numbers] = middle
         cross = np.empty((len(numbers), len(parts), 3, 3))
         for i in range(3):
             for j in range(3):
                 cross[:, :, i, j] = np.add.reduceat(points[:, :, i] * local[:, j], starts, axis=1) / parts.count
         for i, number in enumerate(numbers):
-            linear, found = solver(cross[i])
-            for kept, value in zip(values, found):
+            linear, fit = solver(cross[i])
+            for kept, value in zip(values, fit):
                 kept[number] = value
-            points[i] -= np.einsum("nij,nj->ni", linear[own], local)
+            points[i] -= np.einsum("nij,nj->ni", linear[part], local)
         square = np.einsum("tni,tni->tn", points, points).max(axis=0)
         error = np.maximum(error, np.sqrt(np.maximum.reduceat(square, starts)))
     return places, values, error
 
 
 def portions(motion: Motion, vertex_count: int) -> Iterator[tuple[int, np.ndarray]]:
-    """The blocks of a motion, in portions for work on that many of its vertices."""
+    """Yield the blocks of a motion, in portions for work on that many of its vertices."""
     step = max(1, WORK_BYTES // (vertex_count * 24))
     for start, frames in motion.blocks():
         for first in range(0, len(frames), step):

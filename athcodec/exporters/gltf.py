@@ -82,8 +82,8 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
     looks = looks_of(motion, objects_of(motion))
     meshes = meshes_of(motion, looks, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
-    found, lost_copies = with_copies(motion, meshes.meshes) if has_copies else (list(meshes.meshes), {})
-    write = _writer(motion, options, looks.surface, found, lambda done: report(0.95 * done))
+    shapes, lost_copies = with_copies(motion, meshes.meshes) if has_copies else (list(meshes.meshes), {})
+    write = _writer(motion, options, looks.surface, shapes, lambda done: report(0.95 * done))
     facts = {
         "animation": write.name if options.rig is None else "a rig",
         "unit": str(motion.metadata.get("unit") or ""),
@@ -91,7 +91,7 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
     if isinstance(motion, ClipView):
         facts |= {"level": motion.level, "level_max_error": float(motion.max_error)}
     facts |= write.facts
-    copied = [shape for shape in found if isinstance(shape, GltfCopies)]
+    copied = [shape for shape in shapes if isinstance(shape, GltfCopies)]
     if copied:
         facts["instances"] = sum(len(shape.copies.rest[0]) for shape in copied)
         write.max_error = max(write.max_error, *(shape.copies.max_error for shape in copied))
@@ -103,7 +103,7 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
     glb = Glb(clock(motion) | {"athcodec": facts})
     add_materials(glb, meshes)
     transform = root_transform(motion)
-    later = write.add(glb, glb.node(name="plant", **transform), transform, found, report)
+    later = write.add(glb, glb.node(name="plant", **transform), transform, shapes, report)
     facts |= {"max_error": write.max_error, "vertices": motion.vertex_count}
     with new_file(path) as out:
         glb.write(out, later)
@@ -112,12 +112,12 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
 
 
 def _writer(
-    motion: Motion, options: WriteOptions, surface: Surface, found: list[GltfMesh | GltfCopies], report: Progress
+    motion: Motion, options: WriteOptions, surface: Surface, meshes: list[GltfMesh | GltfCopies], report: Progress
 ) -> _Joined | _Morphed:
     """Return what moves the meshes, as the options ask."""
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
-    shapes = [shape for shape in found if isinstance(shape, GltfMesh)]
+    shapes = [shape for shape in meshes if isinstance(shape, GltfMesh)]
     if not shapes:
         return _Joined(motion, None)
     chosen = np.zeros(motion.vertex_count, bool)
@@ -140,7 +140,7 @@ def _writer(
 
 
 def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
-    """The rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
+    """Write the rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | left_out})
@@ -205,7 +205,7 @@ def _morphs_fit(motion: Motion, offset_count: int) -> bool:
 
 
 def check_morphs(motion: Motion, offset_count: int) -> None:
-    """Raises ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
+    """Raise ClipError where a motion of so many positions and normals is more than morph targets can sensibly hold."""
     if not _morphs_fit(motion, offset_count):
         raise ClipError(
             f"morph targets: got {motion.frame_count} frames of {offset_count} positions and normals, expected at most "
@@ -213,26 +213,28 @@ def check_morphs(motion: Motion, offset_count: int) -> None:
         )
 
 
-def _add_animation(glb: Glb, take: Take, samplers: list[dict], channels: list[dict]) -> None:
+def _add_animation(glb: Glb, take: Take, samplers: list[dict[str, Any]], channels: list[dict[str, Any]]) -> None:
     if channels:
         animation = {"name": take.name, "samplers": samplers, "channels": channels}
         extras = {"extras": take.extras} if take.extras else {}
         glb.json.setdefault("animations", []).append(animation | extras)
 
 
-def _animate(glb: Glb, found: list[Take], movers: Movers | None, more: list[tuple[list[dict], list[dict]]]) -> None:
+def _animate(
+    glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[dict[str, Any]], list[dict[str, Any]]]]
+) -> None:
     """An animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than at
     rest in any of them; one key where such a one stands still in one."""
     if movers is None:
-        movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((found[-1].stop, 0, 3)),) * 3)
+        movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((takes[-1].stop, 0, 3)),) * 3)
     has_others = bool(more[0][1])
     used = [(values != rest).any(axis=(0, 2)) for values, rest in zip(movers.poses, movers.rest)]
-    if len(found) > 1 and not np.any(used) and movers.nodes and not has_others:
+    if len(takes) > 1 and not np.any(used) and movers.nodes and not has_others:
         used[0][0] = True  # an animation has a channel at least
-    for take, (samplers, channels) in zip(found, more):
+    for take, (samplers, channels) in zip(takes, more):
         poses = [_keys(take, values) for values in movers.poses]
         moves = [of & (values != values[:1]).any(axis=(0, 2)) for of, values in zip(used, poses)]
-        if len(found) > 1 and np.any(used) and not np.any(moves) and not has_others:
+        if len(takes) > 1 and np.any(used) and not np.any(moves) and not has_others:
             path = next(path for path, of in enumerate(used) if of.any())
             moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
         _add_channels(glb, movers.nodes, take, poses, used, moves, samplers, channels)
@@ -249,14 +251,14 @@ class _Joined:
         self.facts = {} if joints is None else {"joints": len(joints.bind)}
 
     def add(
-        self, glb: Glb, root: int, transform: dict[str, Any], found: list[GltfMesh | GltfCopies], report: Progress
+        self, glb: Glb, root: int, transform: dict[str, Any], shapes: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         joints, movers = self._joints, []
         if joints is not None:
             movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
         # meshes with a skin are beside the root, as nothing but joints places them, and copies beside those
         place: tuple[int | None, dict[str, Any]] = (root, {}) if joints is None else (None, transform)
-        for shape in found:
+        for shape in shapes:
             if isinstance(shape, GltfCopies):
                 movers += shape.add(glb, *place)
             elif joints is not None:
@@ -265,10 +267,10 @@ class _Joined:
         _animate(glb, moving, Movers.all_of(movers), [([], []) for _ in moving])
         return iter(())
 
-    def add_still(self, glb: Glb, root: int, found: Iterable[GltfMesh]) -> None:
+    def add_still(self, glb: Glb, root: int, shapes: Iterable[GltfMesh]) -> None:
         """Add joints without keys, and meshes that hang on them."""
         self._add_skin(glb, root, self._joints)
-        for shape in found:
+        for shape in shapes:
             self._add_mesh(glb, shape, self._joints)
 
     def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
@@ -282,26 +284,26 @@ class _Joined:
         return nodes
 
     def _add_mesh(self, glb: Glb, shape: GltfMesh, joints: Joints) -> None:
-        own, weights = _influences(joints, shape.source, np.uint8 if len(joints.bind) <= 256 else np.uint16)
-        mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": own, "WEIGHTS_0": weights})
+        joint_numbers, weights = _influences(joints, shape.source, np.uint8 if len(joints.bind) <= 256 else np.uint16)
+        mesh = add_mesh(glb, shape, np.asarray(self._motion.rest), {"JOINTS_0": joint_numbers, "WEIGHTS_0": weights})
         glb.node(name=shape.name, mesh=mesh, skin=0)
 
 
 def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 4) joints and their weights."""
-    own = np.zeros((len(source), 4), dtype)
+    """Return (n, 4) joints and their weights."""
+    vertex_joints = np.zeros((len(source), 4), dtype)
     if joints.weights is None:
-        weights = np.zeros(own.shape, np.uint8)
-        own[:, 0], weights[:, 0] = joints.vertex_joint[source], 255
-        return own, weights
-    found, width = np.zeros(own.shape, np.float32), joints.weights.shape[1]
-    found[:, :width] = joints.weights[source]
-    own[:, :width] = np.where(found[:, :width] > 0, joints.vertex_joint[source], 0)
-    return own, found
+        weights = np.zeros(vertex_joints.shape, np.uint8)
+        vertex_joints[:, 0], weights[:, 0] = joints.vertex_joint[source], 255
+        return vertex_joints, weights
+    joint_weights, width = np.zeros(vertex_joints.shape, np.float32), joints.weights.shape[1]
+    joint_weights[:, :width] = joints.weights[source]
+    vertex_joints[:, :width] = np.where(joint_weights[:, :width] > 0, joints.vertex_joint[source], 0)
+    return vertex_joints, joint_weights
 
 
 def _keys(take: Take, values: np.ndarray) -> np.ndarray:
-    """The clip's of all frames, (n, J, width); a loop returns to its first rotation the shorter way."""
+    """Return the clip's of all frames, (n, J, width); a loop returns to its first rotation the shorter way."""
     keys = take.of(values)
     if take.is_loop and values.shape[2] == 4:
         keys[-1] *= np.where((keys[-1] * keys[-2]).sum(axis=1, keepdims=True) < 0, np.float32(-1), np.float32(1))
@@ -315,16 +317,16 @@ def _add_channels(
     poses: list[np.ndarray],
     used: list[np.ndarray],
     moves: list[np.ndarray],
-    samplers: list[dict],
-    channels: list[dict],
+    samplers: list[dict[str, Any]],
+    channels: list[dict[str, Any]],
 ) -> None:
     """Append samplers and channels. poses, used, moves: one array for each of PATHS, of which the latter two say, (J,),
     which nodes have a channel and which of those move. A node that moves gets a key per frame, one that is still a
     single key."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
-    for path, values, mine, moving in zip(PATHS, poses, used, moves):
-        for which, count in ((moving, len(values)), (mine & ~moving, 1)):
-            chosen = np.flatnonzero(which)
+    for path, values, is_used, moving in zip(PATHS, poses, used, moves):
+        for chosen_nodes, count in ((moving, len(values)), (is_used & ~moving, 1)):
+            chosen = np.flatnonzero(chosen_nodes)
             if not len(chosen):
                 continue
             if count not in inputs:
@@ -347,10 +349,10 @@ class _Morphed:
         self.max_error = 0.0
 
     def add(
-        self, glb: Glb, root: int, transform: dict[str, Any], found: list[GltfMesh | GltfCopies], report: Progress
+        self, glb: Glb, root: int, transform: dict[str, Any], parts: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         shapes, meshes, channels, movers = [], [], [], []
-        for shape in found:
+        for shape in parts:
             if isinstance(shape, GltfCopies):
                 movers += shape.add(glb, root, {})
                 continue
@@ -369,12 +371,14 @@ class _Morphed:
         least, self.max_error = self.max_error, UNKNOWN_BOUND
         return self._targets(glb, shapes, bounds, least, report)
 
-    def _add_targets(self, glb: Glb, found: list[GltfMesh], meshes: list[int], view: int) -> list[list[dict]]:
-        """The accessors of positions, by frame and mesh, whose bounds are not known yet."""
+    def _add_targets(
+        self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int
+    ) -> list[list[dict[str, Any]]]:
+        """Return the accessors of positions, by frame and mesh, whose bounds are not known yet."""
         accessors, place = [], 0
         for _ in range(self._motion.frame_count):
             accessors.append([])
-            for mesh, shape in zip(meshes, found):
+            for mesh, shape in zip(meshes, shapes):
                 bounds = {"min": [UNKNOWN_BOUND] * 3, "max": [UNKNOWN_BOUND] * 3}
                 target = {}
                 for key, more in (("POSITION", bounds), (NORMAL, {})):
@@ -389,7 +393,7 @@ class _Morphed:
         return accessors
 
     def _targets(
-        self, glb: Glb, found: list[GltfMesh], accessors: list[list[dict]], least: float, report: Progress
+        self, glb: Glb, shapes: list[GltfMesh], accessors: list[list[dict]], least: float, report: Progress
     ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
         normals = MovingNormals(self._surface, rest)
@@ -400,7 +404,7 @@ class _Morphed:
                 away = rest.astype(np.float64) + offsets - frame
                 largest = max(largest, float(np.einsum("ni,ni->n", away, away).max()))
                 normals.move(frame)
-                for shape, accessor in zip(found, accessors[start + i]):
+                for shape, accessor in zip(shapes, accessors[start + i]):
                     values = offsets[shape.source]
                     accessor["min"], accessor["max"] = values.min(axis=0).tolist(), values.max(axis=0).tolist()
                     yield values.tobytes()

@@ -64,7 +64,7 @@ class Glb:
         self._length = 0
 
     def node(self, parent: int | None = None, **values: Any) -> int:
-        """A node below another, or of the scene."""
+        """Return a node below another, or of the scene."""
         self.json["nodes"].append(values)
         index = len(self.json["nodes"]) - 1
         above = (
@@ -76,7 +76,7 @@ class Glb:
         return index
 
     def view(self, size: int, **values: Any) -> int:
-        """A buffer view of the next `size` bytes of the binary chunk."""
+        """Return a buffer view of the next `size` bytes of the binary chunk."""
         self.json["bufferViews"].append({"buffer": 0, "byteOffset": self._length, "byteLength": size} | values)
         self._length += size
         if self._length > LARGEST_GLB:
@@ -84,13 +84,13 @@ class Glb:
         return len(self.json["bufferViews"]) - 1
 
     def accessor(self, view: int, dtype: np.dtype, count: int, width: int, **values: Any) -> int:
-        """The number of a new accessor of (count, width) values in a buffer view; values: further entries."""
+        """Return the number of a new accessor of (count, width) values in a buffer view; values: further entries."""
         kind = {"bufferView": view, "componentType": COMPONENTS[dtype.name], "count": count, "type": TYPES[width]}
         self.json["accessors"].append(kind | values)
         return len(self.json["accessors"]) - 1
 
     def array(self, values: np.ndarray, bounds: bool = False, normalized: bool = False, **view: Any) -> int:
-        """An accessor of its own for (count, width) values; those of vertices are padded to whole words."""
+        """Return an accessor of its own for (count, width) values; those of vertices are padded to whole words."""
         values = np.ascontiguousarray(values.reshape(len(values), -1))
         more: dict[str, Any] = {"normalized": True} if normalized else {}
         if bounds:
@@ -108,7 +108,7 @@ class Glb:
         return self.accessor(index, values.dtype, count, width, **more)
 
     def stored(self, values: np.ndarray) -> int:
-        """A buffer view of an array, for accessors of its parts."""
+        """Return a buffer view of an array, for accessors of its parts."""
         index = self.view(values.nbytes)
         self._append(values.tobytes())
         return index
@@ -194,9 +194,19 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
         place = np.full(len(source), -1)
         place[rows] = np.arange(len(rows))
         attributes = {key: array[rows] for key, array in values.items()}
-        own = np.flatnonzero((corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop))
-        if len(own):
-            made.append(GltfMesh(part_name, source[rows], place[corner_place[triangles[own]]], labels[own], attributes))
+        rows_of_part = np.flatnonzero(
+            (corner_vertex[triangles[:, 0]] >= start) & (corner_vertex[triangles[:, 0]] < stop)
+        )
+        if len(rows_of_part):
+            made.append(
+                GltfMesh(
+                    part_name,
+                    source[rows],
+                    place[corner_place[triangles[rows_of_part]]],
+                    labels[rows_of_part],
+                    attributes,
+                )
+            )
             continue
         if has_made_normals:
             del attributes[NORMAL]
@@ -211,7 +221,7 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
 def add_mesh(
     glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None, **primitive: Any
 ) -> int:
-    """Adds a mesh to the file, in its rest pose (N, 3)."""
+    """Add a mesh to the file, in its rest pose (N, 3)."""
     semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
     for key, values in (mesh.attributes | dict(attributes or {})).items():
         is_ratio = key == COLOUR or key.startswith("WEIGHTS_")
@@ -234,8 +244,8 @@ def add_mesh(
 
 def by_material(corners: np.ndarray, labels: np.ndarray) -> list[tuple[int, np.ndarray]]:
     """Return the materials of rows of corners, (n, k), and the rows that have each; that of the first row first."""
-    found, first = np.unique(labels, return_index=True)
-    return [(int(label), corners[labels == label]) for label in found[np.argsort(first)]]
+    used, first = np.unique(labels, return_index=True)
+    return [(int(label), corners[labels == label]) for label in used[np.argsort(first)]]
 
 
 def add_materials(glb: Glb, meshes: GltfMeshes) -> None:
@@ -284,13 +294,13 @@ class Take:
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """Return the keys of values (T, ...), one per frame of the motion."""
-        own = values[self.start : self.stop]
-        return np.concatenate([own, own[:1]]) if self.is_loop else own
+        rows = values[self.start : self.stop]
+        return np.concatenate([rows, rows[:1]]) if self.is_loop else rows
 
 
 def takes(motion: Motion) -> list[Take]:
-    """An animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot tell
-    apart."""
+    """Return an animation for each clip, "motion" where it has no name. Raises ClipError for times that float32 cannot
+    tell apart."""
     clip_ranges = motion.clip_ranges or (ClipRange("", motion.frame_count),)
     return [
         _take(motion, clip_range, start, stop)
@@ -316,8 +326,8 @@ def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
 
 def clock(motion: Motion) -> dict[str, Any]:
     """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
-    said = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
-    return said if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | said
+    scene = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
+    return scene if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | scene
 
 
 def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
@@ -333,7 +343,7 @@ def branch_extras(motion: Motion) -> dict[str, Any]:
 
 
 def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """Fans over the polygons: (F, 3) places among the corners."""
+    """Return fans over the polygons: (F, 3) places among the corners."""
     counts = np.asarray(counts, np.int64)
     starts, fans = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     first = np.repeat(starts, fans)
@@ -341,7 +351,7 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([first, second, second + 1], axis=1)
 
 
-def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, list[str]]:
+def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
     """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
@@ -349,17 +359,19 @@ def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict, dict, l
     for name in ("vertex_branch", "stem_index"):
         if getattr(motion, name, None) is not None:
             arrays[name] = getattr(motion, name)
-    per_vertex, per_corner, left_out = {}, {}, []
+    per_vertex: dict[str, np.ndarray] = {}
+    per_corner: dict[str, np.ndarray] = {}
+    left_out: list[str] = []
     for name, array in arrays.items():
         if name in NOT_PER_VERTEX or name == FACE_MATERIAL and face_materials(motion):
             continue
         domain = domains.get(name, "vertex" if array.ndim and len(array) == motion.vertex_count else "")
         where = {"vertex": (per_vertex, motion.vertex_count), "corner": (per_corner, corner_count)}.get(domain)
-        found = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
-        if found is None or found[0] in where[0]:
+        entry = _semantic(name, array) if where and array.ndim in (1, 2) and len(array) == where[1] else None
+        if where is None or entry is None or entry[0] in where[0]:
             left_out.append(name)
         else:
-            where[0][found[0]] = found[1]
+            where[0][entry[0]] = entry[1]
     return per_vertex, per_corner, left_out
 
 
@@ -377,7 +389,7 @@ def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 
 def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
-    """As glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
+    """Return as glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
     if semantic == COLOUR and values.dtype in (np.uint8, np.uint16):
         return values
     if values.dtype.kind != "f" or not np.isfinite(values).all():
@@ -410,7 +422,7 @@ def _as_component(values: np.ndarray) -> np.ndarray | None:
 def _split(
     corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray], vertex_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
+    """Return the vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
     if not per_corner or not len(corner_vertex):
         return np.arange(vertex_count), corner_vertex
     rows = [corner_vertex.astype("<i8").view(np.uint8).reshape(-1, 8)]
@@ -437,7 +449,7 @@ def _from_corners(values: np.ndarray, corner_place: np.ndarray, count: int) -> n
 
 
 def _objects(motion: Motion, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
-    """(name, first vertex, one past the last); one of all where objects do not hold together."""
+    """Return (name, first vertex, one past the last); one of all where objects do not hold together."""
     counts, names = motion.attributes.get("part_vertex_counts"), motion.metadata.get("part_names")
     whole = [(names[0] if isinstance(names, list) and len(names) == 1 else name, 0, motion.vertex_count)]
     if counts is None or not isinstance(names, list) or len(names) != len(counts) or np.min(counts, initial=1) < 1:

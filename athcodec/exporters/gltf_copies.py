@@ -36,7 +36,7 @@ class Movers:
 
     @classmethod
     def all_of(cls, movers: list[Movers]) -> Movers | None:
-        """Concatenate the arrays of several; None of none."""
+        """Return the arrays of several movers as one; None if there are none."""
         if not movers:
             return None
         return cls(
@@ -48,17 +48,20 @@ class Movers:
 
 @dataclass(eq=False)
 class GltfCopies:
-    """`shape` is the mesh of one copy; own: what each copy has instead of each vertex, (k, width) by its semantic;
-    lost: the semantics of what neither has; names: of each, where they are objects of their own."""
+    """The mesh of one copy, `shape`, and its copies.
+
+    `copy_attributes` holds the values that each copy has in place of each vertex, (k, width) by their semantic. `lost`
+    lists the semantics that fit neither. `names` are those of the copies if they are separate objects.
+    """
 
     shape: GltfMesh
     copies: Copies
-    own: dict[str, np.ndarray]
+    copy_attributes: dict[str, np.ndarray]
     lost: list[str]
     names: list[str] | None = None
 
     def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
-        """The mesh and its nodes, below one with a transform; those that move."""
+        """Return the mesh and its nodes, below one with a transform; those that move."""
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
         is_still = all((pose == pose[:1]).all() for pose in poses)
@@ -70,7 +73,7 @@ class GltfCopies:
         nodes, at_rest = [], [pose[0] for pose in poses] if is_still else self.copies.rest
         for number, (place, turn, scale) in enumerate(zip(*at_rest)):
             at = dict(zip(PATHS, (place.tolist(), unit_quaternion(turn), scale.tolist())))
-            extras = {key[1:]: _plain(values[number]) for key, values in self.own.items()}
+            extras = {key[1:]: _plain(values[number]) for key, values in self.copy_attributes.items()}
             name = f"{self.shape.name}_{number}" if self.names is None else self.names[number]
             nodes.append(glb.node(above, name=name, mesh=mesh, **at, **({"extras": extras} if extras else {})))
         return [] if is_still else [Movers(nodes, self.copies.rest, poses)]
@@ -78,7 +81,7 @@ class GltfCopies:
     def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: dict[str, Any]) -> None:
         poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
         parts = {path.upper(): glb.array(pose) for path, pose in zip(PATHS, poses)}
-        parts |= {key: glb.array(values) for key, values in self.own.items()}
+        parts |= {key: glb.array(values) for key, values in self.copy_attributes.items()}
         extension = {INSTANCING: {"attributes": parts}}
         glb.node(parent, name=self.shape.name, mesh=mesh, extensions=extension, **transform)
         for key in ("extensionsUsed", "extensionsRequired"):  # without it one of them would be shown
@@ -86,23 +89,25 @@ class GltfCopies:
             names += [] if INSTANCING in names else [INSTANCING]
 
 
-def with_copies(motion: Motion, found: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
-    """The meshes, those that are copies of one shape as such: where transforms keep them within what the level is off,
-    and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all lose."""
+def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
+    """Return the meshes, those that are copies of one shape as such: where transforms keep them within what the level
+    is off, and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all
+    lose."""
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
-    if sum(len(run) for run in runs) != len(found):
-        return list(found), {}
+    if sum(len(run) for run in runs) != len(meshes):
+        return list(meshes), {}
     together = [_together(run) for run in runs]
     fits = fit_copies(motion, together, allowed)
     shapes: list[GltfMesh | GltfCopies] = []
-    waiting = iter(found)
+    waiting = iter(meshes)
     for number, (run, obj) in enumerate(zip(runs, together)):
-        own = [next(waiting) for _ in run]
-        made = _as_copies(_joined(own), obj, fits[number]) if number in fits else None
+        parts = [next(waiting) for _ in run]
+        made = _as_copies(_joined(parts), obj, fits[number]) if number in fits else None
         if made is None:
-            shapes, obj.copies = shapes + own, 1
+            shapes += parts
+            obj.copies = 1
             continue
-        made.names = [shape.name for shape in own] if len(run) > 1 else None
+        made.names = [shape.name for shape in parts] if len(run) > 1 else None
         _hold(motion, made.copies, allowed)
         shapes.append(made)
     lost = {key for shape in shapes if isinstance(shape, GltfCopies) for key in shape.lost}
@@ -110,7 +115,7 @@ def with_copies(motion: Motion, found: list[GltfMesh]) -> tuple[list[GltfMesh | 
 
 
 def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
-    """Objects side by side that have as many vertices in the same faces; each other one alone."""
+    """Yield objects side by side that have as many vertices in the same faces; each other one alone."""
     run: list[SceneObject] = []
     for obj in objects:
         if run and not _is_alike(run[0], obj):
@@ -131,7 +136,7 @@ def _is_alike(one: SceneObject, other: SceneObject) -> bool:
 
 
 def _together(run: list[SceneObject]) -> SceneObject:
-    """Objects side by side as copies of the first."""
+    """Return objects side by side as copies of the first."""
     first, last = run[0], run[-1]
     if len(run) == 1:
         return first
@@ -149,7 +154,7 @@ def _together(run: list[SceneObject]) -> SceneObject:
 
 
 def _joined(shapes: list[GltfMesh]) -> GltfMesh:
-    """One mesh of several, which are drawn alike."""
+    """Return one mesh of several, which are drawn alike."""
     if len(shapes) == 1:
         return shapes[0]
     starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
@@ -171,8 +176,12 @@ def unit_quaternion(quaternion: np.ndarray) -> list[float]:
 
 def _without(shape: GltfMesh | GltfCopies, lost: set[str]) -> GltfMesh | GltfCopies:
     if isinstance(shape, GltfCopies):
-        own = {key: values for key, values in shape.own.items() if key not in lost}
-        return GltfCopies(_without(shape.shape, lost), shape.copies, own, sorted(lost), shape.names)
+        attributes = {key: values for key, values in shape.copy_attributes.items() if key not in lost}
+        return GltfCopies(_mesh_without(shape.shape, lost), shape.copies, attributes, sorted(lost), shape.names)
+    return _mesh_without(shape, lost)
+
+
+def _mesh_without(shape: GltfMesh, lost: set[str]) -> GltfMesh:
     return replace(shape, attributes={key: values for key, values in shape.attributes.items() if key not in lost})
 
 
@@ -186,14 +195,15 @@ def _hold(motion: Motion, copies: Copies, allowed: float) -> None:
 
 
 def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies | None:
-    """None where copies have materials, texture coordinates or colours of their own."""
-    which, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
-    if (np.bincount(which) * obj.copies != len(which)).any():
+    """Return the meshes as copies of one; None if copies have materials, texture coordinates or colours of their
+    own."""
+    copy, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
+    if (np.bincount(copy) * obj.copies != len(copy)).any():
         return None
-    rows = np.argsort(which, kind="stable").reshape(obj.copies, -1)
+    rows = np.argsort(copy, kind="stable").reshape(obj.copies, -1)
     if (local[rows] != local[rows[:1]]).any():
         return None
-    shared, own, lost = {}, {}, []
+    shared, values_of_copies, lost = {}, {}, []
     for key, values in shape.attributes.items():
         each = values[rows]
         if key == NORMAL:
@@ -203,19 +213,19 @@ def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies 
         elif not key.startswith("_"):
             return None
         elif _same(each, each[:, :1]):
-            own[key] = each[:, 0]
+            values_of_copies[key] = each[:, 0]
         else:
             lost.append(key)
-    place = np.full(len(which), -1)
+    place = np.full(len(copy), -1)
     place[rows[0]] = np.arange(rows.shape[1])
     corners, materials = shape.corners, shape.materials
     if corners is not None:
-        of_copy = np.argsort(which[corners[:, 0]], kind="stable").reshape(obj.copies, -1)
+        of_copy = np.argsort(copy[corners[:, 0]], kind="stable").reshape(obj.copies, -1)
         if (materials[of_copy] != materials[of_copy[:1]]).any():
             return None
         corners, materials = place[corners[of_copy[0]]], materials[of_copy[0]]
     one = replace(shape, source=local[rows[0]], corners=corners, attributes=shared, materials=materials)
-    return GltfCopies(one, copies, own, lost)
+    return GltfCopies(one, copies, values_of_copies, lost)
 
 
 def _same(values: np.ndarray, expected: np.ndarray) -> bool:
@@ -223,5 +233,5 @@ def _same(values: np.ndarray, expected: np.ndarray) -> bool:
 
 
 def _plain(row: np.ndarray) -> Any:
-    """As JSON has it."""
+    """Return as JSON has it."""
     return row[0].item() if len(row) == 1 else row.tolist()

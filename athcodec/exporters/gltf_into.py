@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import copy
 import io
-import json
 import os
-import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -24,22 +22,12 @@ from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.clip_view import ClipView
 from athcodec.errors import ClipError
 from athcodec.exporters.gltf import check_morphs
-from athcodec.exporters.gltf_build import (
-    COLOUR,
-    COMPONENTS,
-    INDICES,
-    NORMAL,
-    TYPES,
-    UNLIT,
-    VERTICES,
-    by_material,
-    material_of,
-    takes,
-)
+from athcodec.exporters.gltf_build import COLOUR, INDICES, NORMAL, UNLIT, by_material, material_of, takes
+from athcodec.exporters.gltf_edit import DRACO, INSTANCES, Binary, glb_bytes, prune, used_numbers
 from athcodec.exporters.looks import Look, line_look, looks_of_mesh
 from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import file_ids, keeping, new_file
-from athcodec.files.gltf.document import HARMLESS, MESHOPT, GltfFile
+from athcodec.files.gltf.document import HARMLESS, GltfFile
 from athcodec.files.gltf.json import BROKEN, entries
 from athcodec.files.gltf.motion import (
     EXTENSION,
@@ -57,17 +45,13 @@ from athcodec.motion.clip import ClipRange, MotionClip
 from athcodec.motion.frames import Frames
 from athcodec.motion.joining import split
 from athcodec.sources import ReadOptions
-from athcodec.sources.gltf import GltfNode, read_moving
+from athcodec.sources.gltf import read_moving
+from athcodec.sources.gltf_nodes import GltfNode
 from athcodec.sources.gltf_scene import POINTER, Target, target_of
 
 # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
 SHARE_OF_TWINS = 1 / 8
-ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
-INSTANCES = "EXT_mesh_gpu_instancing"
-DRACO = "KHR_draco_mesh_compression"
-KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # _references lists every index that these extensions hold.
-Reference = tuple[str, Any, Any]
-"""An array of the file ("accessors" ...), and the holder and key of an index into it."""
+KNOWN = (*HARMLESS, INSTANCES, DRACO, "FB_ngon_encoding")  # gltf_edit.references lists every index that these hold.
 
 
 class Into:
@@ -126,32 +110,32 @@ class Into:
         """Write the file with the .ath file `encoded` of `clip` in it, once. Raises ClipError, OSError."""
         with naming(self.path, *BROKEN):
             self._check_unchanged()
-            used = _used(self._json)
-            binary, ath = _Binary(self._file), Path(encoded).read_bytes()
+            used = used_numbers(self._json)
+            binary, ath = Binary(self._file), Path(encoded).read_bytes()
             animations = self._json["animations"]
             self._replace_motion(binary)
             motion = self._motion(binary.add(ath), ath, animations)
-            said = self._json.setdefault("extensions", {}).setdefault(EXTENSION, {})
-            said.setdefault("motions", []).append(motion)
+            extension = self._json.setdefault("extensions", {}).setdefault(EXTENSION, {})
+            extension.setdefault("motions", []).append(motion)
             if EXTENSION not in self._json.setdefault("extensionsUsed", []):
                 self._json["extensionsUsed"].append(EXTENSION)
             if _knows_references(self._json):
-                _prune(self._json, used, self._needless)
+                prune(self._json, used, self._needless)
             data = binary.packed(self._json)
         with keeping(file_ids(self.path)), new_file(path) as out:
-            out.write(_glb(self._json, data))
+            out.write(glb_bytes(self._json, data))
 
     def _check_unchanged(self) -> None:
         if not self._file.unchanged():
             raise ClipError("got another file than when it was opened, expected the same")
 
-    def _motion(self, view: int, ath: bytes, animations: list[dict]) -> dict[str, Any]:
-        """Clips begin when their animations' first keys do, and keep what these say in extras."""
-        said = {animation.get("name"): animation.get("extras") for animation in animations}
+    def _motion(self, view: int, ath: bytes, animations: list[dict[str, Any]]) -> dict[str, Any]:
+        """Return clips begin when their animations' first keys do, and keep what these say in extras."""
+        extras = {animation.get("name"): animation.get("extras") for animation in animations}
         clips = []
         with AthFile(io.BytesIO(ath)) as file:
             for clip, name, start in zip(file.clips, split(self.clip), self._placement.starts):
-                more = {"start": start, "extras": said.get(name)}
+                more = {"start": start, "extras": extras.get(name)}
                 clips.append({"name": clip.name} | {key: value for key, value in more.items() if value})
         clips = [clip for clip in clips if len(clip) > 1]
         named = {} if self._name is None else {"name": self._name}
@@ -159,7 +143,7 @@ class Into:
 
     # ---- meshes and nodes ----
 
-    def _replace_motion(self, binary: _Binary) -> None:
+    def _replace_motion(self, binary: Binary) -> None:
         gltf, moving = self._json, {node.index for node in self._nodes}
         bound = {}
         for index in sorted(moving):
@@ -188,14 +172,14 @@ class Into:
         self._needless = _needless_nodes(gltf, freed)
         _drop_channels(gltf, moving, meshes, self._needless)
 
-    def _replace_part(self, part: GltfNode, mesh: dict | None, binary: _Binary) -> None:
+    def _replace_part(self, part: GltfNode, mesh: dict[str, Any] | None, binary: Binary) -> None:
         primitives = part.primitives
         if mesh is not None:
             originals = self._json["meshes"][part.mesh]["primitives"]
             primitives = [
                 mesh["primitives"][number]
                 for number, one in enumerate(originals)
-                if any(one is own for own in primitives)
+                if any(one is reached for reached in primitives)
             ]
         faces = [self._faces(part, primitive) for primitive in primitives]
         attributes = self._attributes(part, binary)
@@ -216,22 +200,22 @@ class Into:
             primitive["attributes"] = kept | {
                 key: value for key, value in attributes.items() if key in kept or key == VERTEX_ATTRIBUTE
             }
-            said = {"motion": self._number} | (
+            content = {"motion": self._number} | (
                 {"firstVertex": part.first} if part.first and self._vertex is None else {}
             )
-            primitive.setdefault("extensions", {})[EXTENSION] = said
+            primitive.setdefault("extensions", {})[EXTENSION] = content
         shown = self._json["meshes"][part.mesh] if mesh is None else mesh
         self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
 
-    def _faces(self, part: GltfNode, primitive: dict) -> np.ndarray:
-        """The triangles of a primitive, (F, 3), as they are to face in the motion's space."""
+    def _faces(self, part: GltfNode, primitive: dict[str, Any]) -> np.ndarray:
+        """Return the triangles of a primitive, (F, 3), as they are to face in the motion's space."""
         rows = triangles(self._file, primitive, part.count)
         return rows[:, ::-1] if part.mirrored.any() and not self._keep else rows
 
     def _dress(
-        self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: _Binary
+        self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: Binary
     ) -> None:
-        """Gives primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
+        """Give primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
         if all("material" in primitive for primitive, _ in drawn):
             return
         faces = np.concatenate([rows for _, rows in drawn])
@@ -253,12 +237,12 @@ class Into:
             groups = by_material(rows, looks.labels[first - len(rows) : first])
             further = [copy.deepcopy(primitive) for _ in groups[1:]]
             siblings += further  # at the end, so that the others keep their places
-            for each, (label, own) in zip([primitive, *further], groups):
+            for each, (label, material) in zip([primitive, *further], groups):
                 each["material"] = self._material(looks.materials[label], has_colours)
-                each |= _drawn(binary, own) if further else {}
+                each |= _drawn(binary, material) if further else {}
 
     def _material(self, look: Look, has_colours: bool) -> int:
-        """The number of a material, which is added where the file has not got it."""
+        """Return the number of a material, which is added where the file has not got it."""
         materials, material = self._json.setdefault("materials", []), material_of(look, has_colours)
         if material not in materials:
             materials.append(material)
@@ -266,49 +250,49 @@ class Into:
             used += [] if UNLIT in used else [UNLIT]
         return materials.index(material)
 
-    def _attributes(self, part: GltfNode, binary: _Binary) -> dict[str, int]:
-        """The attributes of a part that change, as new accessors."""
-        found = {}
+    def _attributes(self, part: GltfNode, binary: Binary) -> dict[str, int]:
+        """Return the attributes of a part that change, as new accessors."""
+        accessors = {}
         rest = self.clip.source_rest[self._vertices(part)]
         positions = part.attributes["POSITION"]
         stored = self._file.array(positions)
         if stored.dtype != np.float32 or not np.array_equal(stored.view("<u4"), rest.view("<u4")):
-            found["POSITION"] = binary.attribute(rest, bounds=True)
+            accessors["POSITION"] = binary.attribute(rest, bounds=True)
             for key in ("NORMAL", "TANGENT"):
                 if key in part.attributes:
                     values = self._file.floats(part.attributes[key]).astype(np.float32)
                     values[:, :3] = self._placement.turned(part, values[:, :3], key == "NORMAL")
-                    found[key] = binary.attribute(values)
+                    accessors[key] = binary.attribute(values)
         if self._vertex is not None:
             dtype = np.uint16 if self.clip.vertex_count <= 1 << 16 else np.float32
-            found[VERTEX_ATTRIBUTE] = binary.attribute(self._vertices(part)[:, None].astype(dtype))
-        return found
+            accessors[VERTEX_ATTRIBUTE] = binary.attribute(self._vertices(part)[:, None].astype(dtype))
+        return accessors
 
     def _vertices(self, part: GltfNode) -> np.ndarray:
         return np.arange(part.first, part.first + part.count) if self._vertex is None else self._vertex[part.vertices]
 
     def _move_mesh(self, index: int) -> None:
-        """Its mesh to a node of its own, in the motion's space."""
+        """Move the mesh of a node to a new node, in the motion's space."""
         gltf, node = self._json, self._json["nodes"][index]
         matrix = self._placement.space
         if not self._placement.is_always_shown(index):
             self.lost.setdefault("visibility in time", []).append(node.get("name") or f"node {index}")
-        own = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
+        child = {"mesh": node.pop("mesh")} | ({"name": node["name"]} if "name" in node else {})
         if not np.array_equal(matrix, np.eye(4)):
-            own["matrix"] = matrix.T.ravel().tolist()
-        gltf["nodes"].append(own)
+            child["matrix"] = matrix.T.ravel().tolist()
+        gltf["nodes"].append(child)
         scene = gltf["scenes"][gltf.get("scene", 0)] if gltf.get("scenes") else None
         if scene is not None:
             scene.setdefault("nodes", []).append(len(gltf["nodes"]) - 1)
 
 
-def _drawn(binary: _Binary, faces: np.ndarray) -> dict[str, int]:
-    """The members of a primitive that draws these triangles, (F, 3)."""
+def _drawn(binary: Binary, faces: np.ndarray) -> dict[str, int]:
+    """Return the members of a primitive that draws these triangles, (F, 3)."""
     return {"indices": binary.array(faces.reshape(-1, 1).astype(np.uint32), INDICES), "mode": 4}
 
 
 def _named(clip: MotionClip) -> MotionClip:
-    """With the name of the animation where it is a single one."""
+    """Return the clip under the name of its animation if it has a single one."""
     played = clip.metadata.get("animations", [])
     if clip.clip_ranges[1:] or len(played) != 1:
         return clip
@@ -322,40 +306,40 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
     Raises ClipError where these are more than glTF can sensibly hold, OSError.
     """
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
-        gltf, used, binary, needless = file.json, _used(file.json), _Binary(file), set[int]()
+        gltf, used, binary, needless = file.json, used_numbers(file.json), Binary(file), set[int]()
         numbers = [view.decoder.file.source.number for view in views]
         places_of_views = [places_of(file, number) for number in numbers]
         for view, places in zip(views, places_of_views):
             check_morphs(view, sum(len(vertices) * (1 + _has_normals(primitive)) for primitive, vertices in places))
         for number, view, places in zip(numbers, views, places_of_views):
-            said = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
+            clips = {clip["name"]: clip for clip in gltf["extensions"][EXTENSION]["motions"][number].get("clips", ())}
             _add_targets(file, binary, places, view)
-            needless |= _morph_nodes(gltf, binary, places, view, said)
+            needless |= _morph_nodes(gltf, binary, places, view, clips)
             for primitive, _ in places:
                 _pop_extension(primitive)
         _remove_motions(gltf, set(numbers))
         if _knows_references(gltf):
-            _prune(gltf, used, needless)
+            prune(gltf, used, needless)
         data = binary.packed(gltf)
     with keeping(file_ids(path)), new_file(out) as written:
-        written.write(_glb(gltf, data))
+        written.write(glb_bytes(gltf, data))
 
 
-def _remove_motions(gltf: dict, numbers: set[int]) -> None:
+def _remove_motions(gltf: dict[str, Any], numbers: set[int]) -> None:
     """Motions of the file, and with the last of them the extension; primitives that others move name these anew."""
-    said = gltf["extensions"][EXTENSION]
-    kept = [number for number in range(len(said["motions"])) if number not in numbers]
+    extension = gltf["extensions"][EXTENSION]
+    kept = [number for number in range(len(extension["motions"])) if number not in numbers]
     if not kept:
         _pop_extension(gltf)
         gltf["extensionsUsed"].remove(EXTENSION)
         if not gltf["extensionsUsed"]:
             del gltf["extensionsUsed"]
         return
-    said["motions"] = [said["motions"][number] for number in kept]
+    extension["motions"] = [extension["motions"][number] for number in kept]
     for primitive in (primitive for mesh in gltf["meshes"] for primitive in mesh["primitives"]):
-        own = extension_of(primitive)
-        if own is not None:
-            own["motion"] = kept.index(own["motion"])
+        reference = extension_of(primitive)
+        if reference is not None:
+            reference["motion"] = kept.index(reference["motion"])
 
 
 def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
@@ -366,22 +350,22 @@ def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         motion = entries(extension_of(file.json) or {}, "motions")[number]
         _, start, _ = file.part(motion, "bufferView")
-        view, binary = file.json["bufferViews"][motion["bufferView"]], _Binary(file)
+        view, binary = file.json["bufferViews"][motion["bufferView"]], Binary(file)
         if view["buffer"] != 0 or "uri" in file.json["buffers"][0]:
             raise ClipError(f"{EXTENSION}: got a motion outside the GLB, expected it inside")
         view["byteLength"] = len(ath)
         binary.put(start, ath)
         data = binary.packed(file.json)
     with new_file(out) as written:
-        written.write(_glb(file.json, data))
+        written.write(glb_bytes(file.json, data))
         return written.tell()
 
 
-def _has_normals(primitive: dict) -> bool:
+def _has_normals(primitive: dict[str, Any]) -> bool:
     return NORMAL in primitive["attributes"]
 
 
-def _add_targets(file: GltfFile, binary: _Binary, places: list[GltfPlace], motion: ClipView) -> None:
+def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion: ClipView) -> None:
     """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
     gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
     normals, at_rest = MovingNormals(Surface(*(motion.polygons or ((), ())), rest), rest), {}
@@ -413,9 +397,9 @@ def _add_targets(file: GltfFile, binary: _Binary, places: list[GltfPlace], motio
 
 
 def _morph_nodes(
-    gltf: dict, binary: _Binary, places: list[GltfPlace], motion: ClipView, said: dict[str, dict]
+    gltf: dict[str, Any], binary: Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, dict]
 ) -> set[int]:
-    """Animates the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
+    """Animate the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
     them before goes. Returns the nodes that nothing needs any more."""
     moved = {id(primitive) for primitive, _ in places}
     moving = {
@@ -430,25 +414,27 @@ def _morph_nodes(
     _drop_channels(gltf, moving, {gltf["nodes"][index]["mesh"] for index in moving}, needless)
     weights = np.eye(motion.frame_count, dtype=np.float32)
     for take, clip_range in zip(takes(motion), motion.clip_ranges):
-        mine = said.get(clip_range.name, {})
-        times = (take.times + mine.get("start", 0.0)).astype(np.float32)
+        entry = stated.get(clip_range.name, {})
+        times = (take.times + entry.get("start", 0.0)).astype(np.float32)
         sampler = {"input": binary.array(times[:, None]), "output": binary.array(take.of(weights).reshape(-1, 1))}
-        _animate(gltf, take.name, take.extras | mine.get("extras", {}), sampler, sorted(moving))
+        _animate(gltf, take.name, take.extras | entry.get("extras", {}), sampler, sorted(moving))
     return needless
 
 
-def _animate(gltf: dict, name: str, extras: dict[str, Any], sampler: dict[str, int], nodes: list[int]) -> None:
+def _animate(
+    gltf: dict[str, Any], name: str, extras: dict[str, Any], sampler: dict[str, int], nodes: list[int]
+) -> None:
     every = gltf.setdefault("animations", [])
-    found = next((one for one in every if one.get("name") == name), None)
-    if found is None:
-        found = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
-        every.append(found)
-    found["samplers"].append(sampler)
-    number = len(found["samplers"]) - 1
-    found["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
+    animation = next((one for one in every if one.get("name") == name), None)
+    if animation is None:
+        animation = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
+        every.append(animation)
+    animation["samplers"].append(sampler)
+    number = len(animation["samplers"]) - 1
+    animation["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
 
 
-def _pop_extension(holder: dict) -> None:
+def _pop_extension(holder: dict[str, Any]) -> None:
     holder["extensions"].pop(EXTENSION)
     if not holder["extensions"]:
         del holder["extensions"]
@@ -480,7 +466,7 @@ def _few_twins(kind: np.ndarray) -> bool:
 
 
 def _kinds(kind: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """(N,) from 0 on, the same where `kind` and positions (N, 3) are."""
+    """Return (N,) from 0 on, the same where `kind` and positions (N, 3) are."""
     table = np.concatenate([kind[:, None], positions.astype(np.float32).view("<i4").astype(np.int64)], axis=1)
     rows = np.ascontiguousarray(table).view(f"V{table.dtype.itemsize * table.shape[1]}").ravel()
     return np.unique(rows, return_inverse=True)[1].ravel()
@@ -503,8 +489,8 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
     )
 
 
-def _drop_channels(gltf: dict, moving: set[int], meshes: set[int], needless: set[int]) -> None:
-    """Removes the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
+def _drop_channels(gltf: dict[str, Any], moving: set[int], meshes: set[int], needless: set[int]) -> None:
+    """Remove the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
 
     def stays(target: Target | str) -> bool:
         if isinstance(target, str):
@@ -533,16 +519,17 @@ def _drop_channels(gltf: dict, moving: set[int], meshes: set[int], needless: set
                     del gltf[key]
 
 
-def _has_pointer(channel: dict) -> bool:
+def _has_pointer(channel: dict[str, Any]) -> bool:
     return POINTER in (channel["target"].get("extensions") or {})
 
 
-def _knows_references(gltf: dict) -> bool:
-    """Whether _references lists every index of the file: not where pointers to places in it remain, which are text."""
+def _knows_references(gltf: dict[str, Any]) -> bool:
+    """Return whether _references lists every index of the file: not where pointers to places in it remain, which are
+    text."""
     return all(name.startswith(KNOWN) and name != POINTER for name in gltf.get("extensionsUsed", ()))
 
 
-def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
+def _needless_nodes(gltf: dict[str, Any], freed: set[int]) -> set[int]:
     """Return the nodes that moved vertices, those above and those below them, which show nothing, no skin uses, and
     nothing that stays is below."""
     nodes = gltf["nodes"]
@@ -564,186 +551,11 @@ def _needless_nodes(gltf: dict, freed: set[int]) -> set[int]:
 
 
 def _above(index: int, parent: dict[int, int]) -> list[int]:
-    found = []
+    nodes = []
     while index in parent:
         index = parent[index]
-        found.append(index)
-    return found
+        nodes.append(index)
+    return nodes
 
 
 # ---- what is needed no more ----
-
-
-def _references(gltf: dict) -> Iterator[Reference]:
-    """Every index of the file's arrays into each other, but those of meshes, animations and what these do not need."""
-    for scene in gltf.get("scenes", ()):
-        yield from _each("nodes", scene, "nodes")
-    for node in gltf.get("nodes", ()):
-        yield from _each("nodes", node, "children")
-        yield from _entry("skins", node, "skin")
-        if INSTANCES in (node.get("extensions") or {}):
-            yield from _all("accessors", node["extensions"][INSTANCES]["attributes"])
-    for skin in gltf.get("skins", ()):
-        yield from _each("nodes", skin, "joints")
-        yield from _entry("nodes", skin, "skeleton")
-        yield from _entry("accessors", skin, "inverseBindMatrices")
-    for animation in gltf.get("animations", ()):
-        for channel in animation["channels"]:
-            yield from _entry("nodes", channel["target"], "node")
-        for sampler in animation["samplers"]:
-            yield from _all("accessors", sampler, ("input", "output"))
-    for mesh in gltf.get("meshes", ()):
-        for primitive in mesh["primitives"]:
-            yield from _all("accessors", primitive["attributes"])
-            yield from _entry("accessors", primitive, "indices")
-            for target in primitive.get("targets", ()):
-                yield from _all("accessors", target)
-            if DRACO in (primitive.get("extensions") or {}):
-                yield from _entry("bufferViews", primitive["extensions"][DRACO], "bufferView")
-    for accessor in gltf.get("accessors", ()):
-        yield from _entry("bufferViews", accessor, "bufferView")
-        for part in ("indices", "values") if "sparse" in accessor else ():
-            yield from _entry("bufferViews", accessor["sparse"][part], "bufferView")
-    for image in gltf.get("images", ()):
-        yield from _entry("bufferViews", image, "bufferView")
-    for motion in (extension_of(gltf) or {}).get("motions", ()):
-        yield from _entry("bufferViews", motion, "bufferView")
-
-
-def _entry(kind: str, holder: dict, key: str) -> Iterator[Reference]:
-    """Yield the reference that an object holds under a key, if it has one."""
-    if key in holder:
-        yield kind, holder, key
-
-
-def _all(kind: str, holder: dict, keys: Any = None) -> Iterator[Reference]:
-    for key in list(holder) if keys is None else keys:
-        yield from _entry(kind, holder, key)
-
-
-def _each(kind: str, holder: dict, key: str) -> Iterator[Reference]:
-    for place in range(len(holder.get(key, ()))):
-        yield kind, holder[key], place
-
-
-def _used(gltf: dict) -> dict[str, set[int]]:
-    """Return which entries of each array are referred to."""
-    found: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
-    for kind, holder, key in _references(gltf):
-        found[kind].add(holder[key])
-    return found
-
-
-def _prune(gltf: dict, before: dict[str, set[int]], needless: set[int]) -> None:
-    """Removes these nodes, and what was referred to before and is no more."""
-    _remove(gltf, "skins", before["skins"] - _used(gltf)["skins"])
-    for holder, key in [(scene, "nodes") for scene in gltf.get("scenes", ())] + [
-        (node, "children") for node in gltf["nodes"]
-    ]:
-        if not needless.isdisjoint(holder.get(key, ())):
-            holder[key] = [node for node in holder[key] if node not in needless]
-            if not holder[key]:
-                del holder[key]
-    _remove(gltf, "nodes", needless)
-    for kind in ("accessors", "bufferViews"):
-        _remove(gltf, kind, before[kind] - _used(gltf)[kind])
-
-
-def _remove(gltf: dict, kind: str, dead: set[int]) -> None:
-    """Entries of an array, to which nothing that remains refers; the others get new numbers."""
-    if not dead:
-        return
-    place = np.cumsum([index not in dead for index in range(len(gltf[kind]))]) - 1
-    gltf[kind] = [item for index, item in enumerate(gltf[kind]) if index not in dead]
-    for kind_of, holder, key in _references(gltf):
-        if kind_of == kind:
-            holder[key] = int(place[holder[key]])
-    if not gltf[kind]:
-        del gltf[kind]
-
-
-class _Binary:
-    """The binary chunk: its bytes so far, and what is added."""
-
-    def __init__(self, file: GltfFile):
-        self._json, self._added = file.json, bytearray()
-        self._old = file.binary_chunk()
-        self._start = len(self._old) + -len(self._old) % 4
-        self._views_before = copy.deepcopy(self._json.get("bufferViews", []))
-
-    def add(self, data: bytes, **view: Any) -> int:
-        """A buffer view of these bytes."""
-        self._json.setdefault("bufferViews", []).append(
-            {"buffer": 0, "byteOffset": self._start + len(self._added), "byteLength": len(data)} | view
-        )
-        self._added += data + bytes(-len(data) % 4)
-        return len(self._json["bufferViews"]) - 1
-
-    def put(self, start: int, data: bytes) -> None:
-        """Replace as many bytes by these."""
-        self._old = self._old[:start] + data + self._old[start + len(data) :]
-
-    def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
-        """An accessor of (count, width) values of vertices, each padded to whole words."""
-        width, item = values.shape[1], values.itemsize * values.shape[1]
-        padded = np.zeros((len(values), item + -item % 4), np.uint8)
-        padded[:, :item] = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), item)
-        stride = {"byteStride": padded.shape[1]} if padded.shape[1] != item else {}
-        accessor = {
-            "bufferView": self.add(padded.tobytes(), target=VERTICES, **stride),
-            "componentType": COMPONENTS[values.dtype.name],
-            "count": len(values),
-            "type": TYPES[width],
-        }
-        if bounds:
-            accessor |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        self._json.setdefault("accessors", []).append(accessor)
-        return len(self._json["accessors"]) - 1
-
-    def array(self, values: np.ndarray, target: int | None = None) -> int:
-        """An accessor of (count, 1) numbers without gaps, with its bounds."""
-        index = self.attribute(values, bounds=True)
-        view = self._json["bufferViews"][self._json["accessors"][index]["bufferView"]]
-        del view["target"]
-        view |= {} if target is None else {"target": target}
-        return index
-
-    def packed(self, gltf: dict) -> bytes:
-        """The bytes without those that only views had which are gone; the views' offsets become those in it."""
-        data = bytes(self._old).ljust(self._start, b"\0") + bytes(self._added)
-        needless = np.zeros(len(data) + 1, bool)
-        for holder in _byte_ranges(self._views_before):
-            needless[holder.get("byteOffset", 0) :][: holder["byteLength"]] = True
-        kept = list(_byte_ranges(gltf["bufferViews"]))
-        for holder in kept:
-            needless[holder.get("byteOffset", 0) :][: holder["byteLength"]] = False
-        edges = np.flatnonzero(np.diff(needless, prepend=False)).reshape(-1, 2)
-        starts, stops = edges[:, 0] + -edges[:, 0] % ALIGNMENT, edges[:, 1] // ALIGNMENT * ALIGNMENT
-        gaps = [(start, stop) for start, stop in zip(starts.tolist(), stops.tolist()) if stop > start]
-        ends, gone = np.array([stop for _, stop in gaps]), np.cumsum([0] + [stop - start for start, stop in gaps])
-        for holder in kept:
-            offset = holder.get("byteOffset", 0)
-            if offset or gaps:
-                holder["byteOffset"] = int(offset - gone[np.searchsorted(ends, offset, "right")])
-        pieces = zip([0] + [stop for _, stop in gaps], [start for start, _ in gaps] + [len(data)])
-        return b"".join(data[start:stop] for start, stop in pieces)
-
-
-def _byte_ranges(views: list[dict]) -> Iterator[dict]:
-    """Return the entries with byteOffset and byteLength in the binary chunk: views, and what decompresses to them."""
-    for view in views:
-        for holder in (view, *((view.get("extensions") or {}).get(name) for name in MESHOPT)):
-            if holder is not None and holder["buffer"] == 0:
-                yield holder
-
-
-def _glb(gltf: dict, data: bytes) -> bytes:
-    gltf.setdefault("buffers", [{}])[0]["byteLength"] = len(data)
-    data = data + bytes(-len(data) % 4)
-    text = json.dumps(gltf, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()
-    text += b" " * (-len(text) % 4)
-    size = 28 + len(text) + len(data)
-    if size >= 1 << 32:
-        raise ClipError(f"GLB: got {size} bytes, expected less than 4 GiB")
-    head = struct.pack("<4sII", MAGIC, 2, size) + struct.pack("<II", len(text), 0x4E4F534A)
-    return head + text + struct.pack("<II", len(data), 0x004E4942) + data

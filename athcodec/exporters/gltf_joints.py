@@ -39,19 +39,19 @@ class Joints:
     names: tuple[str, ...] = ()
 
     def pose(self, rest: np.ndarray, frame: int) -> np.ndarray:
-        """(N, 3) float64: where an engine puts vertices whose rest pose (N, 3) is that of the file."""
-        own = self.vertex_joint
-        bind = self.bind.astype(np.float64)[own]
+        """Return (N, 3) float64: where an engine puts vertices whose rest pose (N, 3) is that of the file."""
+        joint = self.vertex_joint
+        bind = self.bind.astype(np.float64)[joint]
         local = np.einsum("nij,nj->ni", bind[:, :3, :3], rest) + bind[:, :3, 3]
         translation, rotation, scale = (pose[frame].astype(np.float64) for pose in self.poses)
         matrices = rotation_matrices(rotation) * scale[:, None, :]
-        return np.einsum("nij,nj->ni", matrices[own], local) + translation[own]
+        return np.einsum("nij,nj->ni", matrices[joint], local) + translation[joint]
 
 
 def fit_joints(
     motion: Motion, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Joints | None:
-    """Joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
+    """Return joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
     vertices that they are to move, all by default."""
     fitted = (1 - 4 * SLACK) * allowed  # `hold` takes up to 3 of these SLACKs, rounding some of the fourth.
     moving = fit(motion, Placed, fitted, most, lambda done: report(0.7 * done), chosen)
@@ -88,7 +88,7 @@ def _measured(motion: Motion, joints: Joints, chosen: np.ndarray | None, report:
 
 
 def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.ndarray, slack: float) -> None:
-    """Makes constant, as in the first frame or better as at rest, what moves no vertex by `slack`: of translations,
+    """Make constant, as in the first frame or better as at rest, what moves no vertex by `slack`: of translations,
     rotations and scales (T, K, width), those at rest (K, width), and how far vertices go along the axes (K, 3)."""
     scaled = extent * np.abs(poses[2]).max(axis=0)
     around = np.sqrt((scaled**2).sum(axis=1, keepdims=True) - scaled**2)  # from each axis
@@ -104,7 +104,7 @@ def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.nd
 
 
 def _turns(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Angles about a part's own axes, (T, K, 3), at most, between quaternions (K, 4) and (T, K, 4)."""
+    """Return angles about a part's own axes, (T, K, 3), at most, between quaternions (K, 4) and (T, K, 4)."""
     turn = (
         before[..., 3:] * after[..., :3] - after[..., 3:] * before[..., :3] - np.cross(before[..., :3], after[..., :3])
     )

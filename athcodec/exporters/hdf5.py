@@ -93,7 +93,8 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._pending: PendingFile | None = PendingFile(path)
-        self._file, self._sink = None, Sink(self._pending.descriptor, self._pending.path)
+        self._file: Any = None  # An h5py.File, which has no types.
+        self._sink = Sink(self._pending.descriptor, self._pending.path)
         try:
             self._file = h5py.File(self._sink, "w")
             self._positions = self._create_positions(dtype)
@@ -227,13 +228,13 @@ class Sink:
         self._error: BaseException | None = None
 
     def check(self) -> None:
-        """Raises the first error met; an OSError with the name of the file."""
+        """Raise the first error met; an OSError with the name of the file."""
         if isinstance(self._error, OSError):
             raise OSError(self._error.errno, self._error.strerror, self._path)
         if self._error is not None:
             raise self._error
 
-    def write(self, data) -> int:
+    def write(self, data: Any) -> int:
         data = memoryview(data).cast("B")
         done = 0
         while done < len(data) and self._error is None:
@@ -241,7 +242,7 @@ class Sink:
                 done += self._file.write(data[done:])
         return len(data)
 
-    def readinto(self, buffer) -> int:
+    def readinto(self, buffer: Any) -> int:
         view, done = memoryview(buffer).cast("B"), 0
         while done < len(view) and self._error is None:
             with self._noting():
@@ -278,9 +279,9 @@ class Sink:
 
 
 def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:
-    taken = RESERVED_NAMES.intersection(attributes or {})
-    if taken:
-        raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    clashing = RESERVED_NAMES.intersection(attributes or {})
+    if clashing:
+        raise ClipError(f"attributes: got the name {min(clashing)!r}, expected one that the schema does not use")
     return dict(attributes or {})
 
 

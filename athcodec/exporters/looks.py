@@ -63,7 +63,8 @@ class Looks:
 
 def looks_of(motion: Motion, objects: list[SceneObject]) -> Looks:
     """Return what the faces of a motion look like, which are those of its objects."""
-    surface = Surface(*(motion.polygons or ((), ())), motion.rest)
+    counts, corners = motion.polygons or (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    surface = Surface(counts, corners, motion.rest)
     stated = [(obj.name, obj.face_rows, is_double_sided(obj.details)) for obj in objects]
     return _looks(surface, *_named(motion), stated)
 
@@ -86,7 +87,9 @@ def _looks(surface: Surface, labels: np.ndarray, names: list[str], objects: list
     is_nameless = labels < 0
     used, place = np.unique((2 * kinds + states_sides)[is_nameless], return_inverse=True)
     labels[is_nameless] = len(names) + place.ravel()
-    every = [(name, kind_of(name) or _commonest(kinds[labels == i]), ()) for i, name in enumerate(names)]
+    every: list[tuple[str, str, tuple[str, ...]]] = [
+        (name, kind_of(name) or _commonest(kinds[labels == i]), ()) for i, name in enumerate(names)
+    ]
     every += [(KINDS[code // 2], KINDS[code // 2], ("name",)) for code in used.tolist()]
     materials = []
     for i, (name, kind, guessed) in enumerate(every):
@@ -104,7 +107,7 @@ def line_look(name: str) -> Look:
 
 def kind_of(name: str) -> str | None:
     """Return the kind that a name means by its last telling word, which is the noun: "flower_stalk", "leafy_tree"."""
-    words = [str(found.lastgroup) for found in WORDS.finditer(name)]
+    words = [str(match.lastgroup) for match in WORDS.finditer(name)]
     return words[-1] if words and words[-1] in COLOURS else None
 
 
@@ -113,14 +116,15 @@ def _commonest(kinds: np.ndarray) -> str:
 
 
 def _named(motion: Motion) -> tuple[np.ndarray, list[str]]:
-    """(F,) the material of each face among the names of the clip's materials, -1 for none; and these names."""
+    """Return (F,) the material of each face among the names of the clip's materials, -1 for none; and these names."""
     count = 0 if motion.polygons is None else len(motion.polygons[0])
     labels, names = face_materials(motion) or _surfaces(motion) or (np.full(count, -1), [])
     return np.where(labels < len(names), np.maximum(labels, -1), -1), names
 
 
 def _surfaces(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
-    """Stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above 1."""
+    """Return stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above
+    1."""
     stated, uv = motion.metadata.get("surfaces"), motion.attributes.get("uv")
     names = stated.split(", ") if isinstance(stated, str) else []
     is_known = len(names) == 2 and names[0] in STEM_SURFACES and names[1] in LEAF_SURFACES

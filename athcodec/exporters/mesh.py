@@ -35,18 +35,18 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 def domain_of(motion: Motion, name: str) -> str:
     """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
     domains = motion.metadata.get("domains")
-    said = domains.get(name) if isinstance(domains, dict) else None
+    domain = domains.get(name) if isinstance(domains, dict) else None
     values = motion.attributes[name]
-    return said or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
+    return domain or ("vertex" if values.ndim and len(values) == motion.vertex_count else "")
 
 
 def has_mesh(motion: Motion) -> bool:
-    """Whether there are faces or edges to write."""
+    """Return whether there are faces or edges to write."""
     return _count_polygons(motion) > 0 or (motion.edges is not None and len(motion.edges) > 0)
 
 
 def part_spans(motion: Motion) -> list[tuple[str, int, int]]:
-    """(name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
+    """Return (name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     whole = isinstance(names, list) and counts is not None and len(counts) == len(names)
     if not whole or int(np.sum(counts)) != motion.vertex_count or np.min(counts, initial=0) < 0:
@@ -65,7 +65,7 @@ def _count_polygons(motion: Motion) -> int:
 
 
 def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
-    """Texture coordinates of two numbers, and whether they are per corner; None: there are none."""
+    """Return texture coordinates of two numbers, and whether they are per corner; None if there are none."""
     uv = motion.attributes.get("uv")
     if uv is None or uv.ndim != 2 or uv.shape[1] != 2 or uv.dtype.kind != "f":
         return None, False
@@ -76,7 +76,7 @@ def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
 
 
 def _has_obj_colors(motion: Motion) -> bool:
-    """Whether a clip has colours as OBJ has them: three floats for each vertex."""
+    """Return whether a clip has colours as OBJ has them: three floats for each vertex."""
     colors = motion.attributes.get("colors")
     fits = colors is not None and colors.shape == (motion.vertex_count, 3) and colors.dtype.kind == "f"
     return fits and domain_of(motion, "colors") == "vertex"
@@ -117,7 +117,7 @@ class ObjWriter:
 
 
 def _obj_tail(motion: Motion) -> list[str]:
-    """All lines behind those of v."""
+    """Return all lines behind those of v."""
     uv, per_corner = _corner_uv(motion)
     lines = [] if uv is None else [f"vt {u:.9g} {v:.9g}\n" for u, v in uv.tolist()]
     faces = _obj_faces(motion, uv is not None, per_corner)
@@ -131,11 +131,11 @@ def _obj_tail(motion: Motion) -> list[str]:
         return [*lines, *faces, *edges]
     for number, (name, start, stop) in enumerate(spans):
         lines.append(f"o {name}\n")
-        mine = [
+        elements = [
             *(faces[slice(*np.searchsorted(face_parts, [number, number + 1]))]),
             *(edges[slice(*np.searchsorted(edge_parts, [number, number + 1]))]),
         ]
-        lines += mine or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
+        lines += elements or [f"p {' '.join(map(str, range(start + 1, stop + 1)))}\n"] * (stop > start)
     return lines
 
 
@@ -148,13 +148,13 @@ def _first_corners(motion: Motion) -> np.ndarray | None:
 
 
 def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | None:
-    """The part of each vertex; None where they do not come in the order of the parts."""
+    """Return the part of each vertex; None where they do not come in the order of the parts."""
     parts = np.searchsorted(stops, [] if vertices is None else vertices, side="right")
     return parts if (np.diff(parts) >= 0).all() else None
 
 
 def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
-    """A line per face, behind the lines of the group and the material that it is the first of."""
+    """Return a line per face, behind the lines of the group and the material that it is the first of."""
     if not _count_polygons(motion):
         return []
     counts, corners = motion.polygons
@@ -199,7 +199,7 @@ class PlyWriter:
         lines = [
             "ply",
             "format binary_little_endian 1.0",
-            f"comment {OWN} {json.dumps(_ply_said(motion))}",
+            f"comment {OWN} {json.dumps(_ply_scene(motion))}",
             f"element vertex {motion.vertex_count}",
             *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
             *face_header,
@@ -217,7 +217,7 @@ class PlyWriter:
 
 
 def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
-    """The numbers that every vertex has beside its position, one column each."""
+    """Return the numbers that every vertex has beside its position, one column each."""
     columns: dict[str, np.ndarray] = {}
     for name, values in motion.attributes.items():
         if domain_of(motion, name) != "vertex" or len(values) != motion.vertex_count or name == "normals":
@@ -235,14 +235,15 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
     return columns
 
 
-def _ply_said(motion: Motion) -> dict[str, Any]:
-    """With the material of each face, as runs: a property of faces beside their corners stops meshio."""
-    said = names_and_scene(motion)
+def _ply_scene(motion: Motion) -> dict[str, Any]:
+    """Return what the comment of a PLY file holds. Materials of faces are runs: meshio does not read a property of
+    faces beside their corners."""
+    scene = names_and_scene(motion)
     if face_materials(motion) is not None:
         labels = motion.attributes[FACE_MATERIAL]
         starts = np.flatnonzero(np.diff(labels, prepend=labels[:1] - 1))
-        said[FACE_MATERIAL] = np.stack([labels[starts], np.diff(starts, append=len(labels))], axis=1).tolist()
-    return said
+        scene[FACE_MATERIAL] = np.stack([labels[starts], np.diff(starts, append=len(labels))], axis=1).tolist()
+    return scene
 
 
 def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
@@ -266,7 +267,7 @@ def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
 
 
 def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:
-    """Faces of `size` corners each."""
+    """Return faces of `size` corners each."""
     fields = [("count", number), ("corners", "<i4", (size,))]
     if uv is not None:
         fields += [("numbers", number), ("uv", "<f4", (2 * size,))]

@@ -54,9 +54,9 @@ def _write_positions(motion: Motion, member: Any, report: Progress) -> None:
 
 
 def _arrays(motion: Motion) -> dict[str, np.ndarray]:
-    taken = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
-    if taken:
-        raise ClipError(f"attributes: got the name {min(taken)!r}, expected one that the schema does not use")
+    clashing = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
+    if clashing:
+        raise ClipError(f"attributes: got the name {min(clashing)!r}, expected one that the schema does not use")
     for name in motion.attributes:
         if name.startswith(("/", "\\")) or ":" in name or not {"", ".", ".."}.isdisjoint(re.split(r"[/\\]", name)):
             raise ClipError(f"attributes: got the name {name[:80]!r}, expected one that leads to no other folder")

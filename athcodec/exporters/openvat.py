@@ -56,7 +56,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def _texels(motion: Motion, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Column, and row in the first frame, of each vertex."""
+    """Return column, and row in the first frame, of each vertex."""
     vertices = np.arange(motion.vertex_count)
     return vertices % width, vertices // width * motion.frame_count
 
@@ -64,7 +64,8 @@ def _texels(motion: Motion, width: int) -> tuple[np.ndarray, np.ndarray]:
 def _texture(
     motion: Motion, size: tuple[int, int], half: bool, report: Progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """The pixels, the least and the largest offset, and the largest distance of what they show from the motion."""
+    """Return the pixels, the least and the largest offset, and the largest distance of what they show from the
+    motion."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     low, high = _offset_bounds(motion, rest, lambda done: report(0.4 * done))
     pixels = np.zeros((size[1], size[0], 3), np.uint16 if half else np.float32)
@@ -82,7 +83,7 @@ def _texture(
 
 
 def _size(vertices: int, frames: int) -> tuple[int, int]:
-    """Width and height, powers of two of the smallest area, of those the squarest. Raises ClipError."""
+    """Return width and height, powers of two of the smallest area, of those the squarest. Raises ClipError."""
     sizes = []
     for width in (1 << i for i in range(NARROWEST.bit_length() - 1, WIDEST.bit_length())):
         rows = -(-vertices // width) * frames

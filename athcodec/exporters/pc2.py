@@ -45,7 +45,7 @@ def _counted(motion: Motion, start: float, step: float) -> tuple[int, float, flo
 
 
 def check_counts(motion: Motion) -> None:
-    """ClipError where a motion has more frames or vertices than a cache can count."""
+    """Raise ClipError if a motion has more frames or vertices than a cache can count."""
     if max(motion.vertex_count, motion.frame_count) > LARGEST_COUNT:
         raise ClipError(f"got {motion.frame_count} frames of {motion.vertex_count} vertices, expected fewer than 2^31")
 
@@ -85,16 +85,16 @@ def _write_frames(motion: Motion, file: BinaryIO, dtype: str, report: Progress) 
 
 
 def _mesh_to_write(motion: Motion, target: Path) -> str:
-    """The name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
+    """Return the name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
     if not has_mesh(motion):
         return ""
     mesh_path = target.with_suffix(".obj")
     if not mesh_path.exists():
         return mesh_path.name
-    mine = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
+    topology = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
     different = "got no OBJ mesh"
     with suppress(ClipError):
-        different = mine.same_topology(read_mesh(mesh_path, Budget()))
+        different = topology.same_topology(read_mesh(mesh_path, Budget()))
     if different:
         raise ClipError(
             f"{fspath(mesh_path)}: {different} as in the clip; remove this file or choose another name: "

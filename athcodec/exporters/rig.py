@@ -53,7 +53,7 @@ class _Parts:
 
     @classmethod
     def whole(cls, hierarchy: Hierarchy) -> _Parts:
-        """A single run of all."""
+        """Return a single run of all."""
         return cls(np.zeros(1, np.int64), np.array([len(hierarchy.first_vertex)]), np.zeros(1, np.int64))
 
     @property
@@ -61,8 +61,8 @@ class _Parts:
         return int(np.maximum(self.chain, 1).sum())
 
     def finer(self, hierarchy: Hierarchy, off: np.ndarray, allowed: float, most: int) -> _Parts:
-        """The worst of them cut in two, or of longer chains: a run of subtrees between two of them, a subtree into its
-        stem and what hangs on that. off (K,): how far off each is. The same where nothing is to be done."""
+        """Return the worst of them cut in two, or of longer chains: a run of subtrees between two of them, a subtree
+        into its stem and what hangs on that. off (K,): how far off each is. The same where nothing is to be done."""
         rows: list[list[tuple[int, int, int]]] = [
             [part] for part in zip(self.branch.tolist(), self.stop.tolist(), self.chain.tolist())
         ]
@@ -95,7 +95,8 @@ def _cut(
 
 
 def fit_rig(motion: Motion, most: int = RIG_JOINTS, report: Progress = lambda done: None) -> Joints:
-    """The joints of a motion, `most` at most beside the root. A clip without branches gets those that are found."""
+    """Return the joints of a motion, `most` at most beside the root. A clip without branches gets those that are
+    found."""
     hierarchy = hierarchy_to_rig(motion)
     order = hierarchy.vertex_source
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)[order]
@@ -114,14 +115,15 @@ def fit_rig(motion: Motion, most: int = RIG_JOINTS, report: Progress = lambda do
 
 
 def hierarchy_to_rig(motion: Motion) -> Hierarchy:
-    """The branches of a motion, or those that are found where it has none."""
+    """Return the branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
         return motion.decoder.file.hierarchy
     return hierarchy_of(motion if motion.has_branches else with_branches(motion, find_branches(motion)))
 
 
 def _along(points: np.ndarray) -> np.ndarray:
-    """(n,) from 0 to 1: how far points that run from base to tip, as rings of a tube do, lie along its centre line."""
+    """Return (n,) from 0 to 1: how far points that run from base to tip, as rings of a tube do, lie along its centre
+    line."""
     bins = min(BINS, len(points))
     of = np.arange(len(points)) * bins // len(points)
     count = np.bincount(of, minlength=bins)
@@ -129,9 +131,9 @@ def _along(points: np.ndarray) -> np.ndarray:
     way = np.gradient(middle, axis=0) if bins > 1 else np.zeros((1, 3))
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-30)
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1)))
-    found = length[of] + ((points - middle[of]) * way[of]).sum(axis=1)
-    low, high = found.min(), found.max()
-    return (found - low) / (high - low) if high > low else np.zeros(len(points))
+    along = length[of] + ((points - middle[of]) * way[of]).sum(axis=1)
+    low, high = along.min(), along.max()
+    return (along - low) / (high - low) if high > low else np.zeros(len(points))
 
 
 class _Bones:
@@ -164,8 +166,8 @@ class _Bones:
         self._sides = [self._side(side) for side in range(2)]
 
     def _side(self, side: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The vertices that joints of even or odd place move, joint after joint; where each joint begins; which they
-        are."""
+        """Return the vertices that joints of even or odd place move, joint after joint; where each joint begins; which
+        they are."""
         used = np.flatnonzero(self.weight[:, side] > 0)
         rows = used[np.argsort(self.bone[used, side], kind="stable")]
         bones, starts = np.unique(self.bone[rows, side], return_index=True)
@@ -188,12 +190,12 @@ class _Bones:
         return out
 
     def parents(self) -> np.ndarray:
-        """(J,) the joint that each hangs on, -1 for the root."""
-        found = np.arange(self.count) - 1
+        """Return (J,) the joint that each hangs on, -1 for the root."""
+        parent = np.arange(self.count) - 1
         attach = self._attach
         strongest = self.bone[np.arange(len(self.bone)), self.weight.argmax(axis=1)]
-        found[self.first] = np.where(attach >= 0, strongest[attach], -1)
-        return found
+        parent[self.first] = np.where(attach >= 0, strongest[attach], -1)
+        return parent
 
     def fitted(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that they
@@ -209,7 +211,7 @@ class _Bones:
         return turn, shift, np.sqrt((off**2).sum(axis=2).max(axis=0))
 
     def _moved(self, side: int, turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
-        """(T, N, 3) what joints of even or odd place add to the vertices."""
+        """Return (T, N, 3) what joints of even or odd place add to the vertices."""
         bone = self.bone[:, side]
         placed = np.einsum("tnij,nj->tni", turn[:, bone], self.rest) + shift[:, bone]
         return placed * self.weight[:, side, None]
@@ -230,13 +232,14 @@ class _Bones:
         products = wanted[:, :, :, None] * local[:, None, :]
         cross = np.add.reduceat(products, starts, axis=1)
         held = HELD * np.add.reduceat((local**2).sum(axis=1), starts)[:, None, None] * np.eye(3) + 1e-30 * np.eye(3)
-        found = nearest_rotations(cross + held)
-        turn[:, bones] = found
-        shift[:, bones] = aim - np.einsum("tkij,kj->tki", found, middle)
+        rotations = nearest_rotations(cross + held)
+        turn[:, bones] = rotations
+        shift[:, bones] = aim - np.einsum("tkij,kj->tki", rotations, middle)
 
 
 def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
-    """The joints in all frames, each in the space of the one above, and how far off they are as they are written."""
+    """Return the joints in all frames, each in the space of the one above, and how far off they are as they are
+    written."""
     places, parents = bones.joints, np.append(-1, bones.parents() + 1)
     rest = np.concatenate([np.zeros((1, 3)), places])
     turns = np.zeros((motion.frame_count, len(rest), 4), np.float32)
@@ -283,7 +286,7 @@ def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -
 def _off(
     bones: _Bones, parents: np.ndarray, places: np.ndarray, turns: np.ndarray, shifts: np.ndarray, target: np.ndarray
 ) -> float:
-    """The largest distance of vertices that joints move, as an engine has them, from where they are to be."""
+    """Return the largest distance of vertices that joints move, as an engine has them, from where they are to be."""
     local, at = rotation_matrices(turns.astype(np.float64)), shifts.astype(np.float64)
     for joint in range(1, len(parents)):  # Parents precede their children.
         above = parents[joint]
@@ -292,8 +295,8 @@ def _off(
     shift = at[:, 1:] - np.einsum("tkij,kj->tki", local[:, 1:], places)
     weight = bones.weight.astype(np.float32).astype(np.float64)
     moved = sum(
-        (np.einsum("tnij,nj->tni", local[:, 1:][:, bone], bones.rest) + shift[:, bone]) * own[:, None]
-        for bone, own in zip(bones.bone.T, weight.T)
+        (np.einsum("tnij,nj->tni", local[:, 1:][:, bone], bones.rest) + shift[:, bone]) * share[:, None]
+        for bone, share in zip(bones.bone.T, weight.T)
     )
     return float(np.sqrt(((moved - target) ** 2).sum(axis=2).max()))
 

@@ -92,7 +92,7 @@ def _is_loop(motion: Any) -> bool:
 
 
 def _frame_time(motion: Any) -> float:
-    """The mean time of a frame in seconds, after which the first frame of a loop follows its last."""
+    """Return the mean time of a frame in seconds, after which the first frame of a loop follows its last."""
     return float(motion.time[-1] - motion.time[0]) / (motion.frame_count - 1)
 
 
@@ -137,10 +137,10 @@ def _with_velocities(
 
     def slope(frame: int, before: np.ndarray, here: np.ndarray) -> np.ndarray:
         """Return the velocities between a frame and the one before, NaN where an object appears or vanishes."""
-        found = (here.astype(np.float64) - before) / steps[frame]
+        velocity = (here.astype(np.float64) - before) / steps[frame]
         if (joined := presence.joined(frame - 1, frame)) is not None:
-            found[~joined] = np.nan
-        return found
+            velocity[~joined] = np.nan
+        return velocity
 
     _, here = next(frames)
     first = slope(0, motion.block(last, last + 1)[0], here)  # It is NaN unless the clip is a loop.
@@ -164,16 +164,16 @@ def velocities_of_copies(
     steps = _steps(motion)[:, None, None]
     shown = np.ones((len(places), 1), bool) if shown is None else shown
     joined = (shown == np.roll(shown, 1, axis=0))[..., None]
-    found = []
+    velocities = []
     for ways in (places - np.roll(places, 1, axis=0), _turned(np.roll(turns, 1, axis=0), turns)):
         arriving = np.where(joined, ways, np.nan) / steps
-        found.append(_velocity(arriving, np.roll(arriving, -1, axis=0), steps, np.roll(steps, -1, axis=0)))
-    return found[0], found[1]
+        velocities.append(_velocity(arriving, np.roll(arriving, -1, axis=0), steps, np.roll(steps, -1, axis=0)))
+    return velocities[0], velocities[1]
 
 
 def _steps(motion: Any) -> np.ndarray:
-    """(T,) the seconds that each frame follows the one before; of the first frame those that it follows the last one of
-    a loop, else NaN."""
+    """Return (T,) the seconds that each frame follows the one before; of the first frame those that it follows the last
+    one of a loop, else NaN."""
     return np.append(_frame_time(motion) if _is_loop(motion) else np.nan, np.diff(motion.time))
 
 

@@ -50,7 +50,7 @@ class SceneObject:
 
 
 def objects_of(motion: Motion) -> list[SceneObject]:
-    """The objects of a motion, in the order of their vertices; one of all where it does not say."""
+    """Return the objects of a motion, in the order of their vertices; one of all where it does not say."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     face_indices = np.asarray(face_indices, np.int64)
@@ -97,11 +97,13 @@ def lost_arrays(motion: Motion, kept: Collection[str]) -> dict[str, dict[str, li
 
 
 def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
-    """The names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
+    """Return the names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
-    presence = dict.fromkeys(name for own in every if isinstance(own, dict) for name in stated_presence(own))
+    presence = dict.fromkeys(
+        name for entries in every if isinstance(entries, dict) for name in stated_presence(entries)
+    )
     names, details = metadata.get("part_names"), metadata.get("part_usd")
     pairs = list(zip(names, details)) if isinstance(names, list) and isinstance(details, list) else []
     lost = {"doubleSided": [name for name, detail in pairs if is_double_sided(detail)]}
@@ -111,39 +113,39 @@ def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
 
 
 def is_double_sided(details: Any) -> bool:
-    """Whether the faces of an object with such details in "part_usd" are seen from both sides."""
+    """Return whether the faces of an object with such details in "part_usd" are seen from both sides."""
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
 def stated_names(motion: Motion) -> dict[str, Any]:
     """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
-    and copies, and the names of materials. sources.scene_objects.scene_said reads it back."""
-    found: dict[str, Any] = {}
+    and copies, and the names of materials. sources.scene_objects.scene_fields reads it back."""
+    stated: dict[str, Any] = {}
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
         copies, kinds = motion.attributes.get("part_copies"), motion.metadata.get("part_kinds")
-        found["objects"] = {"names": names, "vertices": counts.tolist()}
-        found["objects"] |= {"kinds": kinds} if isinstance(kinds, list) else {}
-        found["objects"] |= {"copies": copies.tolist()} if copies is not None else {}
+        stated["objects"] = {"names": names, "vertices": counts.tolist()}
+        stated["objects"] |= {"kinds": kinds} if isinstance(kinds, list) else {}
+        stated["objects"] |= {"copies": copies.tolist()} if copies is not None else {}
     if face_materials(motion) is not None:
-        found[MATERIAL_NAMES] = motion.metadata[MATERIAL_NAMES]
-    return found
+        stated[MATERIAL_NAMES] = motion.metadata[MATERIAL_NAMES]
+    return stated
 
 
 def names_and_scene(motion: Motion) -> dict[str, Any]:
     """Return `stated_names`, and with them unit, up axis and frame rate."""
-    given = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
-    return {key: SCENE_KEYS[key](value) for key, value in given.items()} | stated_names(motion)
+    scene = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
+    return {key: SCENE_KEYS[key](value) for key, value in scene.items()} | stated_names(motion)
 
 
 def _copies(motion: Motion, object_count: int) -> list[int]:
-    found = motion.attributes.get("part_copies")
-    usable = found is not None and found.shape == (object_count,) and found.dtype.kind in "iu"
-    return found.tolist() if usable else [1] * object_count
+    copies = motion.attributes.get("part_copies")
+    usable = copies is not None and copies.shape == (object_count,) and copies.dtype.kind in "iu"
+    return copies.tolist() if usable else [1] * object_count
 
 
 def _repeats(obj: SceneObject, copies: int) -> bool:
-    """Whether vertices, faces and curves are those of the first copy again and again."""
+    """Return whether vertices, faces and curves are those of the first copy again and again."""
     counts, indices = obj.faces
     if obj.count % copies or len(counts) % copies or len(indices) % copies or len(obj.curves) % copies:
         return False
@@ -155,7 +157,7 @@ def _repeats(obj: SceneObject, copies: int) -> bool:
 
 
 def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
+    """Return (F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
     counts = np.diff(corners)
     of_corner = np.searchsorted(ends, indices, "right")
     faces = np.repeat(np.arange(len(counts)), counts)
@@ -167,7 +169,8 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
 
 
 def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
-    """Names, vertices, kinds and further details of the objects: what the clip says where that fits, else one."""
+    """Return names, vertices, kinds and further details of the objects: what the clip says where that fits, else
+    one."""
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
@@ -190,7 +193,7 @@ def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[di
 
 
 def _fits(motion: Motion, counts: np.ndarray) -> bool:
-    """Whether every face is of one object, and the faces are in the order of the objects."""
+    """Return whether every face is of one object, and the faces are in the order of the objects."""
     if motion.polygons is None:
         return True
     face_counts, indices = motion.polygons
@@ -214,11 +217,12 @@ def _kind(motion: Motion, counts: np.ndarray, index: int) -> str:
 
 
 def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
-    """Vertices per curve where runs of vertices that are neighbours in the numbering and joined by edges make curves
-    of two and more, else None. Further edges, where a branch begins at its parent, are not seen in the curves."""
-    own = np.asarray(edges, np.int64)
-    own = own[(own >= start).all(axis=1) & (own < stop).all(axis=1)]
-    neighbours = own[np.abs(np.diff(own, axis=1)[:, 0]) == 1]
+    """Return vertices per curve where runs of vertices that are neighbours in the numbering and joined by edges make
+    curves of two and more, else None. Further edges, where a branch begins at its parent, are not seen in the
+    curves."""
+    links = np.asarray(edges, np.int64)
+    links = links[(links >= start).all(axis=1) & (links < stop).all(axis=1)]
+    neighbours = links[np.abs(np.diff(links, axis=1)[:, 0]) == 1]
     joined = np.zeros(stop - start, bool)
     joined[neighbours.max(axis=1) - start] = True
     counts = np.diff(np.append(np.flatnonzero(~joined), stop - start))
@@ -226,19 +230,19 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
 
 
 def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
-    """For each object its vertices per curve, empty where it is none."""
-    said = motion.attributes.get("curve_vertex_counts")
+    """Yield the vertices per curve of each object, empty for an object without curves."""
+    stated = motion.attributes.get("curve_vertex_counts")
     totals = [
         int(end - start) if kind == "curves" else 0 for end, start, kind in zip(ends, np.append(0, ends[:-1]), kinds)
     ]
-    usable = said is not None and said.ndim == 1 and said.dtype.kind in "iu" and int(said.sum()) == sum(totals)
+    usable = stated is not None and stated.ndim == 1 and stated.dtype.kind in "iu" and int(stated.sum()) == sum(totals)
     done = 0
     for end, total in zip(ends, totals):
         if not total:
             yield np.empty(0, np.int64)
         elif usable:
-            stop = done + int(np.searchsorted(np.cumsum(said[done:], dtype=np.int64), total)) + 1
-            yield said[done:stop]
+            stop = done + int(np.searchsorted(np.cumsum(stated[done:], dtype=np.int64), total)) + 1
+            yield stated[done:stop]
             done = stop
         else:
             chains = None if motion.edges is None else _chains(motion.edges, int(end) - total, int(end))
@@ -246,8 +250,8 @@ def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterato
 
 
 def face_materials(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
-    """(F,) the material of each face, among the names; outside them where it has none. None where the clip says it of
-    no face."""
+    """Return (F,) the material of each face, among the names; outside them where it has none. None where the clip says
+    it of no face."""
     labels, names = motion.attributes.get(FACE_MATERIAL), motion.metadata.get(MATERIAL_NAMES)
     count = 0 if motion.polygons is None else len(motion.polygons[0])
     if labels is None or not isinstance(names, list) or labels.shape != (count,) or labels.dtype.kind not in "iu":
@@ -256,7 +260,7 @@ def face_materials(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
 
 
 def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.ndarray]]:
-    """The materials that faces have, (F,), and which faces these are."""
+    """Return the materials that faces have, (F,), and which faces these are."""
     return [(int(label), np.flatnonzero(labels == label)) for label in np.unique(labels) if 0 <= label < len(names)]
 
 
@@ -271,14 +275,14 @@ def domain_of(motion: Motion, name: str, values: np.ndarray, domains: dict[str, 
         "branch": motion.branch_count,
     }
     count = len(values) if values.ndim else -1
-    said = domains.get(name) if isinstance(domains, dict) else None
-    if said is not None:
-        return said if rows.get(said) == count else "other"
+    stated = domains.get(name) if isinstance(domains, dict) else None
+    if stated is not None:
+        return stated if rows.get(stated) == count else "other"
     return next((domain for domain in ("vertex", "branch", "face") if count == rows[domain]), "other")
 
 
 def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
-    """The rows of a static array that belong to an object."""
+    """Return the rows of a static array that belong to an object."""
     rows = {"vertex": obj.vertices, "corner": obj.corner_rows, "face": obj.face_rows, "constant": slice(0, 1)}
     return values[rows[domain]]
 
@@ -296,12 +300,12 @@ def own_arrays(motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> Itera
 
 
 def distinct(names: Iterable[str]) -> list[str]:
-    """The names, each made different from those before it by a number behind it."""
-    taken: dict[str, None] = {}
+    """Return the names, each made different from those before it by a number behind it."""
+    names_used: dict[str, None] = {}
     for wanted in names:
         name, number = wanted, 1
-        while name in taken:
+        while name in names_used:
             number += 1
             name = f"{wanted}_{number}"
-        taken[name] = None
-    return list(taken)
+        names_used[name] = None
+    return list(names_used)

@@ -44,7 +44,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def write_frames(motion: Motion, writer: Any, paths: Sequence[str], report: Progress) -> None:
-    """A file for each frame, by writer.write(file, points)."""
+    """Write a file for each frame by `writer.write(file, points)`."""
     for start, frames in motion.blocks():
         for frame, points in enumerate(frames, start):
             with open(paths[frame], "wb") as file:
@@ -53,7 +53,7 @@ def write_frames(motion: Motion, writer: Any, paths: Sequence[str], report: Prog
 
 
 def file_names(motion: Motion, path: FilePath) -> list[str]:
-    """The name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
+    """Return the name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
     path = Path(check_target(path))
     numbering = _numbering(path)
     if numbering is None:
@@ -71,7 +71,7 @@ def file_names(motion: Motion, path: FilePath) -> list[str]:
 
 
 def file_numbers(motion: Motion) -> list[int]:
-    """Numbers of the frames, or 1, 2 ... where they are not whole, twice the same or below 0."""
+    """Return numbers of the frames, or 1, 2 ... where they are not whole, twice the same or below 0."""
     numbers = np.round(frame_numbers(motion), 3)
     usable = (numbers == np.floor(numbers)).all() and numbers.min() >= 0 and numbers.max() <= LARGEST_NUMBER
     if usable and (np.diff(numbers) > 0).all():
@@ -80,5 +80,6 @@ def file_numbers(motion: Motion) -> list[int]:
 
 
 def _numbering(path: Path) -> Numbering | None:
-    """How the files are to be called, where the path says so: by # or %04d, or by digits with a zero before them."""
+    """Return how the files are to be called, where the path says so: by # or %04d, or by digits with a zero before
+    them."""
     return Numbering.of_pattern(path) or (numbering_of(path) if re.search(r"(^|\D)0\d*$", path.stem) else None)

@@ -34,15 +34,16 @@ class Surface:
     def is_open(self) -> np.ndarray:
         """(F,) bool: whether the piece of a face encloses nothing, or its faces do not all show the same side."""
         piece, sides = self._pieces, self._rims
-        own = piece[self._face[sides]]
+        piece_of_side = piece[self._face[sides]]
         start, end = self._ends(self._places, sides)
         # A rim is a part of the border that hangs together, and its hole as large as the sum of vectors along it says.
         nodes, ends = np.unique(
-            np.concatenate([own, own]) * len(self._rest) + np.concatenate([start, end]), return_inverse=True
+            np.concatenate([piece_of_side, piece_of_side]) * len(self._rest) + np.concatenate([start, end]),
+            return_inverse=True,
         )
         ends = ends.reshape(2, -1).T
         rim = first_joined(ends, len(nodes))[ends[:, 0]]
-        origin = self._rest[self._corners[self._first[own]]]
+        origin = self._rest[self._corners[self._first[piece_of_side]]]
         vectors = _sums(np.cross(self._rest[start] - origin, self._rest[end] - origin) / 2, rim, len(nodes))
         holes = np.bincount(nodes // len(self._rest), np.linalg.norm(vectors, axis=1), self._face_count)
         area = np.bincount(piece, np.linalg.norm(self._face_vectors(self._rest), axis=1), self._face_count)
@@ -65,12 +66,12 @@ class Surface:
     @cached_property
     def neighbours(self) -> np.ndarray:
         """(N,): for each vertex another one of a face of it; itself where it has no face."""
-        found = np.arange(len(self._rest))
-        found[self._corners] = self._corners[self._next]
-        return found
+        neighbour = np.arange(len(self._rest))
+        neighbour[self._corners] = self._corners[self._next]
+        return neighbour
 
     def _face_vectors(self, positions: np.ndarray) -> np.ndarray:
-        """(F, 3): normals of the faces, as long as these are large."""
+        """Return (F, 3): normals of the faces, as long as these are large."""
         points = np.asarray(positions, np.float64)[self._corners]
         away = points - points[self._first[self._face]]
         return _sums(np.cross(away, away[self._next]) / 2, self._face, self._face_count)
@@ -154,7 +155,8 @@ class MovingNormals:
         return (moved - normals).astype(np.float32)
 
     def _frames(self, positions: np.ndarray) -> np.ndarray:
-        """(N, 3, 3): of each vertex its normal, the direction of an edge across that, and what is across both."""
+        """Return (N, 3, 3): of each vertex its normal, the direction of an edge across that, and what is across
+        both."""
         points = np.asarray(positions, np.float64)
         normals = self._surface.normals(points)
         along = points[self._surface.neighbours] - points
@@ -191,5 +193,5 @@ def _shared(start: np.ndarray, end: np.ndarray, sides: np.ndarray) -> tuple[np.n
 
 
 def _sums(vectors: np.ndarray, label: np.ndarray, count: int) -> np.ndarray:
-    """(count, 3) float64: the sums of the vectors of each label."""
+    """Return (count, 3) float64: the sums of the vectors of each label."""
     return np.stack([np.bincount(label, column, count) for column in vectors.T], axis=1, dtype=np.float64)

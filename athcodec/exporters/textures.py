@@ -19,14 +19,14 @@ LAYOUT = "athcodec/exporters/vat.md"
 
 
 def facts_of(motion: Motion) -> dict[str, Any]:
-    """Rate, level and size of a MotionClip or ClipView."""
+    """Return rate, level and size of a MotionClip or ClipView."""
     level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}
 
 
 def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
-    """(height, width, channels) float16 or float32 by the names of channels, "RGB" or "RGBA", compressed without loss.
-    Raises OSError."""
+    """Write (height, width, channels) float16 or float32 by the names of channels, "RGB" or "RGBA", compressed without
+    loss. Raises OSError."""
     import OpenEXR  # only where it is needed: PNG does without
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
@@ -38,7 +38,7 @@ def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
 
 
 def write_png(path: str, pixels: np.ndarray) -> None:
-    """(height, width, 3) uint16, without loss."""
+    """Write (height, width, 3) uint16 without loss."""
     height, width, _ = pixels.shape
     rows = np.ascontiguousarray(pixels.astype(">u2")).view(np.uint8).reshape(height, -1)
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)
@@ -55,7 +55,7 @@ def write_png(path: str, pixels: np.ndarray) -> None:
 
 
 def write_json(path: str, facts: dict[str, Any]) -> None:
-    """Raises OSError."""
+    """Raise OSError."""
     with open(path, "w", encoding="utf-8") as out:
         json.dump(facts, out, indent=1, allow_nan=False)
         out.write("\n")

@@ -13,19 +13,19 @@ from athcodec.motion.protocol import Motion
 
 
 def frame_rate_of(motion: Motion) -> float:
-    """Frames per second: what the clip's metadata state, else the median rate of its times."""
+    """Return frames per second: what the clip's metadata state, else the median rate of its times."""
     return stated_fps(motion.metadata) or float(motion.fps)
 
 
 def start_frame_of(metadata: Mapping[str, Any]) -> float:
-    """The number of the frame at time 0, 0 where the metadata state no number."""
+    """Return the number of the frame at time 0, 0 where the metadata state no number."""
     stated = metadata.get("start_frame", 0)
     is_number = isinstance(stated, (int, float)) and not isinstance(stated, bool) and abs(stated) < 1e9
     return float(stated) if is_number else 0.0
 
 
 def frame_numbers(motion: Motion) -> np.ndarray:
-    """(T,) float64; whole where times fall on frames but for rounding. Those of a view are those of the clip."""
+    """Return (T,) float64; whole where times fall on frames but for rounding. Those of a view are those of the clip."""
     return start_frame_of(motion.metadata) + np.round(np.asarray(motion.time) * frame_rate_of(motion), 6)
 
 

@@ -104,7 +104,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 @contextmanager
 def _saying(path: str) -> Iterator[None]:
-    """USD's errors become OSErrors of one line: all that can fail here is writing a file."""
+    """Turn USD's errors into OSErrors of one line: only the writing of the file can fail here."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -115,7 +115,7 @@ def _saying(path: str) -> Iterator[None]:
 
 
 def _convert(binary: str, target: str, suffix: str) -> None:
-    """Converts the binary file that was written to the wanted kind; only that remains."""
+    """Convert the binary file that was written to the wanted kind; only that remains."""
     if suffix == ".usda":
         text = f"{binary}.usda"
         _must(Sdf.Layer.FindOrOpen(binary).Export(text), binary)
@@ -173,7 +173,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
 
 
 def _time_codes(motion: Motion) -> np.ndarray:
-    """(T,) of all frames; of several clips each from 0 on."""
+    """Return (T,) of all frames; of several clips each from 0 on."""
     if len(motion.clip_ranges) < 2:
         return distinct_frame_numbers(motion)
     times = (np.asarray(motion.time[start:stop], np.float64) for start, stop in motion.clip_range_frames)
@@ -201,10 +201,10 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
     normals = looks.surface.unit_normals(motion.rest)
     for obj in objects:
         _set_normals(obj, motion, normals[obj.vertices])
-        own = rest[obj.vertices]
-        obj.target.GetPointsAttr().Set(_vec3(own))
-        if len(own):
-            obj.target.GetExtentAttr().Set(_vec3([own.min(axis=0), own.max(axis=0)]))
+        points = rest[obj.vertices]
+        obj.target.GetPointsAttr().Set(_vec3(points))
+        if len(points):
+            obj.target.GetExtentAttr().Set(_vec3([points.min(axis=0), points.max(axis=0)]))
 
 
 def _write_assembly(
@@ -216,7 +216,7 @@ def _write_assembly(
     codes: np.ndarray,
     report: Progress,
 ) -> dict[str, Any]:
-    """As Nanite Assemblies are laid out, see usd_nanite.py."""
+    """Return as Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
     UsdSkel.Root.Define(stage, nanite.BASE)
     names = distinct(("base", *(_identifier(obj.name) for obj in objects)))[1:]
@@ -300,13 +300,13 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
 
 
 def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
-    """Sets the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
+    """Set the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
     that have colours keep these, which are written with the clip's other arrays."""
     colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
     if obj.kind == "mesh":
         labels = looks.labels[obj.face_rows].reshape(obj.copies, -1)[0]
-        found, of_face = np.unique(labels, return_inverse=True)
-        colours = [looks.materials[label].colour for label in found]
+        used, of_face = np.unique(labels, return_inverse=True)
+        colours = [looks.materials[label].colour for label in used]
         if not is_double_sided(obj.details) and looks.surface.is_open[obj.face_rows].any():
             _mark_guess(obj.target.CreateDoubleSidedAttr(True))
     if "colors" in motion.attributes or not colours:
@@ -320,7 +320,7 @@ def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
 
 
 def _set_normals(obj: SceneObject, motion: Motion, normals: np.ndarray) -> None:
-    """Sets the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
+    """Set the normals of a mesh, (n, 3), whose points stay as they are, where the clip has none."""
     if obj.kind == "mesh" and "normals" not in motion.attributes:
         attribute = obj.target.CreateNormalsAttr(_vec3(normals))
         obj.target.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
@@ -328,7 +328,7 @@ def _set_normals(obj: SceneObject, motion: Motion, normals: np.ndarray) -> None:
 
 
 def _normals_of_one(motion: Motion, obj: SceneObject, copies: Copies, looks: Looks) -> np.ndarray:
-    """The normals of the shape of which an object's vertices are copies."""
+    """Return the normals of the shape of which an object's vertices are copies."""
     return looks.surface.unit_normals(motion.rest)[obj.vertices][: len(copies.shape)] @ copies.axes
 
 
@@ -336,13 +336,13 @@ def _mark_guess(attribute: Usd.Attribute) -> None:
     attribute.SetCustomDataByKey(f"{OWN}:{GUESSED}", True)
 
 
-def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], taken: Iterable[str]) -> None:
-    """The materials by their names, without contents, and the faces that have them."""
-    found = face_materials(motion)
-    if found is None or not found[1]:
+def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], names_used: Iterable[str]) -> None:
+    """Define the materials by their names, without contents, and bind the faces that have them."""
+    labels_and_names = face_materials(motion)
+    if labels_and_names is None or not labels_and_names[1]:
         return
-    labels, names = found
-    scope = UsdGeom.Scope.Define(stage, f"/clip/{distinct([*taken, MATERIALS])[-1]}").GetPath()
+    labels, names = labels_and_names
+    scope = UsdGeom.Scope.Define(stage, f"/clip/{distinct([*names_used, MATERIALS])[-1]}").GetPath()
     materials = []
     for name, identifier in zip(names, distinct(map(_identifier, names))):
         material = UsdShade.Material.Define(stage, scope.AppendChild(identifier))
@@ -350,10 +350,10 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
             material.GetPrim().SetDisplayName(name)
         materials.append(material)
     for obj in objects:
-        own = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
-        runs = [] if own is None or obj.kind != "mesh" else material_runs(own, names)
+        face_labels = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
+        runs = [] if face_labels is None or obj.kind != "mesh" else material_runs(face_labels, names)
         prim = obj.target.GetPrim()
-        if len(runs) == 1 and len(runs[0][1]) == len(own):
+        if len(runs) == 1 and len(runs[0][1]) == len(face_labels):
             UsdShade.MaterialBindingAPI.Apply(prim).Bind(materials[runs[0][0]])
             continue
         for label, faces in runs:
@@ -363,7 +363,7 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
 
 
 def _define_instanced(stage: Usd.Stage, place: str, obj: SceneObject, copies: Copies) -> None:
-    """A PointInstancer, and below it the shape of one copy, which is the object's target."""
+    """Define a PointInstancer, and below it the shape of one copy, which becomes the object's target."""
     instancer = UsdGeom.PointInstancer.Define(stage, place)
     one, name = one_copy(obj), place.rpartition("/")[2]
     obj.target = _define(stage, f"{place}/{name}", one)
@@ -379,7 +379,7 @@ def _vec3(points: Any) -> Vt.Vec3fArray:
 
 
 def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
-    """Where the copies are in each frame. USD's older programs know rotations in half precision only."""
+    """Write where the copies are in each frame. USD's older programs know rotations in half precision only."""
     for obj, copies in instanced:
         instancer = obj.instancer
         turned = [(instancer.CreateOrientationsAttr(), Vt.QuathArray, np.float16)]
@@ -423,7 +423,7 @@ def _int_array(values: np.ndarray) -> Vt.IntArray:
 
 
 def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
-    """Writes those that belong to vertices, corners and faces; returns the others, with their domains."""
+    """Write those that belong to vertices, corners and faces; returns the others, with their domains."""
     left = {}
     domains = motion.metadata.get("domains", {})
     for name, values in motion.attributes.items():
@@ -448,7 +448,7 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
         return False
     type_name = _type_name(name, kind, row if row in shapes else ())
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(found is None for found in placed):
+    if any(place is None for place in placed):
         return False
     for target, rows in placed:
         if not len(rows):  # An object that has no faces or corners has no values for them.
@@ -465,8 +465,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
 
 
 def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, np.ndarray] | None:
-    """The schema that takes the rows of an object, and those that it takes: of copies those of one, where all have the
-    same, or one for each, where it has the same throughout. None where neither is so."""
+    """Return the schema that takes the rows of an object, and those that it takes: of copies those of one, where all
+    have the same, or one for each, where it has the same throughout. None where neither is so."""
     if obj.copies == 1 or domain == "constant":
         return obj.target, rows
     shared = rows_of_one(rows, obj)
@@ -479,9 +479,9 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """As widths of curves and points; of meshes as a primvar."""
+    """Return as widths of curves and points; of meshes as a primvar."""
     placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(found is None or found[0] is not obj.target for found, obj in zip(placed, objects)):
+    if any(place is None or place[0] is not obj.target for place, obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
         if obj.kind == "mesh":
@@ -553,13 +553,13 @@ def _write_frames(
 
 
 def _whole(obj: SceneObject) -> Any:
-    """The schema that all its vertices are under."""
+    """Return the schema that all its vertices are under."""
     return obj.target if obj.copies == 1 else obj.instancer
 
 
 def _write_extents(layer: Sdf.Layer, extents: list, positions: np.ndarray, code: float) -> None:
     for obj, path in extents:
-        own = positions[obj.vertices]
-        if len(own):
+        points = positions[obj.vertices]
+        if len(points):
             half = np.float32(obj.width / 2)
-            layer.SetTimeSample(path, code, _vec3([own.min(axis=0) - half, own.max(axis=0) + half]))
+            layer.SetTimeSample(path, code, _vec3([points.min(axis=0) - half, points.max(axis=0) + half]))

@@ -45,18 +45,18 @@ def parts_of(motion: Motion, objects: list[SceneObject], joints: Joints) -> dict
     """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
-    found = {
+    parts = {
         number: Part(copies, _joint_of_copies(objects[number], joints))
         for number, copies in fit_copies(still, objects, allowed_error(motion)).items()
         if objects[number].kind == "mesh"
     }
-    if not any(obj.kind == "mesh" for number, obj in enumerate(objects) if number not in found):
+    if not any(obj.kind == "mesh" for number, obj in enumerate(objects) if number not in parts):
         raise ClipError("nanite: got no mesh beside the copies, expected one as the base of the assembly")
-    return found
+    return parts
 
 
 def _joint_of_copies(obj: SceneObject, joints: Joints) -> np.ndarray:
-    """(k,) the joint that has the largest part in each copy."""
+    """Return (k,) the joint that has the largest part in each copy."""
     weights = np.zeros((obj.copies, len(joints.bind)))
     copy = np.repeat(np.arange(obj.copies), obj.count // obj.copies)
     assert joints.weights is not None
@@ -66,7 +66,7 @@ def _joint_of_copies(obj: SceneObject, joints: Joints) -> np.ndarray:
 
 
 def mark_root(root: Usd.Prim) -> None:
-    """Makes the prim an assembly of a skeletal mesh, whose skeleton is that of the base."""
+    """Make the prim an assembly of a skeletal mesh, whose skeleton is that of the base."""
     _apply(root, ROOT_SCHEMA)
     kind = root.CreateAttribute(
         "unreal:naniteAssembly:meshType", Sdf.ValueTypeNames.Token, False, Sdf.VariabilityUniform
@@ -76,12 +76,12 @@ def mark_root(root: Usd.Prim) -> None:
 
 
 def _apply(prim: Usd.Prim, schema: str) -> None:
-    """By name, because USD itself does not know these schemas."""
+    """Apply a schema by its name, because USD itself does not know it."""
     prim.AddAppliedSchema(schema)
 
 
 def define_part(stage: Usd.Stage, place: str, name: str) -> str:
-    """The instancer's prototype, without its mesh; returns where that goes."""
+    """Return the instancer's prototype, without its mesh; returns where that goes."""
     UsdGeom.PointInstancer.Define(stage, place)
     prototype = f"{place}/Prototypes/{name}"
     UsdSkel.Root.Define(stage, prototype)
@@ -93,7 +93,7 @@ def define_part(stage: Usd.Stage, place: str, name: str) -> str:
 
 
 def place_part(stage: Usd.Stage, place: str, name: str, obj: SceneObject, part: Part, joints: Joints) -> None:
-    """Where the instances are at rest, and what they hang on; obj.target is the prototype's mesh."""
+    """Place the instances at rest, and name what they hang on; `obj.target` is the prototype's mesh."""
     instancer, prototype = UsdGeom.PointInstancer(stage.GetPrimAtPath(place)), f"{place}/Prototypes/{name}"
     copies, count = part.copies, len(part.joint)
     instancer.CreatePrototypesRel().SetTargets([prototype])
@@ -128,7 +128,8 @@ def _bind_instances(prim: Usd.Prim, names: list[str]) -> None:
 
 
 def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, parts: dict[int, Part]) -> float:
-    """How far instances that move as their joints do are off, at most; or the rest of the rig, if that is more."""
+    """Return how far instances that move as their joints do are off, at most; or the rest of the rig, if that is
+    more."""
     largest = joints.max_error
     for number, part in parts.items():
         turns = rotation_matrices(part.copies.turns[0].astype(np.float64)) * part.copies.scales[0][:, None, :]
@@ -143,7 +144,7 @@ def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, pa
 
 
 def _world(joints: Joints, frame: int) -> np.ndarray:
-    """(J, 4, 4) what each joint does to vertices at rest."""
+    """Return (J, 4, 4) what each joint does to vertices at rest."""
     matrices = np.tile(np.eye(4), (len(joints.bind), 1, 1))
     matrices[:, :3, :3] = rotation_matrices(joints.poses[1][frame].astype(np.float64))
     matrices[:, :3, 3] = joints.poses[0][frame]
@@ -155,7 +156,7 @@ def _world(joints: Joints, frame: int) -> np.ndarray:
 
 
 def wind_of(motion: Motion, joints: Joints) -> str:
-    """The JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
+    """Return the JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
     hierarchy = hierarchy_to_rig(motion)
     order = np.empty(len(joints.vertex_joint), np.int64)
     order[hierarchy.vertex_source] = np.repeat(hierarchy.branch_depth, hierarchy.stem_count)
@@ -164,10 +165,10 @@ def wind_of(motion: Motion, joints: Joints) -> str:
     strongest = joints.vertex_joint[np.arange(len(order)), joints.weights.argmax(axis=1)]
     np.minimum.at(groups, strongest, order)
     groups[0] = 0
-    said = [{"JointName": name, "SimulationGroupIndex": group} for name, group in zip(joints.names, groups.tolist())]
+    entries = [{"JointName": name, "SimulationGroupIndex": group} for name, group in zip(joints.names, groups.tolist())]
     influence = [
         {"bUseDualInfluence": False, "Influence": 1.0, "bIsTrunkGroup": group == 0}
         for group in range(int(groups.max()) + 1)
     ]
-    wind = {"Joints": said, "SimulationGroups": influence, "bIsGroundCover": False, "GustAttenuation": 0.0}
+    wind = {"Joints": entries, "SimulationGroups": influence, "bIsGroundCover": False, "GustAttenuation": 0.0}
     return json.dumps(wind, indent=1) + "\n"

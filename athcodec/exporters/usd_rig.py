@@ -19,7 +19,7 @@ SKELETON = "skeleton"
 def write_rig(
     stage: Usd.Stage, place: str, motion: Motion, joints: Joints, objects: list[SceneObject], codes: np.ndarray
 ) -> None:
-    """Adds below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
+    """Add below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
     all frames, (T,), which begin again with each clip."""
     skeleton = UsdSkel.Skeleton.Define(stage, f"{place}/{SKELETON}")
     paths = _paths(joints)
@@ -48,7 +48,7 @@ def _shifted(place: list[float]) -> Gf.Matrix4d:
 
 
 def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndarray], codes: np.ndarray) -> None:
-    """Samples of translations and rotations; the scales are 1 throughout."""
+    """Write samples of translations and rotations; the scales are 1 throughout."""
     animation.CreateJointsAttr(paths)
     animation.CreateScalesAttr(Vt.Vec3hArray(len(paths), Gf.Vec3h(1)))
     places, turns = animation.CreateTranslationsAttr(), animation.CreateRotationsAttr()

@@ -85,7 +85,7 @@ def _write(
 
 
 def _rows(moving: Moving, dtype: type) -> np.ndarray:
-    """(T, K, 3, 4): what the map of a node adds to the rest pose, seen from the node's middle."""
+    """Return (T, K, 3, 4): what the map of a node adds to the rest pose, seen from the node's middle."""
     rows = np.empty((*moving.places.shape, 4), dtype)
     linear = moving.values[0].reshape(*moving.places.shape, 3) - np.eye(3)
     offset = moving.places - moving.parts.middle.astype(np.float32)
@@ -110,12 +110,12 @@ class _Grid:
         self.height = self.frames * self.rows_per_frame
 
     def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
-        """(what the JSON says of it, (height, width, 4)) each; texels without a node are 0."""
+        """Yield (what the JSON says of it, (height, width, 4)) each; texels without a node are 0."""
         for number, start in enumerate(range(0, len(rows), self.frames)):
-            mine = rows[start : start + self.frames]
+            frames = rows[start : start + self.frames]
             texels = np.zeros((self.frames, self.rows_per_frame * self.per_row, 3, 4), rows.dtype)
-            texels[: len(mine), : rows.shape[1]] = mine
-            facts = {"file": f"{name}_matrices_{number}.exr", "first_frame": start, "frames": len(mine)}
+            texels[: len(frames), : rows.shape[1]] = frames
+            facts = {"file": f"{name}_matrices_{number}.exr", "first_frame": start, "frames": len(frames)}
             yield facts, texels.reshape(self.height, self.width, 4)
 
     def pivots(self, pivots: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ class _Grid:
         return texels.reshape(self.rows_per_frame, self.per_row, 3)
 
     def places(self, vertex_node: np.ndarray) -> np.ndarray:
-        """(N, 2): the middle of the first texel of each vertex's node in frame 0, from 0 to 1."""
+        """Return (N, 2): the middle of the first texel of each vertex's node in frame 0, from 0 to 1."""
         x, y = 3 * (vertex_node % self.per_row) + 0.5, vertex_node // self.per_row + 0.5
         return np.stack([x / self.width, y / self.height], axis=1).astype(np.float32)
 
@@ -132,7 +132,7 @@ class _Grid:
 def _measured(
     motion: Motion, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Progress
 ) -> tuple[float, list[float], list[float]]:
-    """The largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
+    """Return the largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     away = np.concatenate([rest - pivots[vertex_node], np.ones((len(rest), 1))], axis=1)
     largest, low, high = 0.0, np.full(3, np.inf), np.full(3, -np.inf)

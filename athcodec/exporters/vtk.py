@@ -77,10 +77,10 @@ class _VtuWriter:
         cells = cells_of(motion)
         self._packed = packed
         compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
-        said = json.dumps(names_and_scene(motion)).encode()
+        scene = json.dumps(names_and_scene(motion)).encode()
         parts = [
             _HEAD.format(compressor).encode(),
-            *self._section("FieldData", {OWN: np.frombuffer(said, np.uint8)}),
+            *self._section("FieldData", {OWN: np.frombuffer(scene, np.uint8)}),
             _PIECE.format(motion.vertex_count, len(cells.types)).encode(),
         ]
         self._head = b"".join(parts)

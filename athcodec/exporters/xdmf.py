@@ -26,7 +26,7 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
-from athcodec.sources.xdmf import MIXED
+from athcodec.sources.xdmf_cells import MIXED
 
 DISPLACEMENT = "displacement"
 _XDMF_NUMBERS = {name: number for number, name in MIXED.items()} | {"line": 2, "vertex": 1}
@@ -69,7 +69,7 @@ class _Writer:
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
     def write(self, report: Progress) -> ElementTree.Element:
-        """The XML, once all numbers are in the HDF5 file."""
+        """Return the XML, once all numbers are in the HDF5 file."""
         motion, root = self._motion, ElementTree.Element("Xdmf", Version="3.0")
         domain = ElementTree.SubElement(root, "Domain")
         for key in ("fps", "start_frame", "unit", "up_axis"):
@@ -89,7 +89,14 @@ class _Writer:
                 report((frame + 1) / motion.frame_count)
         return root
 
-    def _fill(self, grid: ElementTree.Element, frame: int, time: float, moved: np.ndarray, static: list) -> None:
+    def _fill(
+        self,
+        grid: ElementTree.Element,
+        frame: int,
+        time: float,
+        moved: np.ndarray,
+        static: tuple[list[ElementTree.Element], list[ElementTree.Element]],
+    ) -> None:
         mesh, attributes = static
         if frame == 0:
             grid.extend(mesh)
@@ -152,7 +159,8 @@ class _Writer:
 
 
 def _mixed(cells: Cells) -> np.ndarray:
-    """The stream of a topology of several types: number of the type, number of nodes where that varies, nodes."""
+    """Return the stream of a topology of several types: number of the type, number of nodes where that varies,
+    nodes."""
     parts, start = [], 0
     counted = {VTK_NUMBERS[name] for name in ("line", "vertex", "polygon")}
     for kind, stop in zip(cells.types.tolist(), cells.stops.tolist()):

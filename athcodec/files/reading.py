@@ -39,19 +39,19 @@ class Budget:
     def __init__(self, limit: int = MAX_MEMORY):
         self.limit, self.left = limit, limit
 
-    def need(self, size: int, what: str) -> None:
+    def need(self, size: int, subject: str) -> None:
         """Raise ClipError if there is no room for so many bytes, which do not stay."""
         if size > self.left:
-            raise ClipError(f"{what}: got {size:,} bytes to read, but {no_room(self.limit)}")
+            raise ClipError(f"{subject}: got {size:,} bytes to read, but {no_room(self.limit)}")
 
-    def need_for(self, text: bytes, marks: bytes, each: int, what: str) -> None:
+    def need_for(self, text: bytes, marks: bytes, each: int, subject: str) -> None:
         """Check that there is room for the objects made of a text, each of so many bytes: one before each of these
         marks."""
-        self.need(len(text) + each * (1 + len(text) - len(text.translate(None, marks))), what)
+        self.need(len(text) + each * (1 + len(text) - len(text.translate(None, marks))), subject)
 
-    def take(self, size: int, what: str) -> None:
+    def take(self, size: int, subject: str) -> None:
         """Check that there is room for bytes that stay, and subtract them."""
-        self.need(size, what)
+        self.need(size, subject)
         self.left -= size
 
 

@@ -286,7 +286,7 @@ class _Http:
                 task.cancel()
 
     async def _fetch(self, offset: int, size: int) -> tuple[int, bytes]:
-        """(offset, bytes) of a range, or (0, the whole file) from a server without ranges."""
+        """Return (offset, bytes) of a range, or (0, the whole file) from a server without ranges."""
         for attempt in range(self._remote.retries + 1):
             try:
                 return await self._ask(offset, size)
@@ -349,7 +349,7 @@ class _Http:
         return await self._body(answer, last + 1 - first)
 
     async def _whole(self, answer) -> bytes:
-        """The server ignores ranges: what it sends is taken as a whole where it can be kept."""
+        """Return the server ignores ranges: what it sends is taken as a whole where it can be kept."""
         length = None if "Content-Encoding" in answer.headers else answer.content_length
         if length is not None and length > KEPT_BYTES:
             raise self._refusal(

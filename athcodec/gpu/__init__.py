@@ -60,7 +60,7 @@ class GpuFile:
         self._work = core_file.Work(self.core.work_size())
 
     def level(self, level: int) -> np.ndarray:
-        """Words of a level's block, uint32."""
+        """Return words of a level's block, uint32."""
         self.core.refine(level)
         memory = core_file.aligned(lib.ath_gpu_level_size(self._file, level))
         self._check(lib.ath_gpu_build_level(self._file, level, memory.ctypes.data, len(memory)))
@@ -68,7 +68,7 @@ class GpuFile:
         return words[: words[0]].copy()
 
     def segment(self, segment: int, level: int) -> np.ndarray:
-        """Words of the block of a segment at a level, uint32."""
+        """Return words of the block of a segment at a level, uint32."""
         room = Room()  # none: to find out how much there has to be
         block = self.recorded(segment, level, room)
         if block is None:
@@ -77,7 +77,7 @@ class GpuFile:
         return block
 
     def recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
-        """The block where there is that much room for it; else `room` is set to what it needs."""
+        """Return the block where there is that much room for it; else `room` is set to what it needs."""
         memory = core_file.aligned(lib.ath_gpu_record_size(self._file, level, byref(room)))
         self._prepare(segment, level, room, memory)
         at = lib.ath_gpu_recorded(memory.ctypes.data, byref(room))
@@ -87,7 +87,7 @@ class GpuFile:
         return words[: words[0]].copy()
 
     def prepared(self, segment: int, level: int) -> core_file.Segment:
-        """The segment as the core has it, which the blocks stand for."""
+        """Return the segment as the core has it, which the blocks stand for."""
         return self._prepare(segment, level)
 
     def _prepare(
@@ -103,13 +103,13 @@ class GpuFile:
         return into
 
     def bounds(self, segment: core_file.Segment) -> np.ndarray:
-        """(2, 3) float32, the box of all that a prepared segment shows, relative to the origin."""
+        """Return (2, 3) float32, the box of all that a prepared segment shows, relative to the origin."""
         box = (c_float * 6)()
         lib.ath_gpu_bounds(self._file, segment.pointer, byref(box))
         return np.array(box, np.float32).reshape(2, 3)
 
     def coded_frame(self, frame: int) -> int:
-        """Which of the coded frames of its segment shows a frame of the file."""
+        """Return which of the coded frames of its segment shows a frame of the file."""
         return lib.ath_gpu_frame(self._file, frame)
 
     @staticmethod

@@ -36,13 +36,13 @@ SEGMENT = np.dtype(
 
 
 def section(words: np.ndarray, at: int, dtype, count: int) -> np.ndarray:
-    """Records of a block."""
+    """Return records of a block."""
     size = np.dtype(dtype).itemsize // 4
     return words[at : at + size * count].view(dtype)
 
 
 def head(words: np.ndarray, dtype: np.dtype) -> np.void:
-    """The header of a block."""
+    """Return the header of a block."""
     return section(words, 0, dtype, 1)[0]
 
 
@@ -67,7 +67,7 @@ class Source:
     # ---- pass 1: time ----
 
     def _over_time(self) -> np.ndarray:
-        """(rows, 3, frames) float32."""
+        """Return (rows, 3, frames) float32."""
         rows = section(self.words, self.head["rows"], ROW, self.head["row_count"])
         out = np.zeros((len(rows), 3, len(self.frames)), np.float32)
         for i, row in enumerate(rows):
@@ -86,17 +86,17 @@ class Source:
     # ---- what moves a body ----
 
     def _move(self, b: int) -> tuple[np.void, dict[int, np.ndarray]]:
-        """Its ath_gpu_move, and the amplitudes of its rows by slot."""
+        """Return its ath_gpu_move, and the amplitudes of its rows by slot."""
         move = section(self.words, self.head["moves"] + 4 * b, MOVE, 1)[0]
         rows = section(self.words, self.head["rows"] + 3 * move["row"], ROW, move["rows"])
         return move, dict(zip(rows["slot"].tolist(), self._amplitudes[move["row"] :], strict=False))
 
     def shift(self, b: int) -> np.ndarray:
-        """(frames, 3)."""
+        """Return (frames, 3)."""
         return self._move(b)[1].get(SHIFT, np.zeros((3, len(self.frames)), np.float32)).T
 
     def turn(self, b: int) -> np.ndarray:
-        """(frames, 3): vectors of rotations."""
+        """Return (frames, 3): vectors of rotations."""
         move, tracks = self._move(b)
         if ROTATION not in tracks:
             return np.zeros((len(self.frames), 3), np.float32)
@@ -104,7 +104,7 @@ class Source:
         return tracks[ROTATION].T @ turn.T
 
     def modes(self, b: int, body: np.void) -> np.ndarray:
-        """(modes, 3, frames): what each mode is."""
+        """Return (modes, 3, frames): what each mode is."""
         move, tracks = self._move(b)
         modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
         if move["shape_count"] > 0:
@@ -115,7 +115,7 @@ class Source:
         return out
 
     def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Modes that shapes are made of, in place of the rows of shapes."""
+        """Return modes that shapes are made of, in place of the rows of shapes."""
         modes, count = int(body["shape_modes"]), int(move["shape_count"])
         shapes = section(self.words, self.head["shapes"] + move["shapes"], "<f4", 3 * modes * count)
         shapes = shapes.reshape(count, modes, 3)
@@ -131,7 +131,7 @@ class Source:
     # ---- joins, corrections ----
 
     def join(self, bodies: np.ndarray, positions: np.ndarray, matrices: np.ndarray) -> None:
-        """Adds to them what is left of the jumps at the segment's seam."""
+        """Add to the terms what is left of the jumps at the segment's seam."""
         frames = self.head["join_frames"]
         joined = self.frames < frames
         if not joined.any():
@@ -151,7 +151,7 @@ class Source:
         matrices[joined, :, :, 3] += added[:, :, 9:]
 
     def correct(self, positions: np.ndarray) -> None:
-        """Adds corrections to positions."""
+        """Add corrections to positions."""
         count = self.head["corrected_count"]
         if not count:
             return
@@ -168,7 +168,7 @@ class Source:
         positions += (sums * self.head["correction_part"]).astype(np.float32)
 
     def baked(self, shape: tuple[int, ...]) -> np.ndarray:
-        """(frames, positions, 3)."""
+        """Return (frames, positions, 3)."""
         shape = int(self.head["frames"]), *shape[1:]
         every = section(self.words, self.head["baked"], "<f4", int(np.prod(shape))).reshape(shape)
         return every[self.frames] * self.weights[:, None, None]
@@ -235,7 +235,7 @@ class Passes:
         return rest - body["rest_point"]
 
     def _hung(self, body: np.void) -> tuple[np.ndarray, np.ndarray]:
-        """Where a body hangs, before it is moved and turned itself."""
+        """Return where a body hangs, before it is moved and turned itself."""
         count = self._count
         if body["parent"] < 0:
             return np.tile(body["rest_point"], (count, 1)), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1))
@@ -251,14 +251,14 @@ class Passes:
         return section(self._level, self._of_level["bases"] + at, "<f4", modes * count).reshape(modes, count)
 
     def _finish_matrices(self) -> None:
-        """From R and c of x = c + R (x0 - a) to what is added to R x0."""
+        """Turn R and c of x = c + R (x0 - a) into what is added to R x0."""
         points = self._bodies["rest_point"][(self._bodies["flags"] & NODE) != 0]
         self.matrices[:, :, :, 3] -= np.einsum("tmij,mj->tmi", self.matrices[:, :, :, :3], points)
 
     # ---- pass 3: vertices ----
 
     def vertices(self) -> np.ndarray:
-        """(frames, vertices, 3) float32 in file order, relative to the origin."""
+        """Return (frames, vertices, 3) float32 in file order, relative to the origin."""
         binding = self._vertices["binding"]
         moved, index = (binding & MOVED) != 0, (binding & ~np.uint32(MOVED)).astype(int)
         out = np.empty((self._count, len(binding), 3), np.float32)
@@ -270,12 +270,12 @@ class Passes:
 
 
 def rotations(omega: np.ndarray) -> np.ndarray:
-    """(..., 3, 3): of the quaternions normalize(1, omega / 4) squared."""
+    """Return (..., 3, 3): of the quaternions normalize(1, omega / 4) squared."""
     return squared(np.float32(0.25) * omega)
 
 
 def squared(half: np.ndarray) -> np.ndarray:
-    """Rotations of the quaternions normalize(1, half) squared."""
+    """Return rotations of the quaternions normalize(1, half) squared."""
     n2 = (half * half).sum(-1, keepdims=True)
     scale = 1 / (1 + n2)
     w = ((1 - n2) * scale)[..., 0]
@@ -291,13 +291,14 @@ def squared(half: np.ndarray) -> np.ndarray:
 
 
 def unit(v: np.ndarray) -> np.ndarray:
-    """Vectors of length 1; those that vanish as they are."""
+    """Return vectors of length 1; those that vanish as they are."""
     n2 = (v * v).sum(-1, keepdims=True)
     return v / np.sqrt(np.where(n2 > 1e-30, n2, 1))
 
 
 def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Rotations by the least angle from one vector of length 1 to others; beyond a right angle by less and less."""
+    """Return rotations by the least angle from one vector of length 1 to others; beyond a right angle by less and
+    less."""
     cosine, axis = (u * v).sum(-1), np.cross(u, v)
     w, sine2 = 1 + np.maximum(cosine, 0), (axis * axis).sum(-1)
     h = 2 / (w * w + sine2)
@@ -309,7 +310,7 @@ def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
-    """The rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of none."""
+    """Return the rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of none."""
     identity = np.eye(3, dtype=np.float32)
     H = np.einsum("tvi,vj->tij", placed, offsets) + np.float32(0.01) * (offsets * offsets).sum() * identity
     norm2 = (H * H).sum((1, 2), keepdims=True)
@@ -320,7 +321,7 @@ def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
 
 
 def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """A step of Newton's method to the rotations nearest to H."""
+    """Return a step of Newton's method to the rotations nearest to H."""
     C = H @ np.swapaxes(R, 1, 2)
     axial = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], -1)
     spare = np.maximum(1 - np.trace(C, axis1=1, axis2=2), 0) + np.float32(1e-6)

@@ -14,7 +14,7 @@ _SHIFT = 15  # bits of a float32 that a bin leaves away: 256 bins for each power
 
 
 def paired(reference: np.ndarray, decoded: np.ndarray, values: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The frames of two (k, N, 3) blocks in float64, as many at once as have SLICE_VALUES numbers.
+    """Yield the frames of two (k, N, 3) blocks in float64, as many at once as have SLICE_VALUES numbers.
 
     values: see Meter.
 
@@ -86,10 +86,10 @@ class Spread:
         return sqrt(self._square / self.count) if self.count else 0.0
 
     def quantile(self, fraction: float) -> float:
-        """The value that this fraction of all do not exceed, at most 0.4 % too large; 0 of no values."""
+        """Return the value that this fraction of all do not exceed, at most 0.4 % too large; 0 of no values."""
         if not self.count:
             return 0.0
-        found = np.searchsorted(np.cumsum(self._bins), np.ceil(real("fraction", fraction) * self.count))
+        place = np.searchsorted(np.cumsum(self._bins), np.ceil(real("fraction", fraction) * self.count))
         infinite = np.float32(np.inf).view(np.uint32) >> _SHIFT
-        end = found if found in (0, infinite) else found + 1
+        end = place if place in (0, infinite) else place + 1
         return float(np.array(end << _SHIFT, np.uint32).view(np.float32))

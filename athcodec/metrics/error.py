@@ -105,13 +105,13 @@ class ErrorMeter(Meter):
 
 
 def bits_per_vertex_frame(byte_count: int, frame_count: int, vertex_count: int) -> float:
-    """Size in bits per vertex and frame."""
+    """Return size in bits per vertex and frame."""
     count = whole("frame_count", frame_count) * whole("vertex_count", vertex_count)
     return 8.0 * whole("byte_count", byte_count) / count
 
 
 def _scale(values: np.ndarray) -> float:
-    """A power of two of about the largest magnitude, over which squares neither vanish nor overflow."""
+    """Return a power of two of about the largest magnitude, over which squares neither vanish nor overflow."""
     largest = float(np.abs(values).max(initial=0.0))
     return 2.0 ** min(max(frexp(largest)[1], -1021), 1023) if 0.0 < largest < inf else 1.0
 

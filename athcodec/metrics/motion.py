@@ -73,7 +73,7 @@ class MotionMeter(Meter):
             meter._add(reference, decoded)
 
     def figures(self) -> dict[str, Any]:
-        """The measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
+        """Return the measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
 
         Second differences of the error are in bounds, angles in degrees. What a clip has no seams, edges or faces for
         is None.
@@ -118,7 +118,7 @@ class MotionMeter(Meter):
 
 
 def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
-    """An empty meter for each level of a decoder, to which the frames of all segments are to be added.
+    """Return an empty meter for each level of a decoder, to which the frames of all segments are to be added.
 
     The bound of a level is the largest error that it promises, but not less than the file's bound.
 

@@ -92,7 +92,7 @@ class ShapeMeter(Meter):
         self._add_turns(is_face, normal, shown_normal)
 
     def _add_turns(self, is_face: np.ndarray, normal: np.ndarray, shown: np.ndarray) -> None:
-        """How the normals turn from frame to frame, from the last one added on."""
+        """Add how far the normals turn from frame to frame, from the last frame added on."""
         frames = is_face, normal, shown
         if self._last is not None:
             is_face, normal, shown = (np.concatenate([last, new]) for last, new in zip(self._last, frames))
@@ -102,7 +102,7 @@ class ShapeMeter(Meter):
         self.excess_turn.add(np.maximum(shown_turn - turn, 0.0))
 
     def _normals(self, frames: np.ndarray, rounding: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(k, F) areas, whether a face has one, (k, F, 3) unit normals, 0 where a face has no area at all."""
+        """Return (k, F) areas, whether a face has one, (k, F, 3) unit normals, 0 where a face has no area at all."""
         vectors, reaches = zip(*(_area_vectors(frames, faces) for faces in self._faces))
         vector = np.concatenate(vectors, axis=1)
         area = np.sqrt(np.einsum("tfi,tfi->tf", vector, vector))
@@ -111,8 +111,8 @@ class ShapeMeter(Meter):
 
 
 def edges_of(clip: MotionClip) -> np.ndarray | None:
-    """The edges of a clip to measure: the sides of its faces, each once; without faces its edges; without these the
-    links between neighbours on a stem.
+    """Return the edges of a clip to measure: the sides of its faces, each once; without faces its edges; without these
+    the links between neighbours on a stem.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def edges_of(clip: MotionClip) -> np.ndarray | None:
 
 
 def stem_links(vertex_branch: np.ndarray, stem_index: np.ndarray | None = None) -> np.ndarray:
-    """(E, 2) pairs of neighbours on a stem; see MotionClip for the parameters."""
+    """Return (E, 2) pairs of neighbours on a stem; see MotionClip for the parameters."""
     place = source_stem_index(vertex_branch) if stem_index is None else stem_index
     order = np.lexsort((place, vertex_branch))
     is_link = np.diff(vertex_branch[order]) == 0
@@ -141,13 +141,13 @@ def stem_links(vertex_branch: np.ndarray, stem_index: np.ndarray | None = None) 
 
 
 def _sides(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
-    """(E, 2) pairs of neighbouring corners, each once, without those of a vertex with itself."""
+    """Return (E, 2) pairs of neighbouring corners, each once, without those of a vertex with itself."""
     pairs = np.sort(sides(counts, indices), axis=1)
     return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
 
 
 def _by_size(counts: np.ndarray, indices: np.ndarray) -> list[np.ndarray]:
-    """Faces of three corners and more as (F, size) arrays, one for each size."""
+    """Return faces of three corners and more as (F, size) arrays, one for each size."""
     counts = np.asarray(counts, np.int64)
     starts = np.cumsum(counts) - counts
     sizes = np.unique(counts[counts > 2])
@@ -155,8 +155,8 @@ def _by_size(counts: np.ndarray, indices: np.ndarray) -> list[np.ndarray]:
 
 
 def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(k, F, 3) vectors along the normals, as long as the areas, of (F, size) faces; and (k, F) how far a face reaches
-    from its first corner."""
+    """Return (k, F, 3) vectors along the normals, as long as the areas, of (F, size) faces; and (k, F) how far a face
+    reaches from its first corner."""
     first, *others = (frames.take(corners, axis=1) for corners in faces.T)
     spokes = [corner - first for corner in others]
     vector = np.zeros_like(spokes[0])
@@ -167,13 +167,13 @@ def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """(k, E) lengths."""
+    """Return (k, E) lengths."""
     along = frames.take(edges[:, 1], axis=1) - frames.take(edges[:, 0], axis=1)
     return np.sqrt(np.einsum("tei,tei->te", along, along))
 
 
 def _degrees(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Angles between (..., 3) unit vectors; a right angle where one of them is 0."""
+    """Return angles between (..., 3) unit vectors; a right angle where one of them is 0."""
     apart, together = one - other, one + other
     sine, cosine = (np.sqrt(np.einsum("...i,...i->...", vectors, vectors)) for vectors in (apart, together))
     return np.degrees(2.0 * np.arctan2(sine, cosine))

@@ -138,13 +138,14 @@ class SmoothnessMeter(Meter):
 
 
 def second_differences(frames: np.ndarray, axis: int = 0) -> np.ndarray:
-    """x(t - 1) - 2 x(t) + x(t + 1) along an axis, which gets shorter by two."""
+    """Return x(t - 1) - 2 x(t) + x(t + 1) along an axis, which gets shorter by two."""
     with np.errstate(invalid="ignore"):
         return np.diff(frames, 2, axis=axis)
 
 
 def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
-    """How much more a motion jerks at its seams than usually: the largest acceleration near a seam over the median.
+    """Return how much more a motion jerks at its seams than usually: the largest acceleration near a seam over the
+    median.
 
     Parameters
     ----------
@@ -171,7 +172,7 @@ def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
 
 
 def _squares(vectors: np.ndarray) -> np.ndarray:
-    """Squared lengths of (..., 3) vectors, infinite where they are NaN."""
+    """Return squared lengths of (..., 3) vectors, infinite for vectors with NaN."""
     squares = np.einsum("...i,...i->...", vectors, vectors)
     squares[np.isnan(squares)] = inf
     return squares

@@ -495,7 +495,7 @@ def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> Non
 
 
 def is_name(text: str) -> bool:
-    """Whether it can be stored as UTF-8 and has no control characters below U+0080."""
+    """Return whether it can be stored as UTF-8 and has no control characters below U+0080."""
     return not any(c < " " or c == "\x7f" or "\ud800" <= c <= "\udfff" for c in text)
 
 
@@ -741,7 +741,7 @@ def _point(point: np.ndarray) -> str:
 
 
 def stands_still(clip: MotionClip) -> bool:
-    """Whether all frames are the rest pose; they are read once for a clip."""
+    """Return whether all frames are the rest pose; they are read once for a clip."""
     if clip._stands_still is None:
         frames = (clip.block(frame, frame + 1)[0] for frame in range(clip.frame_count))
         clip._stands_still = all(np.array_equal(frame, clip.source_rest) for frame in frames)

@@ -16,7 +16,7 @@ FAR = 64  # Distance from the origin, in extents of the plant, beyond which floa
 
 
 def is_far(points: np.ndarray) -> bool:
-    """Whether points (N, 3) lie so far from the origin, as those in map coordinates do, that float32 rounds them
+    """Return whether points (N, 3) lie so far from the origin, as those in map coordinates do, that float32 rounds them
     coarsely."""
     with np.errstate(all="ignore"):
         return bool(len(points) and np.abs(points).max() > FAR * np.ptp(points, axis=0).max())

@@ -237,12 +237,14 @@ def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip
     """Raise ClipError unless both are of the same plant."""
     if clip.vertex_count != first.vertex_count:
         raise ClipError(f"{name}: got {clip.vertex_count} vertices, expected {first.vertex_count} as {first_name} has")
-    for what in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
-        if not _equal(getattr(clip, what), getattr(first, what)):
-            raise ClipError(f"{name}: got other {what} than {first_name}, expected clips of one plant")
-    for what in sorted(clip.attributes.keys() | first.attributes.keys()):
-        if not _equal(clip.attributes.get(what), first.attributes.get(what)):
-            raise ClipError(f"{name}: got another attribute {what} than {first_name}, expected clips of one plant")
+    for name_of_array in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
+        if not _equal(getattr(clip, name_of_array), getattr(first, name_of_array)):
+            raise ClipError(f"{name}: got other {name_of_array} than {first_name}, expected clips of one plant")
+    for name_of_array in sorted(clip.attributes.keys() | first.attributes.keys()):
+        if not _equal(clip.attributes.get(name_of_array), first.attributes.get(name_of_array)):
+            raise ClipError(
+                f"{name}: got another attribute {name_of_array} than {first_name}, expected clips of one plant"
+            )
 
 
 def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
@@ -292,7 +294,7 @@ class _AllUnchanged:
 
 
 def _joined(parts: Sequence[Any]) -> Frames:
-    """Positions of several clips, one after the other."""
+    """Return positions of several clips, one after the other."""
     ranges = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
     dtype = np.result_type(*(part.dtype for part in parts))
 
@@ -315,7 +317,8 @@ def _run(positions: Any, first: int, last: int) -> Frames:
 
 
 def _blended(positions: Any, blend: int) -> Frames:
-    """All but the last `blend` frames; the first ones are blended from the frames that follow the new last one."""
+    """Return all but the last `blend` frames; the first ones are blended from the frames that follow the new last
+    one."""
     frame_count, dtype = positions.shape[0] - blend, positions.dtype
 
     def read(start: int, stop: int) -> np.ndarray:

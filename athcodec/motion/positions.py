@@ -81,12 +81,12 @@ def advice(orders: Sequence[Order]) -> str:
 def facts_of(arrays: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
     """Return the facts that arrays with the names of a clip's state; None for one that is missing."""
     facts = {}
-    for name, what in _COUNTED.items():
+    for name, axis in _COUNTED.items():
         values = np.asarray(arrays[name]) if arrays.get(name) is not None else np.zeros(0)
-        if values.size and what != INDICES:
-            facts[name] = what, len(values.reshape(-1) if what == FRAMES else values)
+        if values.size and axis != INDICES:
+            facts[name] = axis, len(values.reshape(-1) if axis == FRAMES else values)
         elif values.size and values.dtype.kind in "iu":
-            facts[name] = what, int(values.max())
+            facts[name] = axis, int(values.max())
     return facts
 
 
@@ -119,12 +119,12 @@ def order_of(shape: Sequence[int], facts: Facts, order: Order | None = None) -> 
             f"positions: got shape {tuple(shape)}, which is {shape[0]} frames of {shape[1]} vertices, but "
             f"{', '.join(conflicts(shape, facts))}; pass {advice(fitting)}"
         )
-    said = f"positions: got shape {tuple(shape)}, expected (frames, vertices, 3)"
-    raise ClipError(f"{said}; say the order of its axes: {advice(fitting or possible)}" if possible else said)
+    got = f"positions: got shape {tuple(shape)}, expected (frames, vertices, 3)"
+    raise ClipError(f"{got}; say the order of its axes: {advice(fitting or possible)}" if possible else got)
 
 
 def is_possible(shape: Sequence[int], order: Order | None = None) -> bool:
-    """Whether an array of this shape can have this order, or any."""
+    """Return whether an array of this shape can have this order, or any."""
     if order is None:
         return any(_possible(tuple(shape)))
     try:
@@ -190,7 +190,7 @@ def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
 
 
 def looks_turned(positions: Any, facts: Facts) -> bool:
-    """Whether frames look like paths of vertices, so that the array probably has vertices first.
+    """Return whether frames look like paths of vertices, so that the array probably has vertices first.
 
     A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If each frame is much
     smaller than the paths, and its points follow each other more closely than those of a path, frames and vertices have
@@ -268,17 +268,17 @@ def _possible_of_few(shape: tuple[int, ...]) -> Iterator[Order]:
 def conflicts(shape: Sequence[int], facts: Facts, order: Order = USUAL) -> list[str]:
     """Return what contradicts that an array of this shape has an order, in words. Raises ClipError where it cannot."""
     lengths = {FRAMES: 1} | _lengths(shape, order)
-    found = []
-    for name, (what, number) in facts.items():
-        if what == INDICES and number >= lengths[VERTICES]:
-            found.append(f"{name} name vertex {number}")
-        elif what != INDICES and number != lengths[what]:
-            found.append(f"{name} has {number} rows")
-    return found
+    lines = []
+    for name, (axis, number) in facts.items():
+        if axis == INDICES and number >= lengths[VERTICES]:
+            lines.append(f"{name} name vertex {number}")
+        elif axis != INDICES and number != lengths[axis]:
+            lines.append(f"{name} has {number} rows")
+    return lines
 
 
 def _confirm(shape: Sequence[int], facts: Facts) -> bool:
-    """Whether the facts fit frames and vertices of this shape, and not the other way round."""
+    """Return whether the facts fit frames and vertices of this shape, and not the other way round."""
     swapped: Order = (USUAL[1], USUAL[0], USUAL[2])
     return not conflicts(shape, facts) and bool(conflicts(shape, facts, swapped))
 

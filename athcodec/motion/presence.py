@@ -17,13 +17,13 @@ FAR = 1.1  # Ratio of the diagonals with and without a hidden part above which t
 
 
 def frame_runs(shown: np.ndarray) -> list[list[int]]:
-    """The [first, stop] frames of each run of True in `shown` (T,)."""
+    """Return the [first, stop] frames of each run of True in `shown` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]])))
     return edges.reshape(-1, 2).tolist()
 
 
 def stated_presence(metadata: Mapping[str, Any]) -> dict[str, list[list[int]]]:
-    """metadata["presence"], without entries that are no list of [first, stop] frames."""
+    """Return metadata["presence"], without entries that are no list of [first, stop] frames."""
     stated = metadata.get(PRESENCE)
     return {name: runs for name, runs in stated.items() if _are_runs(runs)} if isinstance(stated, dict) else {}
 
@@ -34,7 +34,7 @@ def _are_runs(runs: Any) -> bool:
 
 
 def presence_within(metadata: Mapping[str, Any], frames: range) -> dict[str, Any]:
-    """The metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
+    """Return the metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
     if PRESENCE not in metadata:
         return dict(metadata)
     cut = {}
@@ -51,7 +51,7 @@ def presence_of_parts(
 ) -> dict[int, np.ndarray]:
     """By the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those that
     show each of its copies, (T, copies)."""
-    found: dict[int, np.ndarray] = {}
+    presence: dict[int, np.ndarray] = {}
     stated = stated_presence(metadata)
     places = {name: number for number, name in enumerate(names)} if stated else {}
     for key, runs in stated.items():
@@ -63,27 +63,27 @@ def presence_of_parts(
         for first, stop in runs:
             shown[first:stop] = True
         if copy:
-            found.setdefault(part, np.ones((frame_count, copies[part]), bool))[:, int(copy)] = shown
+            presence.setdefault(part, np.ones((frame_count, copies[part]), bool))[:, int(copy)] = shown
         else:
-            found[part] = shown[:, None]
-    return found
+            presence[part] = shown[:, None]
+    return presence
 
 
 def parts_hidden_far_away(clip: Any) -> list[str]:
-    """The names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times as
-    long. Reads every frame of a MotionClip that has presence."""
+    """Return the names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times
+    as long. Reads every frame of a MotionClip that has presence."""
     counts, names = clip.attributes.get("part_vertex_counts"), clip.metadata.get("part_names")
     if not stated_presence(clip.metadata) or counts is None or np.shape(counts) != np.shape(names):
         return []
     copies = clip.attributes.get("part_copies", np.ones_like(counts))
-    found = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
+    presence = presence_of_parts(clip.metadata, names, copies.tolist(), clip.frame_count)
     starts = np.cumsum(counts) - counts
     # The last row is what is shown.
     low, high = np.full((2, len(names) + 1, 3), np.inf) * np.array([1, -1])[:, None, None]
     for start, block in clip.blocks():
         for frame, positions in enumerate(block, start):
             is_shown = np.ones(len(positions), bool)
-            for part, shown in found.items():
+            for part, shown in presence.items():
                 rows = slice(starts[part], starts[part] + counts[part])
                 is_shown[rows] = np.repeat(shown[frame], counts[part] // shown.shape[1])
                 hidden = positions[rows][~is_shown[rows]]
@@ -93,4 +93,4 @@ def parts_hidden_far_away(clip: Any) -> list[str]:
             high[-1] = np.maximum(high[-1], positions[is_shown].max(axis=0, initial=-np.inf))
     with np.errstate(invalid="ignore"):  # inf - inf where nothing is shown or hidden
         diagonals = np.linalg.norm(np.maximum(high, high[-1]) - np.minimum(low, low[-1]), axis=1)
-        return [names[part] for part in found if diagonals[part] > FAR * diagonals[-1]]
+        return [names[part] for part in presence if diagonals[part] > FAR * diagonals[-1]]

@@ -6,13 +6,13 @@ import numpy as np
 
 
 def normalized(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) at length 1; without a rotation where they have none."""
+    """Return quaternions (..., 4) at length 1; a quaternion of length 0 becomes the one without a rotation."""
     length = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     return np.where(length > 0, quaternions / np.where(length > 0, length, 1.0), [0.0, 0.0, 0.0, 1.0])
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of unit quaternions (..., 4), x y z w."""
+    """Return (..., 3, 3) of unit quaternions (..., 4), x y z w."""
     x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
     rows = [
         1 - 2 * (y * y + z * z),
@@ -29,7 +29,7 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 
 def quaternions(rotations: np.ndarray) -> np.ndarray:
-    """(..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
+    """Return (..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
     m = np.moveaxis(rotations, (-2, -1), (0, 1))
     squares = np.stack(
         [
@@ -52,5 +52,5 @@ def quaternions(rotations: np.ndarray) -> np.ndarray:
         -2,
     )
     best = squares.argmax(axis=-1)
-    found = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+    unscaled = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    return unscaled / np.linalg.norm(unscaled, axis=-1, keepdims=True)

@@ -40,7 +40,7 @@ def _in_units(clip: MotionClip, unit: str | None) -> MotionClip:
 
 
 def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
-    """Turned by the right angle that takes its up axis to the wanted one."""
+    """Return the clip turned by the right angle that takes its up axis to the wanted one."""
     if up_axis is None:
         return clip
     stated = clip.metadata.get("up_axis") or up_axis

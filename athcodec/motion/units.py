@@ -103,14 +103,14 @@ LengthLike: TypeAlias = float | str | Length
 """A length as a caller passes it: a number in scene units, or text with or without a unit, such as "1mm"."""
 
 
-def parse_length(text: str, what: str = "length") -> Length:
+def parse_length(text: str, name: str = "length") -> Length:
     """Read a length.
 
     Parameters
     ----------
     text : str
         A number, with or without a unit: "2e-3", "1mm", "0.5 cm".
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -125,19 +125,19 @@ def parse_length(text: str, what: str = "length") -> Length:
     match = _QUANTITY.fullmatch(text)
     if not match or match[2] not in ("", *METRES) or float(match[1]) == math.inf:
         raise BoundError(
-            f"{what}: got {text!r}, expected a number in scene units or one followed by {', '.join(METRES)}"
+            f"{name}: got {text!r}, expected a number in scene units or one followed by {', '.join(METRES)}"
         )
     return Length(float(match[1]), match[2])
 
 
-def length_of(length: Any, what: str = "length") -> Length:
+def length_of(length: Any, name: str = "length") -> Length:
     """Return a length that a caller passes as LengthLike; numbers may be NaN, infinite or negative.
 
     Parameters
     ----------
     length : float, str or Length
         A number in scene units, or text as `parse_length` takes it.
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -154,18 +154,18 @@ def length_of(length: Any, what: str = "length") -> Length:
     if isinstance(length, Length):
         return length
     if isinstance(length, str):
-        return parse_length(length, what)
-    return Length(real(what, length, 'such as 0.01, or text such as "1cm"'))
+        return parse_length(length, name)
+    return Length(real(name, length, 'such as 0.01, or text such as "1cm"'))
 
 
-def parse_size(text: str, what: str = "size") -> int:
+def parse_size(text: str, name: str = "size") -> int:
     """Read a size in bytes.
 
     Parameters
     ----------
     text : str
         A number, with or without a unit: "50000", "50kB", "1.5MiB".
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -181,18 +181,18 @@ def parse_size(text: str, what: str = "size") -> int:
     match = _QUANTITY.fullmatch(text)
     size = float(match[1]) * BYTES[match[2]] if match and match[2] in BYTES else 0.0
     if not 1 <= size < 2**63:
-        raise BoundError(f"{what}: got {text!r}, expected bytes, at least one: 50000, 50kB, 1.5MB or 48KiB")
+        raise BoundError(f"{name}: got {text!r}, expected bytes, at least one: 50000, 50kB, 1.5MB or 48KiB")
     return int(size)
 
 
-def size_of(size: Any, what: str = "size") -> int:
+def size_of(size: Any, name: str = "size") -> int:
     """Return a size in bytes that a caller passes: a number, or text as `parse_size` takes it.
 
     Parameters
     ----------
     size : int, float or str
         Bytes.
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -208,10 +208,10 @@ def size_of(size: Any, what: str = "size") -> int:
         If it is neither text nor a number.
     """
     if isinstance(size, str):
-        return parse_size(size, what)
-    number = real(what, size, 'of bytes, or text such as "50kB"')
+        return parse_size(size, name)
+    number = real(name, size, 'of bytes, or text such as "50kB"')
     if not math.isfinite(number):
-        raise BoundError(f"{what}: got {number}; expected a finite number of bytes")
+        raise BoundError(f"{name}: got {number}; expected a finite number of bytes")
     return int(number)
 
 
@@ -234,14 +234,14 @@ def metres_of(metadata: Mapping[str, Any]) -> float | None:
     return None
 
 
-def checked_unit(unit: Any, what: str = "unit") -> str:
+def checked_unit(unit: Any, name: str = "unit") -> str:
     """Return a unit that an option names, a symbol of METRES.
 
     Parameters
     ----------
     unit : str
         "m", "cm", "mm", "km", "in" or "ft".
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -257,17 +257,17 @@ def checked_unit(unit: Any, what: str = "unit") -> str:
         return str(unit)
     near = unit_symbol(unit.decode("utf-8", "replace") if isinstance(unit, bytes) else unit)
     hint = f"; did you mean {near!r}?" if near in METRES else ""
-    raise ClipError(f"{what}: got {unit!r:.80}, expected one of {', '.join(METRES)}{hint}")
+    raise ClipError(f"{name}: got {unit!r:.80}, expected one of {', '.join(METRES)}{hint}")
 
 
-def checked_axis(axis: Any, what: str = "up_axis") -> str:
+def checked_axis(axis: Any, name: str = "up_axis") -> str:
     """Return an axis that an option names.
 
     Parameters
     ----------
     axis : str
         "x", "y" or "z".
-    what : str, optional
+    name : str, optional
         The name that an error message begins with.
 
     Returns
@@ -283,7 +283,7 @@ def checked_axis(axis: Any, what: str = "up_axis") -> str:
         return str(axis)
     near = re.fullmatch(r"\s*\+?([xyz])(?:[ _-]?(?:up|axis))?\s*", str(axis).lower())
     hint = f"; did you mean {near[1]!r}?" if near else ""
-    raise ClipError(f"{what}: got {axis!r:.80}, expected one of {', '.join(AXES)}{hint}")
+    raise ClipError(f"{name}: got {axis!r:.80}, expected one of {', '.join(AXES)}{hint}")
 
 
 def stated_scene(metadata: Mapping[str, Any]) -> dict[str, str]:

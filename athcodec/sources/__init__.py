@@ -205,11 +205,11 @@ class Format:
     package: str = ""
 
     def begins(self, head: bytes) -> bool:
-        """Whether the first bytes of a file are those of this format."""
+        """Return whether the first bytes of a file are those of this format."""
         return bool(self.magic) and any(head.startswith(self.magic, place) for place in self.magic_places)
 
     def ends(self, name: str) -> bool:
-        """Whether the suffix of a file's name, in lower case, is one of this format's."""
+        """Return whether the suffix of a file's name, in lower case, is one of this format's."""
         return Path(name.removesuffix(SERIES) if self.has_series else name).suffix in self.suffixes
 
     @property
@@ -370,7 +370,7 @@ def _warn_of_frames(path: str | PathLike[str]) -> None:
 
 
 def listed(not_read: Mapping[str, Sequence[str]]) -> str:
-    """MotionClip.not_read in words: each kind once, with its first names."""
+    """Return motionclip.not_read in words: each kind once, with its first names."""
     return "; ".join(
         f"{kind} {', '.join(names[:LISTED])}{f' and {len(names) - LISTED} more' if len(names) > LISTED else ''}"
         f"{MEANINGS.get(kind, '')}"
@@ -379,17 +379,17 @@ def listed(not_read: Mapping[str, Sequence[str]]) -> str:
 
 
 def besides(not_read: Mapping[str, Sequence[str]]) -> str:
-    """The end of an error about a source of which nothing can be read: what it holds instead."""
+    """Return the end of an error about a source of which nothing can be read: what it holds instead."""
     return f"; not read: {listed(not_read)}" if not_read else ""
 
 
 def is_pattern(path: str | PathLike[str]) -> bool:
-    """Whether a path stands for numbered files, by # or %04d in its name, and is none itself."""
+    """Return whether a path stands for numbered files, by # or %04d in its name, and is none itself."""
     return NUMBER_PATTERN.fullmatch(Path(path).name) is not None and not os.path.exists(path)
 
 
 def format_named(name: str, formats: Iterable[Format]) -> Format:
-    """The one of `formats` with this name. Raises ValueError."""
+    """Return the one of `formats` with this name. Raises ValueError."""
     known = []
     for candidate in formats:
         if candidate.name == name:
@@ -399,7 +399,7 @@ def format_named(name: str, formats: Iterable[Format]) -> Format:
 
 
 def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], content: str = UNKNOWN) -> Format:
-    """The first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
+    """Return the first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
     ClipError."""
     name, candidates = Path(path).name.lower(), iter(formats)
     known: list[str] = []
@@ -427,7 +427,7 @@ def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[
 
 
 def find_format(path: str | PathLike[str]) -> Format:
-    """The format of a file, by its first bytes or else its suffix. Raises ClipError, OSError."""
+    """Return the format of a file, by its first bytes or else its suffix. Raises ClipError, OSError."""
     if is_pattern(path):
         head = b"#"
     else:
@@ -515,7 +515,7 @@ def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> 
 
 
 def sample_path(name: str = "tree") -> Path:
-    """A clip that is installed with athcodec.
+    """Return a clip that is installed with athcodec.
 
     Parameters
     ----------
@@ -534,7 +534,7 @@ def sample_path(name: str = "tree") -> Path:
     ValueError
         For another name.
     """
-    files = {own: f"{own}_1k_120f.h5" for own in SAMPLES} | {
+    files = {name_of_sample: f"{name_of_sample}_1k_120f.h5" for name_of_sample in SAMPLES} | {
         "leafed": "leafed_tree.ath",
         "fern": "fern.ath",
         "grass": "grass.ath",

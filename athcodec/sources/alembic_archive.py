@@ -74,7 +74,7 @@ BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, Unicod
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """The clip in an archive. Raises ClipError."""
+    """Return the clip in an archive. Raises ClipError."""
     unchanged = FileWatch(path)
     try:
         clip = _clip(Abc.IArchive(path), options)
@@ -106,7 +106,7 @@ class _Track:
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def at(self, time: float) -> list[tuple[int, float]]:
-        """Numbers of samples and their weights."""
+        """Return numbers of samples and their weights."""
         after = int(np.searchsorted(self.times, time))
         low = max(0, after - 1)
         high = min(after, len(self.times) - 1)
@@ -163,7 +163,7 @@ class _Place:
         yield from (each.track for each in (*self.xforms, *self.visibilities))
 
     def shown(self, times: np.ndarray) -> np.ndarray:
-        """(T,) whether the object is shown: the nearest that says anything decides."""
+        """Return (T,) whether the object is shown: the nearest that says anything decides."""
         stated = np.full(len(times), -1)
         for visibility in self.visibilities:
             stated = np.where(stated < 0, visibility.at(times), stated)
@@ -175,7 +175,7 @@ class _Place:
         return self.shown(np.unique([0.0, *(time for each in self.visibilities for time in each.track.times)])).any()
 
     def matrix(self, time: float) -> np.ndarray:
-        """(4, 4) to the world."""
+        """Return (4, 4) to the world."""
         matrix = np.eye(4)
         for xform in self.xforms:
             matrix = matrix @ xform.at(time)
@@ -205,7 +205,7 @@ class _Object(SceneObject):
 def _clip(archive: Any, options: ReadOptions) -> MotionClip:
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
-    own, kept = _kept(archive)
+    metadata, kept = _kept(archive)
     not_read: dict[str, list[str]] = {}
     objects = _together(_find(archive, options.only, not_read))
     times, rate = _times(archive, objects, options.fps)
@@ -242,7 +242,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
         objects,
         frames_of_objects(objects, len(times), sample),
         times - times[0],
-        own_metadata(own) | _metadata(archive, times, rate),
+        own_metadata(metadata) | _metadata(archive, times, rate),
         kept,
         options,
         not_read=not_read,
@@ -253,7 +253,8 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
 
 
 def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
-    """All objects that are read, those of instances too; adds the others to not_read, by the names of their kinds."""
+    """Return all objects that are read, those of instances too; adds the others to not_read, by the names of their
+    kinds."""
     objects, visited, refused = [], 0, list[str]()
     waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
@@ -273,10 +274,11 @@ def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> 
             children.append((child, below, source))
         waiting += reversed(children)
     if not objects:
-        what = f" named like {', '.join(only)}" if only else ""
+        filtered = f" named like {', '.join(only)}" if only else ""
         names = f", or {', '.join(refused[:LISTED])}" if refused else ""
         raise ClipError(
-            f"objects: got none with points{what}, expected a visible mesh, curves or points{names}{besides(not_read)}"
+            f"objects: got none with points{filtered}, expected a visible mesh, curves or points"
+            f"{names}{besides(not_read)}"
         )
     return objects
 
@@ -295,37 +297,37 @@ def _is_named(child: Any, patterns: Sequence[str]) -> bool:
 
 
 def _together(objects: list[_Object]) -> list[_Object]:
-    """Instances of one object, whose shape stays as it is, as copies at the place of the first."""
+    """Return instances of one object, whose shape stays as it is, as copies at the place of the first."""
     by_source: dict[str, _Object] = {}
-    found = []
+    remaining = []
     for obj in objects:
         first = by_source.get(obj.source)
         if first is None:
             by_source[obj.source] = obj
-            found.append(obj)
+            remaining.append(obj)
         elif len(obj.track.times) > 1:
-            found.append(obj)
+            remaining.append(obj)
         else:
             first.places += obj.places
-    return found
+    return remaining
 
 
 def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]) -> _Place:
-    """Adds an object that has points and is shown; returns where its children hang."""
+    """Add an object that has points and is shown; returns where its children hang."""
     name = _schema(child)
     if unread := _unread_properties(child):
         not_read.setdefault("attribute", []).extend(f"{child.getFullName()}.{each}" for each in unread)
     if name.startswith("AbcGeom_Xform"):
         return replace(place, xforms=_above(child, place.xforms))
-    found = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
+    kinds = next((schema for start, schema in SCHEMAS.items() if name.startswith(start)), None)
     if name.startswith("AbcGeom_FaceSet"):
         return place  # A mesh is read together with its face sets.
-    if found is None and name:
+    if kinds is None and name:
         kind = name.partition("_")[2].rpartition("_")[0] or name  # For example NuPatch of AbcGeom_NuPatch_v2.
         not_read.setdefault(kind, []).append(child.getFullName())
-    if found is None:
+    if kinds is None:
         return place
-    kind, wrap = found
+    kind, wrap = kinds
     schema = wrap(child, EXISTING).getSchema()
     points = schema.getPositionsProperty()
     if not points.getNumSamples():
@@ -339,7 +341,7 @@ def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_rea
 
 
 def _unread_properties(child: Any) -> list[str]:
-    """The names of properties beside the schema of an object, and, of a transform, of what users add to it."""
+    """Return the names of properties beside the schema of an object, and, of a transform, of what users add to it."""
     if child.isInstanceRoot() or child.isInstanceDescendant():
         return []  # They are named where the instance's source stands.
     schema = (child.getHeader().getMetaData().get("schemaObjTitle") or "").rpartition(":")[2]
@@ -361,8 +363,8 @@ def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
     count = schema.getNumSamples()
     if not count or _is_own(schema):
         return above
-    own = _Xform(schema, _Track(schema.getTimeSampling(), 1 if schema.isConstant() else count))
-    return [own, *above]
+    transform = _Xform(schema, _Track(schema.getTimeSampling(), 1 if schema.isConstant() else count))
+    return [transform, *above]
 
 
 def _track(samples: Any) -> _Track:
@@ -379,7 +381,7 @@ def _visibility(child: Any) -> Iterator[_Visibility]:
 
 
 def _follow_ids(obj: _Object) -> None:
-    """Notes the ids of points that stand in another order in some sample."""
+    """Note the ids of points that stand in another order in some sample."""
     samples = obj.schema.getIdsProperty() if obj.kind == "points" else None
     if samples is None or not samples.valid() or samples.isConstant():
         return
@@ -389,7 +391,7 @@ def _follow_ids(obj: _Object) -> None:
 
 
 def _topology(obj: _Object) -> None:
-    """Fills in faces or curves."""
+    """Fill in faces or curves."""
     if obj.kind == "curves":
         sample = obj.schema.getValue()
         obj.curve_counts = _fixed(obj, obj.schema.getNumVerticesProperty())
@@ -411,18 +413,18 @@ def _topology(obj: _Object) -> None:
 
 
 def _name_unread(obj: _Object) -> None:
-    """Names the properties of an object that hold something and are not read."""
+    """Name the properties of an object that hold something and are not read."""
     for name in UNREAD:
-        found = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
-        if found.valid() and found.getNumSamples():
-            values = np.array(found.getValue())
+        prop = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
+        if prop.valid() and prop.getNumSamples():
+            values = np.array(prop.getValue())
             obj.left_out += [name] * bool(values.size if values.ndim else values)
     further = obj.schema.getUserProperties()
     obj.left_out += ["userProperties"] * bool(further.valid() and further.getNumProperties())
 
 
 def _bind_materials(obj: _Object) -> None:
-    """By the names of face sets, in which programs write those of materials."""
+    """Take materials from the names of face sets, where programs write them."""
     for name in obj.schema.getFaceSetNames():
         face_set = obj.schema.getFaceSet(name).getSchema()
         obj.left_out += [f"{name} (a face set that changes)"] * (not face_set.isConstant())
@@ -431,16 +433,16 @@ def _bind_materials(obj: _Object) -> None:
             obj.bind(str(name), faces)
 
 
-def _fixed(obj: _Object, found: Any) -> np.ndarray:
-    """Integers that are the same in every frame; ClipError where they change."""
-    first = np.array(found.getValue(), np.int32)
-    if found.isConstant():
+def _fixed(obj: _Object, values: Any) -> np.ndarray:
+    """Return integers that are the same in every frame; ClipError where they change."""
+    first = np.array(values.getValue(), np.int32)
+    if values.isConstant():
         return first
-    track = _Track(found.getTimeSampling(), found.getNumSamples())
+    track = _Track(values.getTimeSampling(), values.getNumSamples())
     for i in range(1, len(track.times)):
-        if not np.array_equal(np.array(found.getValue(track.sample(i)), np.int32), first):
+        if not np.array_equal(np.array(values.getValue(track.sample(i)), np.int32), first):
             raise ClipError(
-                f"{obj.path}: {found.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
+                f"{obj.path}: {values.getName()} changes in frame {i} (at {track.times[i]:g} s), expected "
                 "the same vertices and faces in all"
             )
     return first
@@ -450,7 +452,7 @@ def _fixed(obj: _Object, found: Any) -> np.ndarray:
 
 
 def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
-    """Seconds of the frames in the archive, and frames per second, None where nothing says it."""
+    """Return seconds of the frames in the archive, and frames per second, None where nothing says it."""
     tracks = [track for obj in objects for track in obj.tracks()]
     if not tracks:
         return np.zeros(1), fps
@@ -467,9 +469,10 @@ def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.
 
 
 def _rate(archive: Any, step: float, times: np.ndarray) -> float:
-    """The rate of the samples; where their steps differ, the one that the archive states for the tool that made it."""
-    said = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
-    rate = 1 / step if step > 0 else float(said) or 1 / float(np.median(np.diff(times)))
+    """Return the rate of the samples; where their steps differ, the one that the archive states for the tool that made
+    it."""
+    stated = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
+    rate = 1 / step if step > 0 else float(stated) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
     for exact in (float(round(rate)), nice, (round(rate * 1001 / 1000) * 1000) / 1001):
         if exact > 0 and math.isclose(rate, exact, rel_tol=1e-12 if step > 0 else 1e-6):
@@ -543,7 +546,7 @@ def _own_properties(schema: Any) -> Any:
 
 
 def _is_own(schema: Any) -> bool:
-    """Whether a transform is the one above everything in a file of ours, which only turns Z up into Y up."""
+    """Return whether a transform is the one above everything in a file of ours, which only turns Z up into Y up."""
     return _own_properties(schema) is not None
 
 
@@ -571,27 +574,27 @@ def _kept(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]
 def _descriptor(text: str) -> ArrayDescriptor:
     """Return the object of a JSON text; an empty one if it cannot be parsed."""
     try:
-        found = ArrayDescriptor(**json.loads(text))
+        descriptor = ArrayDescriptor(**json.loads(text))
     except (ValueError, TypeError, RecursionError):
         return ArrayDescriptor()
-    return found if all(isinstance(value, str) for value in found) else ArrayDescriptor()
+    return descriptor if all(isinstance(value, str) for value in descriptor) else ArrayDescriptor()
 
 
 # ---- positions ----
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
-    found = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
-    counts = {len(points) for points, _ in found}
+    samples = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
+    counts = {len(points) for points, _ in samples}
     if len(counts) != 1:
         raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")
-    if len(found) == 1:
-        return found[0][0]
-    return sum(points.astype(np.float64) * weight for points, weight in found).astype(np.float32)
+    if len(samples) == 1:
+        return samples[0][0]
+    return sum(points.astype(np.float64) * weight for points, weight in samples).astype(np.float32)
 
 
 def _sample(obj: _Object, number: int) -> np.ndarray:
-    """(n, 3) points of a sample."""
+    """Return (n, 3) points of a sample."""
     when = obj.track.sample(number)
     points = np.array(obj.points.getValue(when), np.float32).reshape(-1, 3)
     if obj.ids is None:
@@ -601,6 +604,6 @@ def _sample(obj: _Object, number: int) -> np.ndarray:
 
 
 def _matrix(obj: _Object, time: float) -> np.ndarray:
-    """(4, 4) to the world; of what has instances (copies, 4, 4)."""
+    """Return (4, 4) to the world; of what has instances (copies, 4, 4)."""
     matrices = np.stack([place.matrix(time) for place in obj.places])
     return matrices if len(matrices) > 1 else matrices[0]

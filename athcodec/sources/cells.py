@@ -133,14 +133,15 @@ class Topology:
 
 
 def base_kind(kind: str) -> str:
-    """The type of first order with the same corners."""
+    """Return the type of first order with the same corners."""
     return kind.rstrip("0123456789")
 
 
 def blocks_of(
     types: np.ndarray, starts: np.ndarray, stops: np.ndarray, nodes: np.ndarray, names: dict[int, str]
 ) -> list[Block]:
-    """Cells whose nodes lie between starts and stops, each of a type of `names`. Raises ClipError for another one."""
+    """Return cells whose nodes lie between starts and stops, each of a type of `names`. Raises ClipError for another
+    one."""
     blocks = []
     for number in np.unique(types):
         name = names.get(int(number))
@@ -160,7 +161,7 @@ def blocks_of(
 
 
 def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
-    """Raises ClipError where a cell has a vertex that does not exist."""
+    """Raise ClipError where a cell has a vertex that does not exist."""
     for block in blocks:
         if block.nodes.size and not 0 <= block.nodes.min() <= block.nodes.max() < vertex_count:
             raise ClipError(
@@ -237,7 +238,7 @@ def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
 
 
 def _in_order(counts: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """The corners of the polygons in another order."""
+    """Return the corners of the polygons in another order."""
     starts, wanted = np.cumsum(counts) - counts, counts[order]
     inside = np.arange(wanted.sum()) - np.repeat(np.cumsum(wanted) - wanted, wanted)
     return corners[np.repeat(starts[order], wanted) + inside]
@@ -252,7 +253,7 @@ def _keep_volumes(topology: Topology, volumes: Sequence[Block]) -> None:
 
 
 def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """(counts, corners) of the sides that only one cell has and no face is yet, triangles first."""
+    """Return (counts, corners) of the sides that only one cell has and no face is yet, triangles first."""
     found_counts, found_corners = [], []
     for size in (3, 4):
         sides = [
@@ -263,8 +264,8 @@ def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[
         sides = np.concatenate(sides)
         faces = _faces_of_size(counts, corners, size)
         keys = np.sort(np.concatenate([sides, faces]), axis=1)
-        _, which, often = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-        alone = sides[often[which.reshape(-1)[: len(sides)]] == 1]
+        _, number, often = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        alone = sides[often[number.reshape(-1)[: len(sides)]] == 1]
         found_counts.append(np.full(len(alone), size))
         found_corners.append(alone.reshape(-1))
     none = np.zeros(0, np.int64)

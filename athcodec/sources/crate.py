@@ -18,7 +18,7 @@ COMPRESSED = (0, 4, 0)  # the version since which the sections are compressed
 
 
 def check_crates(path: str) -> None:
-    """ClipError where `path` is a crate, or a zip of crates, whose counts do not fit its size."""
+    """Raise ClipError if `path` is a crate, or a zip of crates, whose counts do not fit its size."""
     with open_plain(path) as file:
         head = file.read(8)
         if head == MAGIC:
@@ -31,7 +31,7 @@ def check_crates(path: str) -> None:
 
 
 def _members(file: BinaryIO) -> list[tuple[int, int]]:
-    """(start, size) of what a .usdz holds, which is stored without compression."""
+    """Return (start, size) of what a .usdz holds, which is stored without compression."""
     try:
         with zipfile.ZipFile(file) as archive:
             entries = [(member.header_offset, member.file_size) for member in archive.infolist()]
@@ -84,14 +84,14 @@ def _sections(file: BinaryIO, start: int, size: int, contents: int) -> list[tupl
         raise ClipError(f"stage: got {count} sections, expected at most {MAX_SECTIONS}")
     table = _read(file, start, size, contents + 8, 32 * count)
     known = ("TOKENS", "STRINGS", "FIELDS", "FIELDSETS", "PATHS", "SPECS")
-    found = []
+    sections = []
     for name, place, length in struct.iter_unpack("<16s2q", table):
         text = name.split(b"\0")[0].decode("ascii", "replace")
         if not (0 <= place <= size and 0 <= length <= size - place):
             raise ClipError(f"stage: got a section {text} behind the end, expected it within {size} bytes")
         if text in known:
-            found.append((text, place, length))
-    return found
+            sections.append((text, place, length))
+    return sections
 
 
 def _read(file: BinaryIO, start: int, size: int, place: int, length: int) -> bytes:

@@ -20,7 +20,7 @@ from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Part, Topology
 from athcodec.sources.mesh import kind_of
-from athcodec.sources.scene_objects import scene_said
+from athcodec.sources.scene_objects import scene_fields
 
 AMBIGUOUS = "u"  # Name of the displacement in some programs and of the velocity in others.
 DISPLACEMENTS = ("displacement", "displacements", "disp", "displ", AMBIGUOUS)
@@ -39,19 +39,19 @@ class Steps(Protocol):
     elsewhere: Mapping[str, str]
 
     def points(self, step: int) -> np.ndarray:
-        """(N, 2) or (N, 3) points of the mesh."""
+        """Return (N, 2) or (N, 3) points of the mesh."""
 
     def fields(self) -> Sequence[str]:
-        """The names of the fields per point."""
+        """Return the names of the fields per point."""
 
     def field(self, step: int, name: str) -> np.ndarray:
-        """(N, ...) values of a field."""
+        """Return (N, ...) values of a field."""
 
     def fixed_points(self) -> bool:
-        """Whether all steps have the points of the first."""
+        """Return whether all steps have the points of the first."""
 
     def check(self, step: int) -> None:
-        """Raises ClipError where the cells are others than in the first step."""
+        """Raise ClipError where the cells are others than in the first step."""
 
 
 def clip_of_steps(
@@ -66,9 +66,11 @@ def clip_of_steps(
     parts: Sequence[Part] = (),
     not_read: Mapping[str, list[str]] | None = None,
 ) -> MotionClip:
-    """The clip of a result at (T,) times. static: data per point that do not change. parts: the objects that the points
-    are, one after the other, "" for one without a name. Raises ClipError where nothing moves, or it is not clear what
-    does."""
+    """Return the clip of a result at (T,) times.
+
+    `static` holds the data per point that do not change, and `parts` the objects that the points form one after the
+    other, "" for one without a name. Raises ClipError if nothing moves, or if it is not clear what does.
+    """
     first = _padded(steps.points(0))
     fixed = steps.fixed_points()
     moved_by = _displacement(steps, fixed, len(time), options)
@@ -79,7 +81,43 @@ def clip_of_steps(
             GuessWarning,
             stacklevel=2,
         )
-    topology, count = steps.topology, len(first)
+    frames = _frames(steps, first, fixed, moved_by, len(time))
+    topology, names = steps.topology, _names_of_static(static, steps)
+    attributes = topology.attributes | {new: static[key] for key, new in names.items()}
+    attributes = {key: values for key, values in attributes.items() if key not in options.skip}
+    metadata, numbers = scene_fields(metadata, len(first))
+    parts = parts or (Part("", len(first)),)
+    attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
+    domains = topology.domains | dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
+    facts = {
+        "part_names": [part.name or name for part in parts],
+        "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
+        "domains": {key: domain for key, domain in domains.items() if key in attributes},
+    }
+    kept = {*names, *options.skip, moved_by}
+    moving = [key for key in steps.fields() if key not in kept] + [
+        key for key in steps.left_out if key not in options.skip
+    ]
+    moving = list(dict.fromkeys(moving))
+    rest = first.astype(frames.dtype) if moved_by and options.rest == "auto" else None
+    return MotionClip(
+        frames,
+        time,
+        faces=topology.faces,
+        edges=topology.edges,
+        rest=rest,
+        rest_pose="mean" if options.rest == "mean" else "first",
+        attributes=attributes,
+        metadata=facts | metadata,
+        resource=resource,
+        unchanged=unchanged,
+        not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
+    )
+
+
+def _frames(steps: Steps, first: np.ndarray, fixed: bool, moved_by: str | None, frame_count: int) -> Frames:
+    """Return the positions at each step: the points, or with `moved_by` the points and this displacement of them."""
+    count = len(first)
     dtype = _dtype(first, _padded(steps.field(0, moved_by)) if moved_by else first)
 
     def frame(step: int) -> np.ndarray:
@@ -101,43 +139,19 @@ def clip_of_steps(
         with np.errstate(over="ignore", invalid="ignore"):
             return np.stack([frame(step).astype(dtype) for step in range(start, stop)])
 
-    domains = dict(topology.domains)
-    names = {key: f"vertex_{key}" if key in topology.attributes else key for key in static}
-    names = {key: new for key, new in names.items() if new not in RESERVED_NAMES and new not in topology.attributes}
-    attributes = topology.attributes | {new: static[key] for key, new in names.items()}
-    attributes = {key: values for key, values in attributes.items() if key not in options.skip}
-    metadata, numbers = scene_said(metadata, count)
-    parts = parts or (Part("", count),)
-    attributes |= {"part_vertex_counts": np.array([part.point_count for part in parts], np.int32)} | numbers
-    domains |= dict.fromkeys(("part_vertex_counts", "part_copies"), "constant")
-    said = {
-        "part_names": [part.name or name for part in parts],
-        "part_kinds": _kinds(parts, polygons(topology.faces, topology.attributes), topology.edges),
-        "domains": {key: domain for key, domain in domains.items() if key in attributes},
-    }
-    kept = {*names, *options.skip, moved_by}
-    moving = [key for key in steps.fields() if key not in kept] + [
-        key for key in steps.left_out if key not in options.skip
-    ]
-    moving = list(dict.fromkeys(moving))
-    rest = first.astype(dtype) if moved_by and options.rest == "auto" else None
-    return MotionClip(
-        Frames(read, len(time), count, dtype),
-        time,
-        faces=topology.faces,
-        edges=topology.edges,
-        rest=rest,
-        rest_pose="mean" if options.rest == "mean" else "first",
-        attributes=attributes,
-        metadata=said | metadata,
-        resource=resource,
-        unchanged=unchanged,
-        not_read=({"field": moving} if moving else {}) | dict(not_read or {}),
-    )
+    return Frames(read, frame_count, count, dtype)
+
+
+def _names_of_static(static: Mapping[str, np.ndarray], steps: Steps) -> dict[str, str]:
+    """Return the name of the attribute that each static array becomes; an array is left out if all of its names are
+    in use."""
+    attributes = steps.topology.attributes
+    names = {key: f"vertex_{key}" if key in attributes else key for key in static}
+    return {key: name for key, name in names.items() if name not in RESERVED_NAMES and name not in attributes}
 
 
 def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None) -> list[str]:
-    """The kind of each part."""
+    """Return the kind of each part."""
     if len(parts) == 1:
         return [kind_of(faces, edges)]
     stops = np.cumsum([part.point_count for part in parts])
@@ -149,7 +163,7 @@ def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, e
 
 
 def _padded(points: np.ndarray) -> np.ndarray:
-    """(N, 3) of (N, 2) or (N, 3)."""
+    """Return (N, 3) of (N, 2) or (N, 3)."""
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.dtype.kind not in "fiu":
         raise ClipError(f"points: got {points.dtype} of shape {points.shape}, expected two or three numbers each")
     return points if points.shape[1] == 3 else np.pad(points, ((0, 0), (0, 1)))
@@ -161,7 +175,7 @@ def _dtype(*arrays: np.ndarray) -> type:
 
 
 def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptions) -> str | None:
-    """The name of the field to add to the points; None: they move themselves."""
+    """Return the name of the field to add to the points; None: they move themselves."""
     names = list(steps.fields())
     others = _listed([f"{key} ({place})" for key, place in steps.elsewhere.items()])
     listed = _listed(names) + (f"; not per point: {others}" if steps.elsewhere else "")
@@ -171,17 +185,17 @@ def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptio
         return options.field
     if not fixed:
         return None
-    found = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
-    if len(found) > 1:
-        raise ClipError(f"field: got {_listed(found)}, expected one displacement; name it with --field")
-    if not found and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
+    matching = [name for name in names if name.lower() in DISPLACEMENTS and _is_vector(steps.field(0, name))]
+    if len(matching) > 1:
+        raise ClipError(f"field: got {_listed(matching)}, expected one displacement; name it with --field")
+    if not matching and step_count > 1 and (names or steps.elsewhere):  # Without any data, it stands still.
         vectors = [name for name in names if _is_vector(steps.field(0, name))]
         if vectors:
             advice = f"name one of {'them' if len(vectors) == len(names) else _listed(vectors)} with --field"
         else:
             advice = f"write the displacement with {'two or three numbers' if names else 'one value'} per point"
         raise ClipError(f"field: got points that do not move and no displacement, only {listed}; {advice}")
-    return found[0] if found else None
+    return matching[0] if matching else None
 
 
 def _is_vector(values: np.ndarray) -> bool:

@@ -57,7 +57,7 @@ class StatedTime:
 
 
 def time_in_text(place: str, text: str) -> StatedTime | None:
-    """The time that a comment states, as in "time = 0.25 s"; None where it states none."""
+    """Return the time that a comment states, as in "time = 0.25 s"; None where it states none."""
     match = _IN_TEXT.search(text)
     return StatedTime(f"{place} {match[0].strip(' ,;|([')!r}", float(match[1]), Kind.TEXT) if match else None
 
@@ -101,7 +101,7 @@ class Series:
         return {"file that is not there": [path.name for path in self.missing]} if self.missing else {}
 
     def in_time(self, stated: Sequence[StatedTime | None]) -> Series:
-        """The frames in the order of the times that files state, where nothing else states times."""
+        """Return the frames in the order of the times that files state, where nothing else states times."""
         seconds = _usable(stated)
         if self.times is not None or seconds is None or (np.diff(seconds) > 0).all():
             return self
@@ -111,7 +111,7 @@ class Series:
         return replace(self, frames=tuple(self.frames[place] for place in order), numbers=numbers)
 
     def hears(self, stated: Sequence[StatedTime | None]) -> bool:
-        """Whether the times that files state are taken, or compared with those of the index."""
+        """Return whether the times that files state are taken, or compared with those of the index."""
         if self.times is not None:
             return any(time is not None and time.kind is Kind.TIME for time in stated)
         return len(self.frames) > 1 and _usable(stated) is not None
@@ -119,7 +119,7 @@ class Series:
     def clock(
         self, stated: Sequence[StatedTime | None], options: ReadOptions, fps: float | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """(T,) seconds from 0, and the metadata of their rate.
+        """Return (T,) seconds from 0, and the metadata of their rate.
 
         stated: what each file says of its own time. fps: the rate that the files say.
         """
@@ -146,7 +146,8 @@ class Series:
         return numbered_times(self.numbers, rate)
 
     def _in_seconds(self, seconds: np.ndarray, rate: float | None) -> tuple[np.ndarray, dict[str, Any]]:
-        """The times; the number of the first frame is that in its name, where those of all frames fit the times."""
+        """Return the times; the number of the first frame is that in its name, where those of all frames fit the
+        times."""
         time, metadata = times_in_seconds(seconds, rate)
         digits = [re.search(r"(\d+)$", frame[0].stem) for frame in self.frames]
         if "fps" in metadata and not self.has_decimals and all(digits):
@@ -155,14 +156,14 @@ class Series:
                 metadata["start_frame"] = int(numbers[0])
         return time, metadata
 
-    def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], who: str, then: str) -> None:
+    def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], subject: str, then: str) -> None:
         """Warn where files state another time than `times`."""
         for time, statement, frame in zip(times.tolist(), stated, self.frames):
             if statement is None or statement.kind is not Kind.TIME:
                 continue
             if abs(statement.seconds - time) > SAME * max(abs(time), abs(statement.seconds)):
                 self._warn(
-                    f"{who} {time:.10g} for {frame[0].name}, {then}; the file has {statement.seconds:.10g} in "
+                    f"{subject} {time:.10g} for {frame[0].name}, {then}; the file has {statement.seconds:.10g} in "
                     f"{statement.place}"
                 )
                 return
@@ -200,7 +201,7 @@ class Series:
 
 
 def series_of(path: FilePath, options: ReadOptions) -> Series:
-    """The frames that an index, a pattern or any one of the files names. Raises ClipError, OSError."""
+    """Return the frames that an index, a pattern or any one of the files names. Raises ClipError, OSError."""
     path = Path(path)
     if is_index(path):
         index = read_index(path, path.parent, options.allow_outside, Budget(options.max_memory))
@@ -233,7 +234,7 @@ def _warn_of_list(files: NumberedFiles) -> None:
 
 
 def _usable(stated: Sequence[StatedTime | None]) -> np.ndarray | None:
-    """(T,) seconds where all files state times by which they can be told apart."""
+    """Return (T,) seconds where all files state times by which they can be told apart."""
     times = [time for time in stated if time is not None]
     if len(times) < len(stated) or len({time.kind for time in times}) > 1:
         return None

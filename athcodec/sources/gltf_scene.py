@@ -59,18 +59,19 @@ class Channel(NamedTuple):
 
 
 def target_of(channel: dict) -> Target | str:
-    """What a channel animates; where that is nothing that is played, its pointer or a name for it. Raises ClipError."""
+    """Return what a channel animates; where that is nothing that is played, its pointer or a name for it. Raises
+    ClipError."""
     target = entry(channel, "target")
-    said = extension(target, POINTER)
-    if said is None:
+    pointed = extension(target, POINTER)
+    if pointed is None:
         node, path = target.get("node"), target.get("path")
         if node is None or path not in PLAYED[:-1]:
             return f"{brief(path).strip(QUOTES)} of node {brief(node)}"
         return Target("nodes", integer(target, "node"), path)
-    pointer = said.get("pointer")
+    pointer = pointed.get("pointer")
     for pattern in POINTED if isinstance(pointer, str) else ():
-        if found := pattern.fullmatch(pointer):
-            index, path, *weight = found.groups()
+        if match := pattern.fullmatch(pointer):
+            index, path, *weight = match.groups()
             return Target(pointer.split("/")[1], int(index), path, int(weight[0]) if any(weight) else -1)
     return brief(pointer).strip(QUOTES)
 
@@ -85,7 +86,7 @@ class Track:
     is_rotation: bool
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(k, ...) float64."""
+        """Return (k, ...) float64."""
         after = np.searchsorted(self.times, times, "right")
         last = len(self.times) - 1
         left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
@@ -110,7 +111,7 @@ class Track:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """From quaternions a to b (..., 4), the shorter way, by `fraction`."""
+    """Return quaternions on the shorter way from a to b (..., 4), at a `fraction` of it."""
     cosine = (a * b).sum(axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
@@ -140,15 +141,15 @@ class Scene:
         self._groups = self._grouped()
 
     def name(self, node: int) -> str:
-        """The name of a node, "" where it has none."""
+        """Return the name of a node, "" where it has none."""
         name = self.nodes[node].get("name")
         return name if isinstance(name, str) else ""
 
     def says_copies(self, node: int) -> bool | None:
-        """What a node states by COPIES about those below it: whether they are one object; None for nothing."""
+        """Return what a node states by COPIES about those below it: whether they are one object; None for nothing."""
         extras = self.nodes[node].get("extras") if node >= 0 else None
-        said = extras.get(COPIES) if isinstance(extras, dict) else None
-        return said if isinstance(said, bool) else None
+        stated = extras.get(COPIES) if isinstance(extras, dict) else None
+        return stated if isinstance(stated, bool) else None
 
     # ---- structure ----
 
@@ -162,7 +163,7 @@ class Scene:
         return parent
 
     def _reached(self) -> list[int]:
-        """The nodes of the default scene, parents first."""
+        """Return the nodes of the default scene, parents first."""
         scenes = self.file.items("scenes")
         if scenes:
             roots = indices(self.file.item("scenes", self.file.json.get("scene", 0)), "nodes")
@@ -179,7 +180,7 @@ class Scene:
         return order
 
     def ancestors(self, nodes: set[int]) -> list[int]:
-        """The nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
+        """Return the nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
         place = {node: i for i, node in enumerate(self.order)}
         wanted: set[int] = set()
         for node in nodes:
@@ -193,8 +194,8 @@ class Scene:
     # ---- animations ----
 
     def _together(self) -> list[int]:
-        """The first animation, and every further one that moves no node that those before it move: tools that write an
-        animation per object mean them to run at once, one with several takes starts with the default one."""
+        """Return the first animation, and every further one that moves no node that those before it move: tools that
+        write an animation per object mean them to run at once, one with several takes starts with the default one."""
         played, moved = [], set()
         for index in range(len(self.file.items("animations"))):
             targets = self.targets(index)
@@ -204,15 +205,15 @@ class Scene:
         return played
 
     def targets(self, index: int) -> set[int]:
-        """The nodes of the scene that an animation moves."""
+        """Return the nodes of the scene that an animation moves."""
         return {channel.node for channel in self._channels(index)[0]}
 
     def unplayed(self, index: int) -> list[str]:
-        """What an animation addresses that moves no node of the scene, as `target_of` names it."""
+        """Return what an animation addresses that moves no node of the scene, as `target_of` names it."""
         return self._channels(index)[1]
 
     def _channels(self, index: int) -> tuple[list[Channel], list[str]]:
-        """The channels of an animation that move nodes of the scene, and what the others address."""
+        """Return the channels of an animation that move nodes of the scene, and what the others address."""
         if index in self._channels_of:
             return self._channels_of[index]
         played, others, inside = [], [], set(self.order)
@@ -227,9 +228,9 @@ class Scene:
                     f"animation {index}: got entry {target.index} of {target.holder}, expected one below {count}"
                 )
             moved = [target.index] if target.holder == "nodes" else self._showing.get(target.index, [])
-            found = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
-            played += found
-            if not found:
+            channels = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
+            played += channels
+            if not channels:
                 others.append(str(target))
         self._channels_of[index] = played, others
         return played, others
@@ -289,7 +290,7 @@ class Scene:
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
-        """(path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
+        """Return (path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
         Visibilities remain in _tracks."""
         alike: dict[tuple, list[int]] = {}
         for (node, path), track in self._tracks.items():
@@ -311,17 +312,17 @@ class Scene:
         return np.unique(np.concatenate(list(tables.values()))) if tables else np.zeros(0)
 
     def animates(self, nodes: set[int]) -> bool:
-        """Whether an animation that is played moves any of these nodes or one above them."""
+        """Return whether an animation that is played moves any of these nodes or one above them."""
         moved = {index for _, grouped, _ in self._groups for index in grouped}
         return not moved.isdisjoint(self.ancestors(nodes))
 
     def is_hidden(self, node: int) -> bool:
-        """Whether a node, or one above it, is never visible."""
+        """Return whether a node, or one above it, is never visible."""
         lineage = self._lineage(node)
         return any((each, "visible") not in self._tracks and not self._is_visible(each) for each in lineage)
 
     def shown(self, node: int, times: np.ndarray) -> np.ndarray:
-        """(T,) whether a node and all above it are visible."""
+        """Return (T,) whether a node and all above it are visible."""
         shown = np.ones(len(times), bool)
         for each in self._lineage(node):
             track = self._tracks.get((each, "visible"))
@@ -338,38 +339,39 @@ class Scene:
         return not isinstance(extension, dict) or extension.get("visible") is not False
 
     def morphs(self, node: int) -> bool:
-        """Whether an animation that is played changes the weights of a node's mesh."""
+        """Return whether an animation that is played changes the weights of a node's mesh."""
         return node in self._weights
 
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
-        """(k, targets) of a node's mesh; times None: without animation, k = 1."""
+        """Return (k, targets) of a node's mesh; times None: without animation, k = 1."""
         tracks = () if times is None else self._weights.get(node, ())
-        found = np.repeat(default[None], len(times) if tracks else 1, axis=0)
+        weights = np.repeat(default[None], len(times) if tracks else 1, axis=0)
         for target, track in tracks:
             values = track.at(times)
             if target.weight >= len(default) or target.weight < 0 and values.shape[1] != len(default):
                 got = f"weight {target.weight}" if target.weight >= 0 else f"{values.shape[1]} weights"
                 raise ClipError(f"node {node}: got {got} animated, expected those of its {len(default)} morph targets")
-            found[:, slice(None) if target.weight < 0 else [target.weight]] = values
-        return found
+            weights[:, slice(None) if target.weight < 0 else [target.weight]] = values
+        return weights
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
-        """(k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k = 1."""
+        """Return (k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k =
+        1."""
         place = {node: i for i, node in enumerate(nodes)}
-        found = self._locals(place, times)
+        matrices = self._locals(place, times)
         above = np.array([place.get(int(self.parent[node]), -1) for node in nodes])
         level = np.zeros(len(nodes), np.int64)
         for i in np.flatnonzero(above >= 0):  # parents stand first
             level[i] = level[above[i]] + 1
         for depth in range(1, int(level.max(initial=0)) + 1):
-            mine = np.flatnonzero(level == depth)
-            found[:, mine] = found[:, above[mine]] @ found[:, mine]
-        return {node: found[:, i] for node, i in place.items()}
+            places = np.flatnonzero(level == depth)
+            matrices[:, places] = matrices[:, above[places]] @ matrices[:, places]
+        return {node: matrices[:, i] for node, i in place.items()}
 
     def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
-        """(k, nodes, 4, 4): from each node to its parent."""
+        """Return (k, nodes, 4, 4): from each node to its parent."""
         frames = 1 if times is None else len(times)
         parts = {
             path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
@@ -378,18 +380,18 @@ class Scene:
         for path, nodes, track in self._groups if times is not None else ():
             inside = [i for i, node in enumerate(nodes) if node in place]
             parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]
-        found = np.zeros((frames, len(place), 4, 4))
-        found[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
-        found[..., :3, 3] = parts["translation"]
-        found[..., 3, 3] = 1.0
+        matrices = np.zeros((frames, len(place), 4, 4))
+        matrices[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
+        matrices[..., :3, 3] = parts["translation"]
+        matrices[..., 3, 3] = 1.0
         for node, i in place.items():
             if "matrix" in self.nodes[node]:
-                found[:, i] = vector(self.nodes[node], "matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
-        return found
+                matrices[:, i] = vector(self.nodes[node], "matrix", np.eye(4).ravel().tolist()).reshape(4, 4).T
+        return matrices
 
 
 def key_rate(keys: np.ndarray) -> float | None:
-    """Frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
+    """Return frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
     if len(keys) < 2:
         return None
     step = float(np.median(np.diff(keys)))
@@ -400,7 +402,7 @@ def key_rate(keys: np.ndarray) -> float | None:
 
 
 def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
-    """(K,) whether keys, rounded to float32 as they are, lie between frames of a rate, from the first key on."""
+    """Return (K,) whether keys, rounded to float32 as they are, lie between frames of a rate, from the first key on."""
     places = (keys - keys[0]) * rate
     blur = 0.01 + float(np.abs(keys).max()) * 4e-7 * rate
     off: np.ndarray = (np.abs(places - np.round(places)) > blur) | (blur >= 0.3)
@@ -408,7 +410,7 @@ def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:
-    """The rate that a tool would have stated: whole, or of a drop-frame time code."""
+    """Return the rate that a tool would have stated: whole, or of a drop-frame time code."""
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)

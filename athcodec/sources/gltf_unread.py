@@ -16,7 +16,7 @@ from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTE
 from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
 
 if TYPE_CHECKING:
-    from athcodec.sources.gltf import GltfNode
+    from athcodec.sources.gltf_nodes import GltfNode
 
 INSTANCING, LIGHTS, VARIANTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual", "KHR_materials_variants"
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
@@ -31,30 +31,30 @@ ARRAYS = ("POSITION", "TEXCOORD_0", "COLOR_0")  # Attributes that are read of ev
 
 
 def not_read(scenes: Sequence[Scene], nodes: Sequence[GltfNode], keeps_normals: bool = True) -> dict[str, list[str]]:
-    """What is in the file and is not read with these nodes, as they move in each of these scenes; parts of a node by
-    the node's name. keeps_normals: whether normals are read."""
+    """Return what is in the file and is not read with these nodes, as they move in each of these scenes; parts of a
+    node by the node's name. keeps_normals: whether normals are read."""
     scene = scenes[0]
-    file, found = scene.file, _unused(scene)
+    file, unread = scene.file, _unused(scene)
     for index in scene.order:
         if extension(scene.nodes[index], LIGHTS) is not None:
-            _add(found, "Light", index, scene.nodes[index])
+            _add(unread, "Light", index, scene.nodes[index])
         if scene.nodes[index].get("mesh") is not None and scene.is_hidden(index):
-            _add(found, "hidden", index, scene.nodes[index])
+            _add(unread, "hidden", index, scene.nodes[index])
     for node in nodes:
         if node.is_flipped and node.kind == "mesh":
-            found.setdefault(FLIPPED, []).append(node.name)
+            unread.setdefault(FLIPPED, []).append(node.name)
         for key in _left_attributes(scene, node, keeps_normals):
-            found.setdefault("attribute", []).append(f"{node.name}.{key}")
+            unread.setdefault("attribute", []).append(f"{node.name}.{key}")
     for kind, name in _unplayed(scenes):
-        found.setdefault(kind, []).append(name)
+        unread.setdefault(kind, []).append(name)
     for kind, names in (("extension", _extensions(file)), ("extras", _extras(scene))):
         if names:
-            found[kind] = names
-    return found
+            unread[kind] = names
+    return unread
 
 
-def _add(found: dict[str, list[str]], kind: str, number: int, item: Any) -> None:
-    found.setdefault(kind, []).append(_name(kind.lower(), number, item))
+def _add(unread: dict[str, list[str]], kind: str, number: int, item: Any) -> None:
+    unread.setdefault(kind, []).append(_name(kind.lower(), number, item))
 
 
 def _name(kind: str, number: int, item: Any) -> str:
@@ -65,46 +65,46 @@ def _name(kind: str, number: int, item: Any) -> str:
 def guessed(item: Any) -> list[Any]:
     """Return the names of what athcodec's writer has guessed of a part of the file."""
     extras = item.get("extras") if isinstance(item, dict) else None
-    ours = extras.get(OWN) if isinstance(extras, dict) else None
-    names = ours.get(GUESSED) if isinstance(ours, dict) else None
+    entry = extras.get(OWN) if isinstance(extras, dict) else None
+    names = entry.get(GUESSED) if isinstance(entry, dict) else None
     return names if isinstance(names, list) else []
 
 
 def _unused(scene: Scene) -> dict[str, list[str]]:
-    """Materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
-    file, found = scene.file, dict[str, list[str]]()
+    """Return materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
+    file, unread = scene.file, dict[str, list[str]]()
     used = {kind: {scene.nodes[index].get(kind) for index in scene.order} for kind in ("mesh", "skin")}
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
         for number, item in enumerate(file.items(items)):
             if "name" not in guessed(item) and (kind != "scene" or number != file.json.get("scene", 0)):
-                _add(found, kind, number, item)
+                _add(unread, kind, number, item)
     for kind, items in (("mesh", "meshes"), ("skin", "skins")):
         for number, item in enumerate(file.items(items)):
             if number not in used[kind]:
-                found.setdefault(f"{kind} that no node of the scene has", []).append(_name(kind, number, item))
-    return found
+                unread.setdefault(f"{kind} that no node of the scene has", []).append(_name(kind, number, item))
+    return unread
 
 
 def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[str]:
-    """The attributes of a node's mesh, of its morph targets and of its instances that are not read."""
+    """Return the attributes of a node's mesh, of its morph targets and of its instances that are not read."""
     slots = 0
     while node.skin is not None and {f"JOINTS_{slots}", f"WEIGHTS_{slots}"} <= node.attributes.keys():
         slots += 1
     read = {*ARRAYS, *(f"{kind}_{slot}" for kind in ("JOINTS", "WEIGHTS") for slot in range(slots))}
     read |= {"NORMAL"} if keeps_normals else set()
     instancing = extension(scene.nodes[node.index], INSTANCING)
-    own = () if instancing is None else entry(instancing, "attributes")
+    attributes = () if instancing is None else entry(instancing, "attributes")
     targets = (target for primitive in node.primitives for target in entries(primitive, "targets"))
     return [
         *(key for key in node.attributes if key not in read and not key.startswith("_")),
         *dict.fromkeys(f"targets.{key}" for target in targets for key in target if key != "POSITION"),
-        *(key for key in own if key not in INSTANCE_PARTS and not key.startswith("_")),
+        *(key for key in attributes if key not in INSTANCE_PARTS and not key.startswith("_")),
     ]
 
 
 def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
-    """(kind, name) of what animations address that is not played; whole animations that others were chosen before are
-    not looked into."""
+    """Yield (kind, name) of what animations address that is not played; whole animations that others were chosen before
+    are not looked into."""
     first = scenes[0]
     played = {index for scene in scenes for index in scene.played}
     for index, animation in enumerate(first.file.items("animations")):
@@ -118,7 +118,7 @@ def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
 
 
 def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
-    """(kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
+    """Yield (kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
     yield "file", 0, file.json
     yield "asset", 0, entry(file.json, "asset")
     for kind in ("scene", "node", "skin", "animation", "camera", "accessor", "bufferView", "buffer"):
@@ -131,7 +131,7 @@ def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
 
 
 def _extensions(file: GltfFile) -> list[str]:
-    """Names of extensions that the file uses and that are not read; those of materials are part of these."""
+    """Return names of extensions that the file uses and that are not read; those of materials are part of these."""
     used = file.json.get("extensionsUsed")
     names = dict.fromkeys(name for name in (used if isinstance(used, list) else ()) if isinstance(name, str))
     for _, _, part in _parts(file):
@@ -141,7 +141,7 @@ def _extensions(file: GltfFile) -> list[str]:
 
 
 def _extras(scene: Scene) -> list[str]:
-    """The parts of the file that have extras which are not read."""
+    """Return the parts of the file that have extras which are not read."""
     names = []
     for kind, number, part in _parts(scene.file):
         extras = part.get("extras")

@@ -99,7 +99,7 @@ class _Reading:
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """The clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
+    """Return the clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
     file = _open(path)
     with closing_on_failure(_Reading(file)):
         clip = _read(file, path, options)
@@ -188,7 +188,7 @@ class _Datasets:
             self.counts_from_1 = self.counts_from_1 or _is_matlab(item)
 
     def _is_sparse(self, group: str) -> bool:
-        """Whether a group is a sparse matrix of MATLAB, which is named then."""
+        """Return whether a group is a sparse matrix of MATLAB, which is named then."""
         if not group or MATLAB_SPARSE not in self._file[group].attrs:
             return False
         if group not in self.not_read.get(SPARSE, ()):
@@ -262,12 +262,12 @@ def _stored(name: str, dataset: h5py.Dataset) -> Stored:
 
 
 def _is_only_a_dimension(dataset: h5py.Dataset) -> bool:
-    """Whether netCDF made a dataset only to state the length of an axis."""
+    """Return whether netCDF made a dataset only to state the length of an axis."""
     return str(_to_python(dataset.attrs.get("NAME", ""))).startswith(ONLY_A_DIMENSION)
 
 
 def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
-    """Raises ClipError where a dataset, or a link on the way to it, is in another file."""
+    """Raise ClipError where a dataset, or a link on the way to it, is in another file."""
     if allow_outside:
         return
     parts = [part for part in name.split("/") if part]
@@ -275,10 +275,10 @@ def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
         link = file.get("/".join(parts[:end]), getlink=True)
         if isinstance(link, h5py.ExternalLink):
             raise ClipError(f"{name[:80]}: got a link to {link.filename[:80]!r}, {_OWN}")
-    found = file.get(name) if parts else None
-    if found is not None and found.file.filename != file.filename:
-        raise ClipError(f"{name[:80]}: got a link to {found.file.filename[:80]!r}, {_OWN}")
-    if isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+    item = file.get(name) if parts else None
+    if item is not None and item.file.filename != file.filename:
+        raise ClipError(f"{name[:80]}: got a link to {item.file.filename[:80]!r}, {_OWN}")
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
         raise ClipError(f"{name[:80]}: got a dataset whose numbers are in other files, {_OWN}")
 
 
@@ -318,21 +318,21 @@ def chunk_bytes(dataset: h5py.Dataset) -> int:
 
 
 def may_explode(file: h5py.File, limit: int) -> bool:
-    """Whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit` bytes
-    whatever shape they have."""
+    """Return whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit`
+    bytes whatever shape they have."""
     size = os.fstat(file.id.get_vfd_handle()).st_size
-    found: list[bool] = [_texts_are_more(file, size, limit)]
+    verdicts: list[bool] = [_texts_are_more(file, size, limit)]
 
     def visit(_: str, item: Any) -> None:
         is_more = isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)
-        found.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
+        verdicts.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
 
     file.visititems(visit)
-    return any(found)
+    return any(verdicts)
 
 
 def _texts_are_more(item: Any, size: int, limit: int) -> bool:
-    """Whether attributes may hold more than `limit` bytes of text, each as long as the file of `size` bytes."""
+    """Return whether attributes may hold more than `limit` bytes of text, each as long as the file of `size` bytes."""
     texts = 0
     for name in item.attrs:
         attribute = item.attrs.get_id(name)
@@ -342,7 +342,8 @@ def _texts_are_more(item: Any, size: int, limit: int) -> bool:
 
 
 def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
-    """Whether a packed chunk, or one of its texts, may unpack to more than `limit` bytes, whatever it should be."""
+    """Return whether a packed chunk, or one of its texts, may unpack to more than `limit` bytes, whatever it should
+    be."""
     if dataset.dtype.hasobject:
         size = os.fstat(dataset.file.id.get_vfd_handle()).st_size
         if max(int(np.prod(dataset.shape or (), dtype=object)), 1) * size > max(limit, size):
@@ -385,7 +386,7 @@ def _parsed(name: str, text: str) -> Any:
 
 
 def _to_python(value: Any) -> Any:
-    """An HDF5 attribute as str, int, float, bool, None or nested lists of them."""
+    """Return an HDF5 attribute as str, int, float, bool, None or nested lists of them."""
     if isinstance(value, h5py.Empty):
         return None
     if isinstance(value, np.ndarray):

@@ -64,23 +64,26 @@ class Index:
         return frozenset(os.path.abspath(file) for frame in self.frames for file in frame)
 
     def lists(self, path: Path) -> bool:
-        """Whether a file is in one of the frames."""
+        """Return whether a file is in one of the frames."""
         return os.path.abspath(path) in self._places
 
     def agrees(self, other: Index) -> bool:
-        """Whether another index has the same files at the same times."""
-        mine, theirs = ([list(map(os.path.abspath, frame)) for frame in index.frames] for index in (self, other))
-        return mine == theirs and np.array_equal(self.times, other.times)
+        """Return whether another index has the same files at the same times."""
+        paths, other_paths = ([list(map(os.path.abspath, frame)) for frame in index.frames] for index in (self, other))
+        return paths == other_paths and np.array_equal(self.times, other.times)
 
 
 def is_index(path: Path) -> bool:
-    """Whether a path has the suffix of an index."""
+    """Return whether a path has the suffix of an index."""
     return path.suffix.lower() in (PVD, SERIES)
 
 
 def read_index(path: Path, folder: Path, allow_outside: bool, budget: Budget) -> Index:
-    """The files of an index. Raises ClipError where it is none, lists files outside of a folder or several that are one
-    part of one time, or where none of its files is there; OSError where it cannot be opened."""
+    """Return the files that an index lists, with their times.
+
+    Raises ClipError if the file is no index, if it lists a file outside of the folder or the same part of a time
+    twice, or if none of its files exists; OSError if it cannot be opened.
+    """
     data = read_plain(path, budget)
     with naming(path, ValueError, RecursionError):
         entries = _pvd(path, data, budget) if path.suffix.lower() == PVD else _series(path, data, budget)
@@ -132,7 +135,7 @@ def _seconds(stated: Any, file: str) -> float:
 
 
 def _beside(path: Path, name: str) -> Path:
-    """The file that an index names, from its own folder; Windows writes paths with backslashes."""
+    """Return the file that an index names, from its own folder; Windows writes paths with backslashes."""
     if not name or "\0" in name:
         raise ClipError(f"got the file name {name[:80]!r}, expected a path")
     file = path.parent / name
@@ -175,8 +178,9 @@ def _index(path: Path, entries: Sequence[_Entry]) -> Index:
 
 
 def index_of(path: Path, frames: Sequence[Path], allow_outside: bool, max_memory: int) -> Index | None:
-    """The index, in the folder of a file or the folder above, that lists it; of a pattern, which is no file itself, one
-    that lists all frames. A GuessWarning says which one is taken where they disagree, and what an index lacks."""
+    """Return the index, in the folder of a file or the folder above, that lists it; of a pattern, which is no file
+    itself, one that lists all frames. A GuessWarning says which one is taken where they disagree, and what an index
+    lacks."""
     named = [path] if path.is_file() else list(frames)
     candidates = []
     for file in _above(path, lambda name: name.lower().endswith((PVD, SERIES))):
@@ -206,7 +210,7 @@ def index_of(path: Path, frames: Sequence[Path], allow_outside: bool, max_memory
 
 
 def list_of(path: Path) -> Path | None:
-    """A file, in the folder of another or the folder above, that lists it as a piece of one frame."""
+    """Return a file, in the folder of another or the folder above, that lists it as a piece of one frame."""
     for file in _above(path, lambda name: name.lower().endswith(LISTS)):
         with suppress(OSError, ClipError, ValueError):
             names = [name.decode() for name in _LISTED.findall(read_plain(file, Budget()))]
@@ -216,7 +220,8 @@ def list_of(path: Path) -> Path | None:
 
 
 def _candidate(file: Path, path: Path, allow_outside: bool, max_memory: int) -> Index | None:
-    """None where a file is no usable index; a GuessWarning says why one that names this path is not."""
+    """Return the index of a file, or None if it is not usable; a GuessWarning says why an index that names this path
+    is not."""
     try:
         return read_index(file, path.parent, allow_outside, Budget(max_memory))
     except (ClipError, OSError) as error:
@@ -227,7 +232,7 @@ def _candidate(file: Path, path: Path, allow_outside: bool, max_memory: int) -> 
 
 
 def _above(path: Path, is_wanted: Callable[[str], bool]) -> Iterator[Path]:
-    """Files of the folder of a path, then of the folder above it."""
+    """Yield files of the folder of a path, then of the folder above it."""
     parent = path.parent.parent if path.parent.name not in ("", os.pardir) else path.parent / os.pardir
     for folder in (path.parent, parent):
         with suppress(OSError):

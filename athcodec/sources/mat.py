@@ -33,7 +33,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """The clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
+    """Return the clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
     from scipy.io import loadmat  # It takes long to import.
 
     watch = FileWatch(path)
@@ -84,6 +84,6 @@ class _Variables:
 
 
 def _texts(values: np.ndarray) -> np.ndarray:
-    """Rows of text as UTF-8; a single row as one text."""
+    """Return rows of text as UTF-8; a single row as one text."""
     texts = np.char.encode(values, "utf-8")
     return texts.reshape(()) if texts.size == 1 else texts

@@ -1,4 +1,4 @@
-"""Meshes in OBJ and PLY files, vertex for vertex and face for face as the files have them.
+"""Reads meshes in OBJ and PLY files, vertex for vertex and face for face as the files have them.
 
 OBJ: v (with colours where there are six or seven numbers), vt, f, l, o, g and usemtl; polygons of any size, relative
 indices, lines continued by a backslash. PLY: ascii and binary of both byte orders; vertices with any scalar properties,
@@ -21,7 +21,7 @@ from athcodec.errors import ClipError
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, read_plain
 from athcodec.motion.clip import RESERVED_NAMES, polygons
-from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_of_json, scene_said
+from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_fields, scene_of_json
 
 FLOAT32_DIGITS = 9
 WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # Bytes that a word of text and the value made of it take.
@@ -74,14 +74,14 @@ class Mesh:
         return polygons(self.faces, self.attributes)
 
     def same_topology(self, other: Mesh) -> str:
-        """ "" where both have as many vertices and the same faces and edges, else what is different."""
+        """Return "" if both have as many vertices and the same faces and edges, else what is different."""
         if len(self.points) != len(other.points):
             return f"got {len(other.points)} vertices, expected {len(self.points)}"
-        for what, mine, theirs in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
-            if (mine is None) != (theirs is None):
-                return f"got {'no' if theirs is None else 'further'} {what}"
-            if mine is not None and not all(map(np.array_equal, mine, theirs)):
-                return f"got other {what}"
+        for elements, first, second in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
+            if (first is None) != (second is None):
+                return f"got {'no' if second is None else 'further'} {elements}"
+            if first is not None and not all(map(np.array_equal, first, second)):
+                return f"got other {elements}"
         return ""
 
     def changed(self, other: Mesh) -> set[str]:
@@ -95,19 +95,19 @@ class Mesh:
 
 
 def same_values(values: np.ndarray | None, others: np.ndarray | None) -> bool:
-    """Whether both are numbers of one shape and value, NaN included."""
+    """Return whether both are numbers of one shape and value, NaN included."""
     if values is None or others is None or values.dtype.kind != others.dtype.kind:
         return False
     return np.array_equal(values, others, equal_nan=values.dtype.kind == "f")
 
 
 def read_mesh(path: FilePath, budget: Budget) -> Mesh:
-    """The mesh in an OBJ or PLY file. Raises ClipError, OSError."""
+    """Return the mesh in an OBJ or PLY file. Raises ClipError, OSError."""
     return parse_mesh(read_plain(path, budget), path, budget)
 
 
 def parse_mesh(data: bytes, path: FilePath, budget: Budget) -> Mesh:
-    """The mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
+    """Return the mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
     try:
         budget.need_for(data, WORD_ENDS, WORD_BYTES, "words")
         if data.startswith((b"ply\n", b"ply\r")):
@@ -131,7 +131,8 @@ def kind_of(faces: object, edges: object) -> str:
 
 
 def with_polygons(counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """(faces, attributes) of a clip for polygons: faces (F, k) int32 where all have k corners, else two attributes."""
+    """Return (faces, attributes) of a clip for polygons: faces (F, k) int32 where all have k corners, else two
+    attributes."""
     counts, corners = np.asarray(counts, np.int32), np.asarray(corners, np.int32)
     if not len(counts):
         return None, {}
@@ -140,11 +141,11 @@ def with_polygons(counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray |
     return None, {"face_vertex_counts": counts, "face_vertex_indices": corners}
 
 
-def _checked(what: str, indices: np.ndarray, count: int) -> np.ndarray:
-    """int32 indices; ClipError for any outside of 0 to count - 1."""
+def _checked(subject: str, indices: np.ndarray, count: int) -> np.ndarray:
+    """Return int32 indices. Raises ClipError for any outside of 0 to count - 1."""
     bad = np.flatnonzero((indices < 0) | (indices >= count))
     if bad.size:
-        raise ClipError(f"{what}: got the number {indices[bad[0]]}, counted from 0, expected below {count}")
+        raise ClipError(f"{subject}: got the number {indices[bad[0]]}, counted from 0, expected below {count}")
     return indices.astype(np.int32)
 
 
@@ -160,7 +161,7 @@ class _Names:
     numbers: dict[str, int] = field(default_factory=dict)
 
     def switch(self, name: str) -> None:
-        """The faces that follow have this name."""
+        """Let this be the name of the faces that follow."""
         if name not in self.numbers:
             self.numbers[name] = len(self.names)
             self.names.append(name)
@@ -245,14 +246,14 @@ def _text(words: Sequence[bytes]) -> str:
 
 
 def obj_lines(data: bytes) -> list[bytes]:
-    """The lines of an OBJ file; those that a backslash continues are joined."""
+    """Return the lines of an OBJ file; those that a backslash continues are joined."""
     if b"\\" in data:
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     return data.splitlines()
 
 
 def parse_obj(data: bytes) -> Mesh:
-    """The mesh in the bytes of an OBJ file. Raises ClipError."""
+    """Return the mesh in the bytes of an OBJ file. Raises ClipError."""
     file = _Obj()
     for line in obj_lines(data):
         file.line(line)
@@ -278,8 +279,8 @@ def parse_obj(data: bytes) -> Mesh:
 
 
 def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[np.ndarray, np.ndarray | None]:
-    """(N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where the
-    coordinates have more digits than float32 holds."""
+    """Return (N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where
+    the coordinates have more digits than float32 holds."""
     flat = [word for row in rows for word in row[:3]]
     if len(flat) != 3 * len(rows) or any(len(row) < 3 for row in rows):
         raise ClipError("vertices: got fewer than three coordinates")
@@ -312,16 +313,16 @@ def _add_face_rows(mesh: Mesh) -> None:
 
 
 def _add_obj_uv(mesh: Mesh, file: _Obj) -> None:
-    which = np.array(file.corner_uvs, np.int64)
-    if not file.uvs or not (which >= 0).any():
+    uv_rows = np.array(file.corner_uvs, np.int64)
+    if not file.uvs or not (uv_rows >= 0).any():
         file.not_read |= {b"vt": None} if file.uvs else {}
         return
-    _checked("texture coordinates", which[which >= 0], len(file.uvs))
+    _checked("texture coordinates", uv_rows[uv_rows >= 0], len(file.uvs))
     table = np.array([[float(word) for word in (*row[:2], b"0", b"0")[:2]] for row in file.uvs], np.float32)
     if any(len(row) > 2 and float(row[2]) != 0 for row in file.uvs):
         file.not_read[b"w of vt"] = None
-    uv = table[which]
-    uv[which < 0] = 0
+    uv = table[uv_rows]
+    uv[uv_rows < 0] = 0
     mesh.attributes["uv"] = uv
     mesh.metadata["domains"]["uv"] = "corner"
 
@@ -343,7 +344,7 @@ def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
 
 
 def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int) -> np.ndarray:
-    """(N,) the name that the first element with the vertex is under; without one that of the vertex before."""
+    """Return (N,) the name that the first element with the vertex is under; without one that of the vertex before."""
     labels = np.full(len(mesh.points), -1, np.int64)
     if mesh.polygons is not None:
         counts, corners = mesh.polygons
@@ -360,7 +361,7 @@ def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int)
 
 
 def _add_parts(mesh: Mesh, labels: np.ndarray, names: Sequence[str]) -> None:
-    """Objects whose vertices lie together in the file; where any do not, the whole file is one."""
+    """Add the objects if the vertices of each lie together in the file; else the whole file is one object."""
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
     if len(set(labels[starts])) != len(starts):
         return
@@ -384,12 +385,12 @@ def _add_face_names(mesh: Mesh, name: str, labels: np.ndarray, names_key: str, n
 
 
 def comments(data: bytes) -> list[str]:
-    """The comments at the beginning of an OBJ or PLY file, but for that of our writer."""
+    """Return the comments at the beginning of an OBJ or PLY file, but for that of our writer."""
     head, is_ply = data[:COMMENT_BYTES], data.startswith((b"ply\n", b"ply\r"))
     marks = (b"comment", b"obj_info") if is_ply else (b"#",)
     lines = (line.strip() for line in (head.partition(b"end_header")[0] if is_ply else head).splitlines())
-    found = [line[len(mark) :].decode("latin-1").strip() for line in lines for mark in marks if line.startswith(mark)]
-    return [line for line in found if not line.startswith(OWN)]
+    texts = [line[len(mark) :].decode("latin-1").strip() for line in lines for mark in marks if line.startswith(mark)]
+    return [line for line in texts if not line.startswith(OWN)]
 
 
 # ---- PLY ----
@@ -409,7 +410,7 @@ class PlyElement:
         return [name for name, _, counted_by in self.properties if counted_by]
 
     def row(self, order: str, lengths: dict[str, int]) -> np.dtype:
-        """A row whose lists have these lengths."""
+        """Return a row whose lists have these lengths."""
         fields: list[tuple] = []
         for name, dtype, counted_by in self.properties:
             if counted_by:
@@ -426,11 +427,11 @@ class PlyHeader:
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
-    said: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
+    scene: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
 
 
 def ply_header(data: bytes) -> PlyHeader:
-    """The header in the bytes of a PLY file. Raises ClipError."""
+    """Return the header in the bytes of a PLY file. Raises ClipError."""
     end = data.find(b"end_header", 0, HEADER_BYTES)
     line_end = data.find(b"\n", end)
     if end < 0 or line_end < 0:
@@ -446,7 +447,7 @@ def ply_header(data: bytes) -> PlyHeader:
         elif words[:1] == ["property"] and header.elements:
             header.elements[-1].properties.append(_ply_property(words[1:]))
         elif words[:2] == ["comment", OWN]:
-            header.said = scene_of_json(line.split(OWN, 1)[1])
+            header.scene = scene_of_json(line.split(OWN, 1)[1])
         elif words and words[0] not in ("comment", "obj_info"):
             raise ClipError(f"header: got {line[:60]!r}, expected an element or a property of PLY")
     for element in header.elements:
@@ -512,7 +513,7 @@ class _Binary:
 
 
 def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, np.ndarray]:
-    """{property: (count,) values, or (counts, values) of a list}."""
+    """Return {property: (count,) values, or (counts, values) of a list}."""
     none = dict.fromkeys(element.lists, 0)
     if not element.properties or not element.count:
         return {}
@@ -536,7 +537,7 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, n
 
 
 def _first_lengths(source: _Text | _Binary, element: PlyElement) -> dict[str, int]:
-    """How long the lists of the next row are: each says it behind those before it."""
+    """Return how long the lists of the next row are: each says it behind those before it."""
     lengths: dict[str, int] = {}
     for position, (name, _, counted_by) in enumerate(element.properties):
         if counted_by:
@@ -575,7 +576,7 @@ def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, np.nd
 
 
 def parse_ply(data: bytes) -> Mesh:
-    """The mesh in the bytes of a PLY file. Raises ClipError."""
+    """Return the mesh in the bytes of a PLY file. Raises ClipError."""
     header = ply_header(data)
     source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length :])
     values: dict[str, dict[str, np.ndarray]] = {}
@@ -588,12 +589,12 @@ def parse_ply(data: bytes) -> Mesh:
     vertices = values.get("vertex", {})
     if not {"x", "y", "z"} <= vertices.keys():
         raise ClipError("got no vertices with x, y and z, expected a PLY file with some")
-    metadata, attributes = scene_said(header.said, len(vertices["x"]))
+    metadata, attributes = scene_fields(header.scene, len(vertices["x"]))
     mesh = Mesh(ply_points(vertices), metadata={"domains": dict.fromkeys(attributes, "constant")} | metadata)
     mesh.attributes |= attributes
     _add_ply_vertex_values(mesh, vertices)
     _add_ply_faces(mesh, values.get("face", {}))
-    _add_ply_materials(mesh, header.said.get(FACE_MATERIAL))
+    _add_ply_materials(mesh, header.scene.get(FACE_MATERIAL))
     edges = values.get("edge", {})
     if {"vertex1", "vertex2"} <= edges.keys():
         ends = np.stack([edges.pop("vertex1"), edges.pop("vertex2")], axis=1).astype(np.int64)
@@ -608,7 +609,7 @@ def parse_ply(data: bytes) -> Mesh:
 
 
 def ply_points(vertices: Any) -> np.ndarray:
-    """(N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
+    """Return (N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
     dtype = (
         np.float32
         if all(
@@ -627,19 +628,19 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
-    taken = set(POSITION_COLUMNS)
+    columns_used = set(POSITION_COLUMNS)
     if not {"nx", "ny", "nz"}.isdisjoint(vertices):
         _leave_out(mesh, "normals")
     colors = [name for name in _PLY_COLORS if name in vertices]
     if set(_PLY_COLORS[:3]) <= set(colors):
         mesh.attributes["colors"] = _native(np.stack([vertices[name] for name in colors], axis=1))
-        taken |= set(colors)
+        columns_used |= set(colors)
     for pair in _UV_NAMES:
         if "uv" not in mesh.attributes and set(pair) <= vertices.keys():
             mesh.attributes["uv"] = _native(np.stack([vertices[name] for name in pair], axis=1))
-            taken |= set(pair)
+            columns_used |= set(pair)
     for name, column in vertices.items():
-        if name not in taken:
+        if name not in columns_used:
             _add_attribute(mesh, name, column)
 
 

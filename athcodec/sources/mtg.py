@@ -69,7 +69,7 @@ class Mtg:
 
 
 def read_mtg(path: FilePath) -> Mtg:
-    """The plants in an MTG file. Raises ClipError that names the line, OSError where it cannot be opened."""
+    """Return the plants in an MTG file. Raises ClipError that names the line, OSError where it cannot be opened."""
     if os.path.getsize(path) > MAX_FILE_BYTES:
         raise ClipError(f"{fspath(path)}: got {os.path.getsize(path)} bytes, expected at most {MAX_FILE_BYTES}")
     with open_plain(path) as file:
@@ -81,7 +81,7 @@ def read_mtg(path: FilePath) -> Mtg:
 
 
 def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of a clip on the branches of an MTG.
+    """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of a clip on the branches of an MTG.
 
     Every vertex goes to the nearest piece of the plant at rest where at least half of the parts have coordinates; else
     the vertices are the parts in their order, and there must be as many. Branches without vertices are left out. Raises
@@ -154,21 +154,21 @@ class _Plants:
         if not self.entities:
             raise ClipError("got no entities, expected a code behind MTG:")
 
-    def _fail(self, what: str) -> ClipError:
-        return ClipError(f"line {self._line}: {what}")
+    def _fail(self, problem: str) -> ClipError:
+        return ClipError(f"line {self._line}: {problem}")
 
     def _header(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-        """The rows of the code, once the sections before it are read."""
+        """Return the rows of the code, once the sections before it are read."""
         section, form = "", ""
         for number, line in enumerate(lines):
             self._line = number + 1
             cells = [cell.strip() for cell in line.split("\t")]
             if not any(cells):
                 continue
-            found = _SECTION.match(" ".join(cells))
-            if found and (section != "CLASSES" or ":" in line or cells[0].rstrip(": ") in ("DESCRIPTION", "FEATURES")):
-                section = found[1]
-                form = found[2] if section == "CODE" else form
+            match = _SECTION.match(" ".join(cells))
+            if match and (section != "CLASSES" or ":" in line or cells[0].rstrip(": ") in ("DESCRIPTION", "FEATURES")):
+                section = match[1]
+                form = match[2] if section == "CODE" else form
                 if section == "MTG":
                     break
             elif section == "CLASSES":
@@ -220,7 +220,7 @@ class _Plants:
             self._aliases[features[ALIAS]] = self._latest[column]
 
     def _code(self, code: str, column: int) -> list[int]:
-        """The entities that the features of the row are about."""
+        """Return the entities that the features of the row are about."""
         start, code, is_absolute = self._start(code, column)
         at, now, about = 0, start, []
         for step in _STEP.finditer(code):
@@ -242,7 +242,8 @@ class _Plants:
         return about
 
     def _start(self, code: str, column: int) -> tuple[int, str, bool]:
-        """The entity that a code goes on from, -1 for none; the code without what says so; whether names are whole."""
+        """Return the entity that a code goes on from, -1 for none; the code without what says so; whether names are
+        whole."""
         if code.startswith("^"):
             if column >= len(self._latest) or self._latest[column] < 0:
                 raise self._fail("got ^ in a column without a code above")
@@ -263,7 +264,7 @@ class _Plants:
         return left, code, left < 0
 
     def _unfolded(self, now: int, relation: str, symbol: str, index: str) -> Iterator[tuple[str, str]]:
-        """Each step that one stands for: E1<<E4 is E1<E2<E3<E4."""
+        """Yield each step that one stands for: E1<<E4 is E1<E2<E3<E4."""
         if len(relation) == 1:
             yield relation, symbol + index
             return
@@ -315,7 +316,7 @@ class _Plants:
         return entity
 
     def _at_scale(self, entity: int, scale: int) -> int:
-        """The entity itself or the one that it is a part of, at this scale or the next coarser."""
+        """Return the entity itself or the one that it is a part of, at this scale or the next coarser."""
         while entity >= 0 and self.entities[entity].scale > scale:
             entity = self.entities[entity].whole
         return entity
@@ -359,8 +360,8 @@ def _parts(plants: _Plants) -> Mtg:
 
 
 def _below(entities: Sequence[_Entity], leaf: int) -> tuple[int, str]:
-    """The entity that a finest part is connected to, and how. A first part is connected as its whole is, any other that
-    is only a part follows the one before it."""
+    """Return the entity that a finest part is connected to, and how. A first part is connected as its whole is, any
+    other that is only a part follows the one before it."""
     entity = leaf
     while entities[entity].relation == "/":
         whole = entities[entity].whole
@@ -388,7 +389,7 @@ def _last_leaf(entities: Sequence[_Entity], entity: int) -> int:
 
 
 def _roots_first(parent: np.ndarray) -> list[int]:
-    """All parts, each behind the one below it. Raises ClipError where they form a cycle."""
+    """Return all parts, each behind the one below it. Raises ClipError where they form a cycle."""
     children: list[list[int]] = [[] for _ in parent]
     for row, below in enumerate(parent.tolist()):
         if below >= 0:
@@ -402,11 +403,12 @@ def _roots_first(parent: np.ndarray) -> list[int]:
 
 
 def _chains(parent: np.ndarray, follows: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """(V,) and (B,): branches numbered by their first part in the file. Only one part goes on the branch of another."""
-    begins, taken = np.ones(len(parent), bool), set()
+    """Return (V,) and (B,): branches numbered by their first part in the file. Only one part goes on the branch of
+    another."""
+    begins, continued = np.ones(len(parent), bool), set()
     for row in range(len(parent)):
-        if follows[row] and int(parent[row]) not in taken:
-            taken.add(int(parent[row]))
+        if follows[row] and int(parent[row]) not in continued:
+            continued.add(int(parent[row]))
             begins[row] = False
     number = np.cumsum(begins) - 1
     branch, branch_parent = np.zeros(len(parent), np.int32), np.full(int(begins.sum()), -1, np.int32)
@@ -426,7 +428,7 @@ def _number(text: Any) -> float:
 
 
 def _coordinates(names: Sequence[str]) -> tuple[str, ...]:
-    """The names of the features that are a position; none where a file has no such features."""
+    """Return the names of the features that are a position; none where a file has no such features."""
     by_upper = {name.upper(): name for name in names}
     return next((tuple(by_upper[name] for name in axes) for axes in COORDINATES if by_upper.keys() >= set(axes)), ())
 
@@ -436,7 +438,7 @@ def _position(entity: _Entity, coordinates: Sequence[str]) -> list[float]:
 
 
 def _stated_base(entities: Sequence[_Entity], leaf: int, coordinates: Sequence[str]) -> list[float] | None:
-    """The position that the file gives to an entity whose first part this is."""
+    """Return the position that the file gives to an entity whose first part this is."""
     entity = leaf
     while entities[entity].whole >= 0 and entities[entities[entity].whole].parts[0] == entity:
         entity = entities[entity].whole
@@ -450,7 +452,7 @@ def _stated_base(entities: Sequence[_Entity], leaf: int, coordinates: Sequence[s
 
 
 def _depths(parent: np.ndarray) -> np.ndarray:
-    """(V,) how many parts are below each."""
+    """Return (V,) how many parts are below each."""
     depth = np.zeros(len(parent))
     for row in _roots_first(parent):
         if parent[row] >= 0:
@@ -459,7 +461,7 @@ def _depths(parent: np.ndarray) -> np.ndarray:
 
 
 def _nearest(path: FilePath, mtg: Mtg, located: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The branch of the nearest piece, from a part's base to its position, and how far up the branch that is."""
+    """Return the branch of the nearest piece, from a part's base to its position, and how far up the branch that is."""
     rows = np.flatnonzero(located)
     tip = mtg.positions[rows]
     base = np.where(np.isfinite(mtg.base[rows]).all(axis=1, keepdims=True), mtg.base[rows], tip)
@@ -474,7 +476,7 @@ def _nearest(path: FilePath, mtg: Mtg, located: np.ndarray, rest: np.ndarray) ->
 
 
 def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(N,) the piece nearest to each point, where on it from 0 to 1, and the distance."""
+    """Return (N,) the piece nearest to each point, where on it from 0 to 1, and the distance."""
     along = tip - base
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     piece, share = np.zeros(len(points), np.int64), np.zeros(len(points))
@@ -493,7 +495,7 @@ def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tu
 
 
 def _without_empty(branch: np.ndarray, branch_parent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Without branches that have no vertices; what hangs on one hangs on the next below that has some."""
+    """Remove branches that have no vertices; what hangs on one hangs on the next below that has some."""
     used = np.bincount(branch, minlength=len(branch_parent)) > 0
     parent = branch_parent.astype(np.int64)
     while True:

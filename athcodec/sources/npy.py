@@ -54,7 +54,7 @@ class Header:
 
 
 def read_header(name: str, file: Any) -> Header:
-    """The header at the beginning of a file that knows its place. Raises ClipError."""
+    """Return the header at the beginning of a file that knows its place. Raises ClipError."""
     version = np.lib.format.read_magic(file)
     if version not in ((1, 0), (2, 0)):
         raise ClipError(f"{name}: got version {version} of NumPy's format, expected (1, 0) or (2, 0)")
@@ -77,8 +77,8 @@ def rows_shape(header: Header) -> tuple[int, ...]:
 
 
 def positions_of_rows(name: str, rows: Any, header: Header, order: Order, budget: Budget) -> Any:
-    """(T, N, 3) positions of an array whose rows, in `rows_shape`, are read when they are sliced, forward most of all.
-    Raises ClipError where it has to be read whole, and there is no room for it."""
+    """Return (T, N, 3) positions of an array whose rows, in `rows_shape`, are read when they are sliced, forward most
+    of all. Raises ClipError where it has to be read whole, and there is no room for it."""
     order = order[::-1] if header.is_fortran else order
     if order[0][:1] != (FRAMES,):
         budget.take(header.bytes, f"{name}, whose axes are in another order, whole")

@@ -50,7 +50,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 @contextmanager
 def _naming_array(name: str) -> Iterator[None]:
-    """Errors of the block say which array they are about."""
+    """Let errors of the block name the array that they are about."""
     try:
         yield
     except ClipError:
@@ -125,7 +125,7 @@ class _Members:
         return ()
 
     def _offset(self, name: str) -> int:
-        """Where an array begins in the file: each member has a header of its own length before it."""
+        """Return where an array begins in the file: each member has a header of its own length before it."""
         info = self._members[name]
         self._file.seek(info.header_offset)
         magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, name))
@@ -139,15 +139,15 @@ class _Members:
 
 
 def _parsed(values: np.ndarray) -> dict[str, Any]:
-    """The metadata in an array of JSON text."""
+    """Return the metadata in an array of JSON text."""
     try:
         text = values.reshape(()).item()
-        found = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
+        content = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
     except (ValueError, TypeError) as error:
         raise ClipError(f"{METADATA}: got no JSON text, expected one: {error}") from None
-    if not isinstance(found, dict):
-        raise ClipError(f"{METADATA}: got a {type(found).__name__}, expected a JSON object")
-    return found
+    if not isinstance(content, dict):
+        raise ClipError(f"{METADATA}: got a {type(content).__name__}, expected a JSON object")
+    return content
 
 
 class _UnpackedRows:

@@ -54,11 +54,11 @@ class Numbering:
         return cls(path.parent, prefix, len(marks) if marks.startswith("#") else int(width or 1), suffix)
 
     def path(self, number: int) -> Path:
-        """The file of this number."""
+        """Return the file of this number."""
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
     def files(self) -> dict[int, Path]:
-        """The files that are there, by their numbers, in that order."""
+        """Return the files that are there, by their numbers, in that order."""
         files = {}
         for name, sign, digits in _numbered(self.folder, self.prefix, self.suffix):
             longer = len(digits) - self.width
@@ -87,7 +87,8 @@ class NumberedFiles:
 
 
 def numbering_of(path: FilePath) -> Numbering | None:
-    """The numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has none."""
+    """Return the numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has
+    none."""
     path = Path(path)
     if is_pattern(path):
         return Numbering.of_pattern(path)
@@ -113,8 +114,8 @@ def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, st
 
 
 def numbered_files(path: FilePath) -> NumberedFiles:
-    """The files of the sequence that a file or a pattern names. Raises ClipError where a pattern matches none or two
-    files have one number, OSError where the folder or the named file is not there."""
+    """Return the files of the sequence that a file or a pattern names. Raises ClipError where a pattern matches none or
+    two files have one number, OSError where the folder or the named file is not there."""
     path = Path(path)
     if is_pattern(path):
         numbering = Numbering.of_pattern(path)
@@ -130,7 +131,7 @@ def numbered_files(path: FilePath) -> NumberedFiles:
 
 
 def _at_end(path: Path) -> NumberedFiles:
-    """The files that differ in the number at the end of their names."""
+    """Return the files that differ in the number at the end of their names."""
     match = _AT_END.fullmatch(path.stem)
     if match is None:
         return NumberedFiles((path,), name=path.stem)
@@ -144,7 +145,8 @@ def _at_end(path: Path) -> NumberedFiles:
 
 
 def _behind_t(path: Path) -> NumberedFiles | None:
-    """The files that differ in a number behind "t" or "time"; None where there is no such number, or one file alone."""
+    """Return the files that differ in a number behind "t" or "time"; None where there is no such number, or one file
+    alone."""
     for match in _BEHIND_T.finditer(path.stem):
         place = match.start(1)
         decimals = _Decimals.of(path.parent, path.stem[:place], path.stem[match.end() :] + path.suffix)
@@ -189,7 +191,7 @@ class _Decimals:
 
     @classmethod
     def of(cls, folder: Path, prefix: str, suffix: str, hyphen: str = "") -> _Decimals:
-        """hyphen: a sign behind the prefix that may be a hyphen; it is one where all files have it."""
+        """Return the decimals of a name. A `hyphen` before the number is a sign only if not all files have it."""
         form = re.compile(re.escape(prefix) + _DECIMAL + re.escape(suffix))
         matches = [(match, name) for name in os.listdir(folder) if (match := form.fullmatch(name))]
         if hyphen and all(match[1] for match, _ in matches):
@@ -201,11 +203,11 @@ class _Decimals:
         return cls(folder, prefix, tuple(sorted(numbers, key=lambda number: (number.value, number.file))))
 
     def are_meant(self, named: str = "") -> bool:
-        """Whether the numbers of these files, of which one may be named, are decimals."""
+        """Return whether the numbers of these files, of which one may be named, are decimals."""
         return self._kind(named) == "decimals"
 
     def are_doubtful(self, named: str) -> bool:
-        """Whether they are as likely decimals as a name and the number of a frame."""
+        """Return whether they are as likely decimals as a name and the number of a frame."""
         return self._kind(named) == "doubtful"
 
     def _kind(self, named: str) -> str:
@@ -232,7 +234,8 @@ class _Decimals:
 
     @staticmethod
     def _follow(broken: Sequence[_Decimal], named: str) -> bool:
-        """Whether the digits behind the point, of files with the same before it as the named one, count frames."""
+        """Return whether the digits behind the point, of files with the same before it as the named one, count
+        frames."""
         whole = next((number.whole for number in broken if number.file == named), broken[0].whole)
         behind = sorted(int(number.behind) for number in broken if number.whole == whole)
         return len(behind) > 1 and behind == list(range(behind[0], behind[-1] + 1))
@@ -242,7 +245,7 @@ class _Decimals:
         return bool(steps.max() <= 1.001 * steps.min())
 
     def files(self) -> NumberedFiles:
-        """Raises ClipError where two of them have one number."""
+        """Raise ClipError where two of them have one number."""
         for before, now in zip(self.numbers, self.numbers[1:]):
             if before.value == now.value:
                 raise ClipError(
@@ -256,7 +259,7 @@ class _Decimals:
 
 
 def _word_before(prefix: str) -> str:
-    """The letters, in lower case, that a number follows at once."""
+    """Return the letters, in lower case, that a number follows at once."""
     word = _WORD.search(prefix)
     return word[0].lower() if word else ""
 
@@ -266,10 +269,10 @@ def files_to_read(path: FilePath) -> NumberedFiles:
     files, path = numbered_files(path), Path(path)
     if is_pattern(path):
         return files
-    taken = {file.name for file in files.paths}
+    names_read = {file.name for file in files.paths}
     form = _PLACES.sub("#", path.stem)
-    others = _of_form(path, _PLACES, taken) if "#" in form else []
-    is_alone = len(taken) == 1 and not path.stem[-1:].isdigit()
+    others = _of_form(path, _PLACES, names_read) if "#" in form else []
+    is_alone = len(names_read) == 1 and not path.stem[-1:].isdigit()
     pattern, similar = _pattern_of(path) if is_alone else ("", [])
     if similar and set(others) <= set(similar):
         warnings.warn(
@@ -280,8 +283,8 @@ def files_to_read(path: FilePath) -> NumberedFiles:
         )
     elif others:
         warnings.warn(
-            f"{path}: read as {len(taken)} of {len(taken) + len(others)} files, without {some(others)}; frames differ "
-            f"in the last number alone, written with as many zeros: to read all as one motion, call them "
+            f"{path}: read as {len(names_read)} of {len(names_read) + len(others)} files, without {some(others)}; "
+            f"frames differ in the last number alone, written with as many zeros: to read all as one motion, call them "
             f"NAME_0001{path.suffix}, NAME_0002{path.suffix} ... in the order of time",
             GuessWarning,
             stacklevel=2,
@@ -289,26 +292,29 @@ def files_to_read(path: FilePath) -> NumberedFiles:
     return files
 
 
-def _of_form(path: Path, places: re.Pattern[str], taken: Iterable[str]) -> list[str]:
-    """Names of files that are as that of `path` but for these places."""
+def _of_form(path: Path, places: re.Pattern[str], names_read: Iterable[str]) -> list[str]:
+    """Return names of files that are as that of `path` but for these places."""
     form = places.sub("#", path.stem)
     return sorted(
         name
-        for name in set(os.listdir(path.parent)).difference(taken)
+        for name in set(os.listdir(path.parent)).difference(names_read)
         if name.endswith(path.suffix) and places.sub("#", name.removesuffix(path.suffix)) == form
     )
 
 
 def _pattern_of(path: Path) -> tuple[str, list[str]]:
-    """A pattern for files that differ from `path` in one number, wherever it stands, and their names."""
+    """Return a pattern for files that differ from `path` in one number, wherever it stands, and their names."""
     similar = [name for name in _of_form(path, _TOKENS, [path.name]) if "#" not in name and "%" not in name]
-    mine = _TOKENS.findall(path.stem)
+    parts = _TOKENS.findall(path.stem)
     for place, match in enumerate(_TOKENS.finditer(path.stem)):
         numbers = {}
         for name in similar:
-            theirs = _TOKENS.findall(name.removesuffix(path.suffix))
-            if theirs[place] != mine[place] and [*theirs[:place], mine[place], *theirs[place + 1 :]] == mine:
-                numbers[name] = theirs[place]
+            other_parts = _TOKENS.findall(name.removesuffix(path.suffix))
+            if (
+                other_parts[place] != parts[place]
+                and [*other_parts[:place], parts[place], *other_parts[place + 1 :]] == parts
+            ):
+                numbers[name] = other_parts[place]
         if numbers:
             widths = {len(number) if number.isdigit() else 1 for number in (match[0], *numbers.values())}
             marks = "#" * (widths.pop() if len(widths) == 1 else 1)
@@ -317,13 +323,14 @@ def _pattern_of(path: Path) -> tuple[str, list[str]]:
 
 
 def some(names: Sequence[str]) -> str:
-    """The first of some names, and how many more there are."""
+    """Return the first of some names, and how many more there are."""
     return ", ".join(names[:LISTED]) + (f" and {len(names) - LISTED} more" if len(names) > LISTED else "")
 
 
 def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
-    """Paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them of a
-    pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are named."""
+    """Return paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them
+    of a pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are
+    named."""
     sequence_of: dict[Path, NumberedFiles] = {}
     named: dict[NumberedFiles | str, list[str]] = {}
     for path in paths:

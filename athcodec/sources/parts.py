@@ -35,22 +35,22 @@ class Part(Protocol):
     elsewhere: Mapping[str, str]
 
     def points(self, step: int) -> np.ndarray:
-        """(N, 2) or (N, 3) points."""
+        """Return (N, 2) or (N, 3) points."""
 
     def fixed_points(self) -> bool:
-        """Whether all steps have the points of the first."""
+        """Return whether all steps have the points of the first."""
 
     def check(self, step: int) -> None:
-        """Raises ClipError where the cells are others than in the first step."""
+        """Raise ClipError where the cells are others than in the first step."""
 
     def names(self, center: str) -> Sequence[str]:
-        """The names of the data per point (NODE) or per cell (CELL) of any step."""
+        """Return the names of the data per point (NODE) or per cell (CELL) of any step."""
 
     def values(self, step: int, name: str, center: str) -> np.ndarray:
-        """(N, ...) values. Raises ClipError where the step has none of this name."""
+        """Return (N, ...) values. Raises ClipError where the step has none of this name."""
 
     def is_static(self, name: str, center: str) -> bool:
-        """Whether all steps have the same values."""
+        """Return whether all steps have the same values."""
 
 
 class JoinedSteps:
@@ -64,10 +64,10 @@ class JoinedSteps:
         for part in parts:
             self.elsewhere |= {**part.elsewhere, **dict.fromkeys(part.names(CELL), CELL)}
         self.left_out = self._add_cell_data()
-        self._said: set[str] = set()
+        self._warned: set[str] = set()
 
     def objects(self) -> dict[str, Any]:
-        """Return what scene_objects.scene_said takes: names, numbers of vertices and kinds of the parts."""
+        """Return what scene_objects.scene_fields takes: names, numbers of vertices and kinds of the parts."""
         return {
             "names": [part.name for part in self._parts],
             "vertices": self._counts,
@@ -95,8 +95,8 @@ class JoinedSteps:
         if not having:
             raise ClipError(f"frame {step}: got no field {name!r} per point, expected one as in the first")
         still = [part.name for part in self._parts if part not in having]
-        if still and name not in self._said:
-            self._said.add(name)
+        if still and name not in self._warned:
+            self._warned.add(name)
             text = f"{self._warn_as}: {', '.join(still)} has no {name}, and stays where it is"
             warnings.warn(text, GuessWarning, stacklevel=2)
         rows = [part.values(step, name, NODE) if part in having else None for part in self._parts]
@@ -105,7 +105,7 @@ class JoinedSteps:
         return self._joined(filled, name)
 
     def static(self) -> dict[str, np.ndarray]:
-        """Data per point that are the same in all steps, and in all parts."""
+        """Return data per point that are the same in all steps, and in all parts."""
         return self._static_data(NODE, self._counts)
 
     def _static_data(self, center: str, counts: Sequence[int]) -> dict[str, np.ndarray]:
@@ -127,17 +127,17 @@ class JoinedSteps:
         names = [name for part in self._parts for name in (*part.names(CELL), *part.elsewhere)]
         return [name for name in dict.fromkeys(names) if name and name not in kept]
 
-    def _joined(self, rows: Sequence[np.ndarray], what: str) -> np.ndarray:
+    def _joined(self, rows: Sequence[np.ndarray], subject: str) -> np.ndarray:
         if len(rows) == 1:
             return rows[0]
         if len({each.shape[1:] for each in rows}) > 1:
             shapes = ", ".join(f"{part.name} {each.shape}" for part, each in zip(self._parts, rows))
-            raise ClipError(f"{what}: got {shapes}, expected as many numbers for each in all of them")
+            raise ClipError(f"{subject}: got {shapes}, expected as many numbers for each in all of them")
         return np.concatenate(rows)
 
 
 def _joined_blocks(parts: Sequence[Part], counts: Sequence[int]) -> list[Block]:
-    """The cells of all parts, numbered as their points and cells follow each other."""
+    """Return the cells of all parts, numbered as their points and cells follow each other."""
     blocks, first, row = [], 0, 0
     for part, count in zip(parts, counts):
         if len(parts) > 1:

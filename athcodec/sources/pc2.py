@@ -58,7 +58,7 @@ def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
 
 
 def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes: int) -> None:
-    """ClipError unless a cache has frames and vertices, and as many bytes as that takes."""
+    """Raise ClipError unless a cache has frames and vertices, and as many bytes as they take."""
     if frame_count < 1 or vertex_count < 1:
         raise ClipError(f"header: got {frame_count} frames of {vertex_count} vertices, expected at least one of one")
     size, expected = os.fstat(file.fileno()).st_size, header_bytes + 12 * frame_count * vertex_count
@@ -67,7 +67,7 @@ def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes
 
 
 def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> MotionClip:
-    """The clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
+    """Return the clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
     positions, time and metadata."""
     file = open_plain(path)
     with naming(path), closing_on_failure(file):
@@ -90,12 +90,12 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
         )
 
 
-def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
-    """The mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
+def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
+    """Return the mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
 
     OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in
     other units or axes."""
-    if found is None:
+    if mesh_path is None:
         metadata = {
             "part_names": [Path(path).stem],
             "part_kinds": ["points"],
@@ -103,16 +103,16 @@ def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, ve
         }
         attributes = {"part_vertex_counts": np.array([vertex_count], np.int32)}
         return Mesh(np.empty((vertex_count, 3)), attributes=attributes, metadata=metadata)
-    if Path(found).suffix.lower() in MESH_SUFFIXES:
-        mesh = read_mesh(found, Budget(options.max_memory))
+    if Path(mesh_path).suffix.lower() in MESH_SUFFIXES:
+        mesh = read_mesh(mesh_path, Budget(options.max_memory))
     else:
-        with read(found, only=options.only, max_memory=options.max_memory) as clip:
+        with read(mesh_path, only=options.only, max_memory=options.max_memory) as clip:
             metadata = {name: value for name, value in clip.metadata.items() if name not in ("fps", "start_frame")}
             not_read = {kind: list(names) for kind, names in clip.not_read.items()}
             mesh = Mesh(clip.rest, clip.faces, clip.edges, clip.attributes, metadata, not_read)
     if len(mesh.points) != vertex_count:
         raise ClipError(
-            f"mesh {fspath(found)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
+            f"mesh {fspath(mesh_path)}: got {len(mesh.points)} vertices, expected {vertex_count} as in the cache"
         )
     mesh.attributes = {
         name: values for name, values in mesh.attributes.items() if name not in options.skip and name != "normals"
@@ -121,7 +121,7 @@ def cached_mesh(found: FilePath | None, path: FilePath, options: ReadOptions, ve
 
 
 def _say_other_meshes(path: Path) -> None:
-    """A GuessWarning where files of the cache's name beside it may be its mesh, and are not looked at."""
+    """Give a GuessWarning if files of the cache's name beside it may be its mesh, and are not looked at."""
     known = {suffix for kind in FORMATS for suffix in kind.suffixes} - set(CACHE_SUFFIXES)
     beside = sorted(
         file.name
@@ -137,7 +137,7 @@ def _say_other_meshes(path: Path) -> None:
 
 
 def _mesh_beside(path: Path) -> Path | None:
-    """The OBJ or PLY file of the cache's name beside it."""
+    """Return the OBJ or PLY file of the cache's name beside it."""
     for suffix in (*MESH_SUFFIXES, *(suffix.upper() for suffix in MESH_SUFFIXES)):
         if path.with_suffix(suffix).is_file():
             return path.with_suffix(suffix)

@@ -52,15 +52,15 @@ class RawRows:
 
 
 def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:
-    """The (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has checked
-    that the file is long enough."""
+    """Return the (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has
+    checked that the file is long enough."""
     rows = RawRows(file, offset, (frame_count, vertex_count, 3), dtype)
     return Frames(lambda start, stop: rows[start:stop], frame_count, vertex_count, rows.dtype)
 
 
-def read_exactly(file: BinaryIO, size: int, what: str) -> bytes:
-    """The next `size` bytes of a file. Raises ClipError where it ends before."""
+def read_exactly(file: BinaryIO, size: int, subject: str) -> bytes:
+    """Return the next `size` bytes of a file. Raises ClipError where it ends before."""
     data = file.read(size)
     if len(data) < size:
-        raise ClipError(f"{what}: got {len(data)} bytes, expected {size}")
+        raise ClipError(f"{subject}: got {len(data)} bytes, expected {size}")
     return data

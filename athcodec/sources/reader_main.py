@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def limit_memory(size: int) -> None:
-    """From now on this process gets so many bytes besides those that it has; where the system can limit them."""
+    """Limit the further memory of this process to so many bytes, if the system can."""
     status = Path("/proc/self/status")
     if resource is None or not status.exists():
         return
@@ -88,11 +88,11 @@ def _send(answers: BinaryIO, data: bytes) -> None:
 
 
 def _described(clip: MotionClip, guesses: list[str]) -> bytes:
-    """All but the positions, with the texts of warnings, as an .npz."""
+    """Return all but the positions, with the texts of warnings, as an .npz."""
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest
-    said: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "shape": (clip.frame_count, clip.vertex_count, 3),
         "dtype": clip.dtype.str,
         "rest_given": clip.rest_given,
@@ -103,8 +103,8 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
     }
     if clip.skin is not None:
         arrays |= {"joint_parent": clip.skin.joint_parent, "vertex_joint": clip.skin.vertex_joint}
-        said["joint_names"] = list(clip.skin.names)
-    arrays["said"] = np.frombuffer(json.dumps(said).encode(), np.uint8)
+        facts["joint_names"] = list(clip.skin.names)
+    arrays["said"] = np.frombuffer(json.dumps(facts).encode(), np.uint8)
     out = io.BytesIO()
     np.savez(out, **arrays)
     return out.getvalue()

@@ -31,38 +31,38 @@ MAIN = "athcodec.sources.reader_main"
 
 
 def read_apart(path: FilePath, options: ReadOptions, module: str, crashed: str) -> MotionClip:
-    """The clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has crashed.
-    Raises ClipError, OSError."""
+    """Return the clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has
+    crashed. Raises ClipError, OSError."""
     path = fspath(path)
     open_plain(path).close()
     process = _Process(path, options, module, crashed)
-    with naming(path), closing_on_failure(process), np.load(io.BytesIO(process.described)) as found:
-        arrays = {name: found[name] for name in found.files}
+    with naming(path), closing_on_failure(process), np.load(io.BytesIO(process.described)) as archive:
+        arrays = {name: archive[name] for name in archive.files}
         attributes = {name.split("/", 1)[1]: values for name, values in arrays.items() if "/" in name}
-        said = json.loads(arrays["said"].tobytes())
-        for guess in said["guesses"]:
+        facts = json.loads(arrays["said"].tobytes())
+        for guess in facts["guesses"]:
             warnings.warn(guess, GuessWarning, stacklevel=2)
-        shape, dtype = tuple(said["shape"]), np.dtype(said["dtype"])
+        shape, dtype = tuple(facts["shape"]), np.dtype(facts["dtype"])
 
         def frames(start: int, stop: int) -> np.ndarray:
             return np.frombuffer(process.ask(f"{start} {stop}"), dtype).reshape(stop - start, *shape[1:])
 
         skin = None
         if "joint_parent" in arrays:
-            skin = Skin(arrays["joint_parent"], arrays["vertex_joint"], tuple(said["joint_names"]))
+            skin = Skin(arrays["joint_parent"], arrays["vertex_joint"], tuple(facts["joint_names"]))
         clip = MotionClip(
             Frames(frames, *shape[:2], dtype, keeps=True),
             arrays["time"],
             rest=arrays["rest"],
             attributes=attributes,
-            metadata=said["metadata"],
+            metadata=facts["metadata"],
             resource=process,
-            unchanged=FileWatch.of({file: tuple(stamp) for file, stamp in said["files"].items()}),
-            not_read=said["not_read"],
+            unchanged=FileWatch.of({file: tuple(stamp) for file, stamp in facts["files"].items()}),
+            not_read=facts["not_read"],
             skin=skin,
             **{name: arrays[name] for name in ARRAYS if name in arrays},
         )
-        clip.rest_given = said["rest_given"]
+        clip.rest_given = facts["rest_given"]
         return clip
 
 

@@ -35,11 +35,11 @@ def registered(group: str) -> tuple[Format, ...]:
     """
     from importlib.metadata import EntryPoint, entry_points  # This import takes longer than that of athcodec.
 
-    own = EntryPoint(OURS, f"{group}:FORMATS", group)
+    bundled = EntryPoint(OURS, f"{group}:FORMATS", group)
     others = sorted(entry_points(group=group), key=lambda point: (point.name, point.value))
-    formats = {form.name: form for form in own.load()}
+    formats = {form.name: form for form in bundled.load()}
     for point in others:
-        for form in _formats_of(point) if point.value != own.value else ():
+        for form in _formats_of(point) if point.value != bundled.value else ():
             if form.name in formats:
                 owner = formats[form.name].package or OURS
                 _warn(point, f"its format {form.name!r} is left out, because {owner} has one of that name")

@@ -83,7 +83,7 @@ class SceneObject:
         return sizes[domain]
 
     def check(self) -> None:
-        """Raises ClipError where faces or curves do not fit the points."""
+        """Raise ClipError where faces or curves do not fit the points."""
         corners = self.face_counts.sum(dtype=np.int64)
         if (self.face_counts < 0).any() or corners != len(self.face_indices):
             raise ClipError(
@@ -99,7 +99,7 @@ class SceneObject:
             raise ClipError(f"{self.path}: got curves of {points} points, expected {self.count}")
 
     def keep(self, name: str, domain: str | None, values: np.ndarray | None) -> None:
-        """Keeps a static array where its rows fit; a row per curve becomes one per vertex."""
+        """Keep a static array where its rows fit; a row per curve becomes one per vertex."""
         if name in self.statics:
             return
         if values is None or domain is None or domain == "constant" and len(values) != 1:
@@ -115,7 +115,7 @@ class SceneObject:
             self.left_out.append(name)
 
     def bind(self, name: str, faces: np.ndarray | slice = slice(None)) -> None:
-        """Gives faces a material, by its name."""
+        """Give faces a material, by its name."""
         if name not in self.materials:
             self.materials.append(name)
         if self.face_materials is None:
@@ -123,7 +123,7 @@ class SceneObject:
         self.face_materials[faces] = self.materials.index(name)
 
     def repeat(self, copies: int) -> None:
-        """Makes so many copies, one after the other, of what it is. They have no rest pose but where they are. Raises
+        """Repeat the object as so many copies, one after the other. They have no rest pose but where they are. Raises
         ClipError for more vertices than make sense."""
         if self.count * copies > MOST_VERTICES:
             raise ClipError(
@@ -146,7 +146,7 @@ class SceneObject:
         self.count, self.copies = self.count * copies, copies
 
     def ordered(self, points: np.ndarray, ids: np.ndarray, where: str) -> np.ndarray:
-        """The points (n, 3) in the order of `self.ids`. Raises ClipError where their ids are others."""
+        """Return the points (n, 3) in the order of `self.ids`. Raises ClipError where their ids are others."""
         rows = rows_by_id(ids, self.ids)
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
             raise ClipError(
@@ -156,7 +156,7 @@ class SceneObject:
         return points[rows]
 
     def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
-        """Reverses the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
+        """Reverse the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
         of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
         facing = Facing()
         for frame in frames:
@@ -173,7 +173,7 @@ class SceneObject:
                 static.values = static.values[order]
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Transforms normals to world space; removes them where they turn in time, or have no direction there."""
+        """Transform normals to world space; remove them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return
@@ -185,12 +185,12 @@ class SceneObject:
             self.statics["normals"] = Static(normals.domain, turned.astype(normals.values.dtype))
 
     def leave_out(self, name: str) -> None:
-        """Removes a static array, if there is one of this name, and notes that it is left out."""
+        """Remove a static array, if there is one of this name, and notes that it is left out."""
         if self.statics.pop(name, None) is not None:
             self.left_out.append(name)
 
     def halve_widths(self, matrix: np.ndarray) -> None:
-        """Replaces the widths in "radius" by radii in world space."""
+        """Replace the widths in "radius" by radii in world space."""
         widths = self.statics.get("radius")
         if widths is not None:
             scale = 0.5 * np.cbrt(abs(np.linalg.det(matrix[:3, :3])))
@@ -211,7 +211,7 @@ class ArrayDescriptor(NamedTuple):
         return cls(name, values.dtype.str, json.dumps(list(values.shape)), domain)
 
     def array(self, raw: bytes) -> np.ndarray | None:
-        """The array; None where the bytes do not make one."""
+        """Return the array; None where the bytes do not make one."""
         try:
             dtype = np.dtype(self.dtype)
             return None if dtype.hasobject else np.frombuffer(raw, dtype).reshape(json.loads(self.shape))
@@ -228,7 +228,7 @@ def clip_of_objects(
     options: ReadOptions,
     **more: Any,
 ) -> MotionClip:
-    """The clip of all objects. kept: arrays that a writer of ours has added to the file; more: further fields of
+    """Return the clip of all objects. kept: arrays that a writer of ours has added to the file; more: further fields of
     MotionClip."""
     attributes, domains = _joined_statics(objects, options.skip)
     _add_kept(kept, attributes, domains, options.skip)
@@ -270,8 +270,8 @@ def frames_of_objects(
     frame_name: Callable[[int], str] = "frame {}".format,
     context: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Frames:
-    """Positions of all objects in world space, frame by frame: float32, or float64 where transforms of the first frame
-    place them far from the origin.
+    """Return positions of all objects in world space, frame by frame: float32, or float64 where transforms of the first
+    frame place them far from the origin.
 
     sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
     of copies the points of one and (copies, 4, 4) matrices;
@@ -311,8 +311,8 @@ def frames_of_objects(
 
 
 def transformed(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """(n, 3) points by a (4, 4) matrix for row vectors, as float64; by (k, 4, 4) k times, one after the other. Points
-    that stay keep their type."""
+    """Return (n, 3) points by a (4, 4) matrix for row vectors, as float64; by (k, 4, 4) k times, one after the other.
+    Points that stay keep their type."""
     if matrix.ndim == 3:
         return (points @ matrix[:, :3, :3] + matrix[:, 3:, :3]).reshape(-1, 3)
     if np.array_equal(matrix, np.eye(4)):
@@ -384,7 +384,7 @@ class Facing:
 
 
 def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The row of each wanted id, (k,) among `ids` (n,); -1 for one that is not there."""
+    """Return the row of each wanted id, (k,) among `ids` (n,); -1 for one that is not there."""
     order = np.argsort(ids, kind="stable")
     places = np.minimum(np.searchsorted(ids[order], wanted), max(len(ids) - 1, 0))
     return np.where(ids[order][places] == wanted, order[places], -1) if len(ids) else np.full(len(wanted), -1)
@@ -418,25 +418,25 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
 
 
 def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
-    """An object that lacks the array has zeros; None where the objects' arrays do not go together."""
-    found = [obj.statics[name] for obj in objects if name in obj.statics]
-    shapes = {static.values.shape[1:] for static in found}
+    """Return an object that lacks the array has zeros; None where the objects' arrays do not go together."""
+    statics = [obj.statics[name] for obj in objects if name in obj.statics]
+    shapes = {static.values.shape[1:] for static in statics}
     if len(shapes) != 1:
         return None
-    domain = _common_domain(found, len(objects))
-    dtypes = {static.values.dtype for static in found}
+    domain = _common_domain(statics, len(objects))
+    dtypes = {static.values.dtype for static in statics}
     dtype = dtypes.pop() if len(dtypes) == 1 else np.result_type(*dtypes)
     if domain == "constant":
-        return Static(domain, found[0].values.astype(dtype, copy=False))
+        return Static(domain, statics[0].values.astype(dtype, copy=False))
     rows = [_spread(obj, obj.statics.get(name), domain, next(iter(shapes))) for obj in objects]
     return Static(domain, np.concatenate(rows).astype(dtype, copy=False))
 
 
-def _common_domain(found: list[Static], object_count: int) -> str:
-    domains = {static.domain for static in found}
+def _common_domain(statics: list[Static], object_count: int) -> str:
+    domains = {static.domain for static in statics}
     if domains == {"constant"}:
-        same = all(np.array_equal(static.values, found[0].values) for static in found)
-        return "constant" if same and len(found) == object_count else "vertex"
+        same = all(np.array_equal(static.values, statics[0].values) for static in statics)
+        return "constant" if same and len(statics) == object_count else "vertex"
     domains.discard("constant")
     return domains.pop() if len(domains) == 1 else "corner"
 
@@ -456,26 +456,28 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
 def scene_of_json(text: str | bytes) -> dict[str, Any]:
     """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
-        said = json.loads(text)
-        if isinstance(said, dict):
-            return {key: said[key] for key in (*SCENE_KEYS, MATERIAL_NAMES, FACE_MATERIAL, "objects") if key in said}
+        entries = json.loads(text)
+        if isinstance(entries, dict):
+            return {
+                key: entries[key] for key in (*SCENE_KEYS, MATERIAL_NAMES, FACE_MATERIAL, "objects") if key in entries
+            }
     return {}
 
 
-def scene_said(said: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """(metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where they are
-    some."""
-    metadata = {key: value for key, value in said.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
+def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Return (metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where
+    they are some."""
+    metadata = {key: value for key, value in entries.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
     metadata = {key: value for key, value in metadata.items() if isinstance(value, SCENE_KEYS.get(key, object))}
-    if _are_names(said.get(MATERIAL_NAMES)):
-        metadata[MATERIAL_NAMES] = said[MATERIAL_NAMES]
-    objects, numbers = _objects_said(said.get("objects"), count)
+    if _are_names(entries.get(MATERIAL_NAMES)):
+        metadata[MATERIAL_NAMES] = entries[MATERIAL_NAMES]
+    objects, numbers = _object_fields(entries.get("objects"), count)
     return metadata | objects, numbers
 
 
-def _objects_said(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    said = said if isinstance(said, dict) else {}
-    names, numbers = said.get("names"), {key: said.get(key) for key in ("vertices", "copies") if key in said}
+def _object_fields(entries: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    entries = entries if isinstance(entries, dict) else {}
+    names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(
         isinstance(each, list) and all(type(n) is int and 0 <= n <= count for n in each) for each in numbers.values()
     )
@@ -483,14 +485,14 @@ def _objects_said(said: Any, count: int) -> tuple[dict[str, Any], dict[str, np.n
         return {}, {}
     if {len(each) for each in numbers.values()} != {len(names)}:
         return {}, {}
-    kinds = said.get("kinds")
+    kinds = entries.get("kinds")
     metadata = {"part_names": names} | ({"part_kinds": kinds} if _are_names(kinds) and len(kinds) == len(names) else {})
     keys = {"vertices": "part_vertex_counts", "copies": "part_copies"}
     return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
 
 
-def _are_names(said: Any) -> bool:
-    return isinstance(said, list) and all(isinstance(name, str) for name in said)
+def _are_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _join_materials(
@@ -500,24 +502,24 @@ def _join_materials(
     domains: dict[str, str],
     skip: Collection[str],
 ) -> dict[str, Any]:
-    """Adds "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
+    """Add "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
     Names come in the order that the file was written from, where it says one."""
     if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
         return {}
-    said = metadata.get(MATERIAL_NAMES)
-    said = said if isinstance(said, list) and all(isinstance(name, str) for name in said) else []
-    names = list(dict.fromkeys([*said, *(name for obj in objects for name in obj.materials)]))
+    stated = metadata.get(MATERIAL_NAMES)
+    stated = stated if isinstance(stated, list) and all(isinstance(name, str) for name in stated) else []
+    names = list(dict.fromkeys([*stated, *(name for obj in objects for name in obj.materials)]))
     rows = []
     for obj in objects:
         place = np.array([*(names.index(name) for name in obj.materials), -1], np.int32)
-        own = np.full(len(obj.face_counts), -1) if obj.face_materials is None else obj.face_materials
-        rows.append(place[own])
+        labels_of_object = np.full(len(obj.face_counts), -1) if obj.face_materials is None else obj.face_materials
+        rows.append(place[labels_of_object])
     attributes[FACE_MATERIAL], domains[FACE_MATERIAL] = np.concatenate(rows), "face"
     return {MATERIAL_NAMES: names}
 
 
 def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.ndarray | None:
-    """(F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
+    """Return (F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
     counts = np.concatenate([obj.face_counts for obj in objects])
     if not len(counts):
         return None
@@ -530,7 +532,7 @@ def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.
 
 def _edges(objects: list[SceneObject]) -> np.ndarray | None:
     """Return the edges between neighbours on each curve, closed if it is periodic."""
-    found = []
+    edges = []
     for obj in objects:
         if obj.curve_counts is None or not obj.count:
             continue
@@ -544,30 +546,30 @@ def _edges(objects: list[SceneObject]) -> np.ndarray | None:
             keep[ends - 1] = counts > 2
         else:
             keep[ends - 1] = False
-        found.append(np.stack([vertices, following], axis=1)[keep] + obj.first)
-    return np.concatenate(found).astype(np.int32) if found else None
+        edges.append(np.stack([vertices, following], axis=1)[keep] + obj.first)
+    return np.concatenate(edges).astype(np.int32) if edges else None
 
 
 def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
-    """Takes what a MotionClip has members for out of the attributes; others of these names are renamed."""
-    found = {}
+    """Take what a MotionClip has members for out of the attributes; others of these names are renamed."""
+    fields = {}
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     rest, edges = attributes.get("rest"), attributes.get("edges")
     if rest is not None and rest.shape == (vertices, 3) and rest.dtype.kind == "f" and "rest" not in domains:
-        found["rest"] = attributes.pop("rest")
+        fields["rest"] = attributes.pop("rest")
     if edges is not None and edges.ndim == 2 and edges.shape[1] == 2 and edges.dtype.kind in "iu":
-        found["edges"] = attributes.pop("edges")
+        fields["edges"] = attributes.pop("edges")
     if "vertex_branch" in attributes and "branch_parent" in attributes:
         for name in ("vertex_branch", "branch_parent", "stem_index"):
             if name in attributes:
-                found[name] = attributes.pop(name)
+                fields[name] = attributes.pop(name)
     for name in [name for name in attributes if name in RESERVED_NAMES]:
         attributes[f"{name}_primvar"] = attributes.pop(name)
         if name in domains:
             domains[f"{name}_primvar"] = domains.pop(name)
-    for name in found:
+    for name in fields:
         domains.pop(name, None)
-    return found
+    return fields
 
 
 def own_metadata(text: Any) -> dict[str, Any]:
@@ -575,15 +577,15 @@ def own_metadata(text: Any) -> dict[str, Any]:
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}
     try:
-        found = json.loads(text)
+        metadata = json.loads(text)
     except (ValueError, RecursionError):
         return {}
-    found = found if isinstance(found, dict) else {}
-    return {name: value for name, value in found.items() if name not in KNOWN_METADATA}
+    metadata = metadata if isinstance(metadata, dict) else {}
+    return {name: value for name, value in metadata.items() if name not in KNOWN_METADATA}
 
 
 def turned_corners(counts: np.ndarray) -> np.ndarray:
-    """(C,) the corners of each face from the last to the first."""
+    """Return (C,) the corners of each face from the last to the first."""
     counts = np.asarray(counts, np.int64)
     ends = np.cumsum(counts)
     return np.repeat(2 * ends - counts - 1, counts) - np.arange(int(ends[-1]) if len(ends) else 0)

@@ -91,20 +91,20 @@ class Arrays(Protocol):
     counts_from_1: bool
 
     def read(self, name: str) -> np.ndarray:
-        """The whole array."""
+        """Return the whole array."""
 
     def positions(self, name: str, order: Order) -> Any:
-        """(T, N, 3) frames of an array whose axes have this order, read when they are sliced."""
+        """Return (T, N, 3) frames of an array whose axes have this order, read when they are sliced."""
 
     def notes(self, name: str) -> Mapping[str, Any]:
-        """What the file says of an array, or of a group."""
+        """Return what the file says of an array, or of a group."""
 
     def labels(self, name: str) -> Sequence[str]:
-        """Names of the dimensions of an array, as far as the file states them."""
+        """Return names of the dimensions of an array, as far as the file states them."""
 
 
 def clip_of_arrays(arrays: Arrays, path: FilePath, options: ReadOptions, **watched: Any) -> MotionClip:
-    """The clip of a file's arrays.
+    """Return the clip of a file's arrays.
 
     watched: resource and unchanged as in MotionClip. Raises ClipError, which lists the arrays where none, or several,
     can be the positions.
@@ -194,16 +194,16 @@ class _Clip:
         if not candidates and len(others) == 1:
             candidates = others  # What is wrong with it is said where it is looked at.
         named = [each for each in candidates if _last(each.name).lower() in POSITION_NAMES]
-        for found in (named, candidates):
-            if len(found) == 1:
-                self._say_chosen(found[0], candidates)
-                return found[0].name
+        for choice in (named, candidates):
+            if len(choice) == 1:
+                self._say_chosen(choice[0], candidates)
+                return choice[0].name
         several = ", ".join(each.shown for each in candidates[:LISTED])
-        what = f"several, {several}" if candidates else "no such dataset"
+        problem = f"several, {several}" if candidates else "no such dataset"
         apart = {_last(each.name).lower() for each in others} >= set("xyz")
         hint = "; x, y and z in arrays of their own have to be stacked into one" if apart else ""
         raise ClipError(
-            f"positions: got {what}, expected (frames, vertices, 3){hint}; --dataset (dataset=) names the array, "
+            f"positions: got {problem}, expected (frames, vertices, 3){hint}; --dataset (dataset=) names the array, "
             f"--axes (axes=) the order of its axes; {listing(stored)}"
         )
 
@@ -363,14 +363,14 @@ class _Clip:
         """Return what seems to be times in the nearest group that has any: ascending numbers under a usual name."""
         for full in _upwards(self.used[POSITIONS], ""):
             group = full.rpartition("/")[0]
-            found = [
+            guesses = [
                 name
                 for name, stored in self.arrays.stored.items()
                 if name.rpartition("/")[0] == group and _last(name).lower() in TIME_NAMES and _is_row(stored)
                 if stored.dtype.kind in "fiumM" and name not in self.options.skip and _ascends(self._read(name))
             ]
-            if found:
-                return found
+            if guesses:
+                return guesses
         return []
 
     def _guess_rate(self, metadata: dict[str, Any]) -> None:
@@ -400,23 +400,23 @@ class _Clip:
     def _further(self, name: str) -> dict[str, np.ndarray]:
         """Return the arrays that are not of the schema; those of the positions' group by their names in it."""
         group, skip = name.rpartition("/")[0], set(self.options.skip)
-        taken, found = set(self.used.values()), {}
+        names_used, arrays = set(self.used.values()), {}
         names = sorted(self.arrays.stored, key=lambda each: not each.startswith(f"{group}/"))
         for full in names:
             short = full.removeprefix(f"{group}/") if group else full
-            if full in taken or full in skip or short in skip:
+            if full in names_used or full in skip or short in skip:
                 continue
             is_reserved = (_last(full) if group else full) in RESERVED_NAMES
-            if is_reserved or short in found:
+            if is_reserved or short in arrays:
                 self.not_read.setdefault(OTHER_CLIP, []).append(full)
                 continue
             values = self._read(full)
             if values.dtype.kind in "mMO":
                 self.not_read.setdefault(f"array of {values.dtype.name}", []).append(short)
                 continue
-            found[short] = values
+            arrays[short] = values
             self._name_notes(full, self.arrays.notes(full))
-        return {name: found[name] for name in sorted(found)} if group else found
+        return {name: arrays[name] for name in sorted(arrays)} if group else arrays
 
     def _warn(self, text: str) -> None:
         warnings.warn(f"{os.fspath(self.path)}: {text}", GuessWarning, stacklevel=2)
@@ -435,12 +435,12 @@ def _last(name: str) -> str:
 
 
 def _is_unnamed(name: str) -> bool:
-    """Whether a file's only array has no name, or the one that NumPy gives to it."""
+    """Return whether a file's only array has no name, or the one that NumPy gives to it."""
     return name in ("", "arr_0")
 
 
 def _is_row(stored: Stored) -> bool:
-    """Whether an array is a row of numbers, whatever else its shape is."""
+    """Return whether an array is a row of numbers, whatever else its shape is."""
     return bool(stored.shape) and max(stored.shape) == np.prod(stored.shape, dtype=object)
 
 
@@ -454,7 +454,7 @@ def _ascends(values: np.ndarray) -> bool:
 
 
 def _is_scalar_name(key: str) -> bool:
-    """Whether metadata of this name are a rate, or what else is a single word or number."""
+    """Return whether metadata of this name are a rate, or what else is a single word or number."""
     return key in SCALARS or _plain(key) in RATE_NAMES | STEP_NAMES
 
 
@@ -466,10 +466,10 @@ def _branches(
     positions: Any, known: Mapping[str, np.ndarray | None], metadata: dict[str, Any], options: ReadOptions
 ) -> dict[str, np.ndarray | None]:
     """Return the branches of the file, else those that its edges make."""
-    found = {name: known[name] for name in BRANCHES}
+    branches = {name: known[name] for name in BRANCHES}
     edges = known["edges"]
-    if found["vertex_branch"] is not None or found["branch_parent"] is not None:
-        return found
+    if branches["vertex_branch"] is not None or branches["branch_parent"] is not None:
+        return branches
     if edges is None:
         return {}
     rest = MotionClip(positions, np.arange(len(positions)), rest=known["rest"]).rest  # checked, as the clip's will be

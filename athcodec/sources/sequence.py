@@ -41,8 +41,8 @@ _LABELS = (b"vt ", b"vt\t", b"usemtl ", b"usemtl\t", b"o ", b"o\t", b"g ", b"g\t
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
-    """The clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
-    read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
+    """Return the clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its
+    frame is read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
     series = series_of(path, options)
     if len(series.parts) > 1:
         raise ClipError(f"{series.index}: got {len(series.parts)} files at one time, expected one")
@@ -196,7 +196,7 @@ def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
 
 
 def _obj_elements(lines: Sequence[bytes]) -> list[bytes]:
-    """The lines that say which vertices belong together, and what is where on them."""
+    """Return the lines that say which vertices belong together, and what is where on them."""
     return [line for line in lines if line.startswith(_ELEMENTS + _LABELS)]
 
 

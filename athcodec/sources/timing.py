@@ -19,7 +19,8 @@ MOST_FRAMES = 100_000  # Most frames of a rate that is advised.
 
 
 def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
-    """(T,) seconds from 0 of frames with these numbers in the tool that made them, and the metadata that says so.
+    """Return (T,) seconds from 0 of frames with these numbers in the tool that made them, and the metadata that says
+    so.
 
     Without a given rate the metadata has one only where the numbers do not follow one another: they could not be found
     again from the times.
@@ -33,7 +34,8 @@ def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, 
 
 
 def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
-    """(T,) seconds from 0 of frames whose times a file has as float32 or float64, and the metadata of their rate.
+    """Return (T,) seconds from 0 of frames whose times a file has as float32 or float64, and the metadata of their
+    rate.
 
     Where all times are whole multiples of a usual rate's step, but for the rounding of their own type, that rate is
     meant: the clip then has it, and the times without the rounding. With a rate,
@@ -72,8 +74,8 @@ def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, 
 
 
 def _rate_of_all(places: np.ndarray, fps: float) -> float | None:
-    """The lowest rate, a whole number or a multiple of fps, with frames at all of these seconds, one of them at 0; None
-    where that takes more frames than anybody wants."""
+    """Return the lowest rate, a whole number or a multiple of fps, with frames at all of these seconds, one of them at
+    0; None where that takes more frames than anybody wants."""
     highest = min(MOST_FPS, MOST_FRAMES / max(float(np.ptp(places)), SAME_TIME))
     multiples = fps * np.arange(2, int(highest / fps) + 1)
     for rate in sorted({*multiples.tolist(), *map(float, range(int(fps) + 1, int(highest) + 1))}):
@@ -83,12 +85,12 @@ def _rate_of_all(places: np.ndarray, fps: float) -> float | None:
 
 
 def plain_number(number: float) -> str:
-    """The number as an option takes it and a person writes it: without an exponent."""
+    """Return the number as an option takes it and a person writes it: without an exponent."""
     return np.format_float_positional(round(float(number), 6), trim="-")
 
 
 def whole(number: float) -> int | float:
-    """The number, an int where it is whole."""
+    """Return the number, an int where it is whole."""
     return int(number) if number == int(number) else float(number)
 
 

@@ -29,13 +29,14 @@ PURPOSE_BINDINGS = ("material:binding:full", "material:binding:preview")
 
 
 def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dict[str, list[str]]:
-    """Prims that are inactive, overs of nothing or classes that nothing takes, variants that are not selected, layers
-    of a package that no other names, and data of the layer. prototypes: what instancers show, wherever it stands."""
-    found: dict[str, list[str]] = {}
+    """Return prims that are inactive, overs of nothing or classes that nothing takes, variants that are not selected,
+    layers of a package that no other names, and data of the layer. prototypes: what instancers show, wherever it
+    stands."""
+    left_out: dict[str, list[str]] = {}
     classes = []
 
     def add(kind: str, prim: Usd.Prim, more: str = "") -> None:
-        found.setdefault(kind, []).append(f"{prim.GetPath()}{more}")
+        left_out.setdefault(kind, []).append(f"{prim.GetPath()}{more}")
 
     prims = iter(_PrimsOnce(stage))
     for prim in prims:
@@ -50,15 +51,15 @@ def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dic
                 add("variant", prim, f" {text}")
             continue
         prims.prune()
-    taken = _sources_of_arcs(stage).union(prototypes) if classes else set()
-    above = {prefix for path in taken for prefix in path.GetPrefixes()}
+    arc_paths = _sources_of_arcs(stage).union(prototypes) if classes else set()
+    above = {prefix for path in arc_paths for prefix in path.GetPrefixes()}
     for prim in classes:
-        is_taken = prim.GetPath() in above or _is_below(prim.GetPath(), taken)
+        is_taken = prim.GetPath() in above or _is_below(prim.GetPath(), arc_paths)
         if not is_taken and any(map(_has_shape, Usd.PrimRange(prim, Usd.PrimAllPrimsPredicate))):
             add("class that nothing inherits", prim)
     layers = _other_layers(stage.GetRootLayer())
     data = [f"customLayerData.{key}" for key in stage.GetRootLayer().customLayerData if key != OWN]
-    return found | {kind: names for kind, names in (("layer", layers), ("metadata", data)) if names}
+    return left_out | {kind: names for kind, names in (("layer", layers), ("metadata", data)) if names}
 
 
 class _PrimsOnce:
@@ -87,7 +88,7 @@ class _PrimsOnce:
 
 
 def _is_below(path: Sdf.Path, places: Collection[Sdf.Path]) -> bool:
-    """Whether a path is one of `places`, which is a set, or below one."""
+    """Return whether a path is one of `places`, which is a set, or below one."""
     return any(prefix in places for prefix in path.GetPrefixes())
 
 
@@ -112,11 +113,11 @@ def _other_variants(prim: Usd.Prim) -> Iterator[str]:
 
 
 def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
-    """The paths in the stage that inherits, specializes and references of prims lead to."""
-    found = set()
+    """Return the paths in the stage that inherits, specializes and references of prims lead to."""
+    paths = set()
 
     def follow(node: Pcp.NodeRef) -> None:
-        found.add(node.path)
+        paths.add(node.path)
         for child in node.children:
             follow(child)
 
@@ -124,11 +125,11 @@ def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
         if prim.HasAuthoredInherits() or prim.HasAuthoredSpecializes() or prim.HasAuthoredReferences():
             for node in prim.GetPrimIndex().rootNode.children:
                 follow(node)
-    return found
+    return paths
 
 
 def _other_layers(root: Sdf.Layer) -> list[str]:
-    """The layers of a .usdz that its first one does not lead to."""
+    """Return the layers of a .usdz that its first one does not lead to."""
     if not zipfile.is_zipfile(root.realPath):
         return []
     with zipfile.ZipFile(root.realPath) as package:
@@ -149,7 +150,8 @@ def _other_layers(root: Sdf.Layer) -> list[str]:
 
 
 def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
-    """The files of value clips, which USD opens when a value is asked for; and the names of those that are missing."""
+    """Return the files of value clips, which USD opens when a value is asked for; and the names of those that are
+    missing."""
     files, missing = [], []
     for prim in stage.TraverseAll():
         if not prim.HasAuthoredMetadata("clips"):
@@ -169,9 +171,9 @@ def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
 
 
 def unread_properties(prim: Usd.Prim) -> list[str]:
-    """The names of attributes and relationships, or their namespaces, and metadata that are authored on a prim, differ
-    from their fallback and are not read."""
-    found: dict[str, None] = {}
+    """Return the names of attributes and relationships, or their namespaces, and metadata that are authored on a prim,
+    differ from their fallback and are not read."""
+    unread: dict[str, None] = {}
     order = UsdGeom.Xformable(prim).GetXformOpOrderAttr().Get() if prim.IsA(UsdGeom.Xformable) else None
     operations = {name.removeprefix("!invert!") for name in order or ()}
     for attribute in prim.GetAuthoredAttributes():
@@ -179,21 +181,21 @@ def unread_properties(prim: Usd.Prim) -> list[str]:
         space = name.partition(":")[0]
         if space == "xformOp":
             if name not in operations:
-                found[f"{name} (not in xformOpOrder)"] = None
+                unread[f"{name} (not in xformOpOrder)"] = None
         elif space not in OBJECT_PROPERTIES and _differs(prim, attribute):
-            found[space] = None
+            unread[space] = None
         if attribute.HasAuthoredConnections():
-            found[f"{name}.connect"] = None
+            unread[f"{name}.connect"] = None
     for relationship in prim.GetAuthoredRelationships():
         name, targets = relationship.GetName(), relationship.GetForwardedTargets()
         space = name.partition(":")[0]
         if targets and (space not in (*RELATIONSHIPS, OWN) or name in PURPOSE_BINDINGS):
-            found[name if space in RELATIONSHIPS else space] = None
-        gone = [target for target in targets if not prim.GetStage().GetObjectAtPath(target)]
-        if gone and name != "prototypes":  # An instancer names these one by one.
-            found[f"{name} (there is no {gone[0]})"] = None
+            unread[name if space in RELATIONSHIPS else space] = None
+        missing = [target for target in targets if not prim.GetStage().GetObjectAtPath(target)]
+        if missing and name != "prototypes":  # An instancer names these one by one.
+            unread[f"{name} (there is no {missing[0]})"] = None
     metadata = [key for key in ("customData", "assetInfo") if prim.HasAuthoredMetadata(key)]
-    return [*found, *metadata]
+    return [*unread, *metadata]
 
 
 def _differs(prim: Usd.Prim, attribute: Usd.Attribute) -> bool:
@@ -206,5 +208,5 @@ def _differs(prim: Usd.Prim, attribute: Usd.Attribute) -> bool:
 
 
 def is_array(value: Any) -> bool:
-    """Whether a value is one of USD's arrays."""
+    """Return whether a value is one of USD's arrays."""
     return type(value).__module__.startswith("pxr.Vt")

@@ -153,7 +153,7 @@ class _Steps:
         return self._now[1]
 
     def _read(self, path: Path, budget: Budget, above: tuple[Path, ...] = ()) -> Grid:
-        """The data set in a file, or in those that it lists; above: the files that list it."""
+        """Return the data set in a file, or in those that it lists; above: the files that list it."""
         self._file_count += 1
         if self._file_count > MOST_FILES:
             raise ClipError(f"{above[0]}: got more than {MOST_FILES} files, expected fewer for one frame")

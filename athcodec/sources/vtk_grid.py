@@ -93,11 +93,12 @@ class Grid:
         return self.types, self.starts, self.stops, self.nodes
 
     def topology(self) -> Topology:
-        """Raises ClipError for cells of a type that is not read, or with nodes that are no points."""
+        """Raise ClipError for cells of a type that is not read, or with nodes that are no points."""
         return topology_of(blocks_of(*self.cells, VTK_NAMES), len(self.points))
 
     def time(self) -> tuple[str, float | np.float32] | None:
-        """The field that states the time of the data set, and its value; one of STEP_NAMES where no other does."""
+        """Return the field that states the time of the data set, and its value; one of STEP_NAMES where no other
+        does."""
         known = {name.lower(): name for name in reversed(self.field_data)}
         for name in (*TIME_NAMES, *STEP_NAMES):
             values = self.field_data.get(known.get(name, ""))
@@ -109,12 +110,12 @@ class Grid:
 
 
 def starts_of(stops: np.ndarray) -> np.ndarray:
-    """Where cells begin whose nodes follow one another."""
+    """Return where cells begin whose nodes follow one another."""
     return np.concatenate([[0], stops[:-1]]).astype(np.int64) if len(stops) else stops
 
 
 def poly_cells(cells: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(types, stops, nodes) of PolyData's cells, which are in a list for each kind: (stops, nodes) by names of
+    """Return (types, stops, nodes) of PolyData's cells, which are in a list for each kind: (stops, nodes) by names of
     POLY_CELLS."""
     none = np.zeros(0, np.int64)
     types, stops, nodes = [none], [none], [none]
@@ -127,7 +128,7 @@ def poly_cells(cells: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.n
 
 
 def lattice_cells(size: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(types, stops, nodes): hexahedra, quads or lines, along the axes that have more than one point."""
+    """Return (types, stops, nodes): hexahedra, quads or lines, along the axes that have more than one point."""
     strides = np.cumprod([1, *size])[:3]
     along = [axis for axis in range(3) if size[axis] > 1]
     first = np.zeros(1, np.int64)
@@ -143,8 +144,8 @@ def lattice_cells(size: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:
-    """One data set of several, one after the other, whose points become objects of these names; neighbours of one
-    name are one object. Arrays that not all of them have are left out and named."""
+    """Return one data set of several, one after the other, whose points become objects of these names; neighbours of
+    one name are one object. Arrays that not all of them have are left out and named."""
     filled = [(grid, name) for grid, name in zip(grids, names, strict=True) if len(grid.points)] or [(grids[0], "")]
     grids, names = [grid for grid, _ in filled], [name for _, name in filled]
     if len(grids) == 1 and not any(names):
@@ -183,12 +184,12 @@ def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:
 
 
 def _common(data: Sequence[dict[str, np.ndarray]], left_out: list[str]) -> dict[str, np.ndarray]:
-    """The arrays that all have in one form, joined; names of the others are added to left_out."""
-    found = {}
+    """Return the arrays that all have in one form, joined; names of the others are added to left_out."""
+    shared = {}
     for name in dict.fromkeys(name for arrays in data for name in arrays):
         values = [arrays[name] for arrays in data if name in arrays]
         if len(values) == len(data) and len({(array.shape[1:], array.dtype.kind) for array in values}) == 1:
-            found[name] = np.concatenate(values)
+            shared[name] = np.concatenate(values)
         else:
             left_out.append(name)
-    return found
+    return shared

@@ -46,12 +46,12 @@ _WIDTHS = {"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS"
 
 
 def is_legacy(data: bytes) -> bool:
-    """Whether a file begins as legacy VTK files do."""
+    """Return whether a file begins as legacy VTK files do."""
     return _MAGIC.match(data) is not None
 
 
 def read_legacy(data: bytes, budget: Budget) -> Grid:
-    """The data set in the bytes of a file. Raises ClipError, ValueError, OverflowError."""
+    """Return the data set in the bytes of a file. Raises ClipError, ValueError, OverflowError."""
     if not is_legacy(data):
         raise ClipError("got no legacy VTK file, expected '# vtk DataFile Version' in its first line")
     return _Legacy(data, budget).grid()
@@ -113,7 +113,8 @@ class _Legacy:
     # ---- text ----
 
     def _line(self, or_blank: bool = False) -> str:
-        """The next line with anything on it, "" at the end of the file; or_blank: the next one, whatever it holds."""
+        """Return the next line with anything on it, "" at the end of the file; or_blank: the next one, whatever it
+        holds."""
         while self._at < len(self._data):
             end = self._data.find(b"\n", self._at)
             end = len(self._data) if end < 0 else end
@@ -124,7 +125,7 @@ class _Legacy:
         return ""
 
     def _next_is(self, word: bytes) -> bool:
-        """Whether the next word is this one; nothing is taken."""
+        """Return whether the next word is this one; nothing is taken."""
         start = self._at
         while self._data[start : start + 1].isspace():
             start += 1
@@ -143,7 +144,7 @@ class _Legacy:
         return words[:count]
 
     def _array(self, kind: str, count: int, width: int = 1) -> np.ndarray:
-        """(count,) or (count, width) numbers of a type of VTK."""
+        """Return (count,) or (count, width) numbers of a type of VTK."""
         if count < 0 or width < 1:
             raise ClipError(f"got {count} rows of {width} numbers, expected some")
         name = _TYPES.get(kind.lower())
@@ -182,7 +183,7 @@ class _Legacy:
             self._at += size + (head & ((1 << (8 * size - 2)) - 1))
 
     def _metadata(self) -> None:
-        """Names of components and other information, which end with an empty line."""
+        """Pass over names of components and other information, which end with an empty line."""
         while (line := self._line(or_blank=True)) != "":
             if line.upper().startswith("COMPONENT_NAMES"):
                 self._other["names of components"] = None
@@ -217,7 +218,7 @@ class _Legacy:
             raise ClipError(f"got {line[:60]!r}, expected a section of a legacy VTK file; save it as .vtu or .vtp")
 
     def _cell_list(self, words: list[str], line: str) -> tuple[np.ndarray, np.ndarray]:
-        """(stops, nodes). From version 5.0 on, offsets and nodes are arrays of their own."""
+        """Return (stops, nodes). From version 5.0 on, offsets and nodes are arrays of their own."""
         first, second = _number(words, 0, line), _number(words, 1, line)
         if self._next_is(b"OFFSETS"):
             kinds = [self._line().split()[1], None]
@@ -251,7 +252,7 @@ class _Legacy:
         return values.astype(np.int64)
 
     def _built(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Points, types, stops and nodes."""
+        """Return points, types, stops and nodes."""
         if not self._kind:
             raise ClipError("got no DATASET, expected one")
         if self._kind == "STRUCTURED_POINTS":
@@ -344,6 +345,6 @@ def _number(words: list[str], place: int, line: str) -> int:
 
 
 def _lattice(axes: list[np.ndarray]) -> np.ndarray:
-    """(N, 3) points of a lattice, x first."""
+    """Return (N, 3) points of a lattice, x first."""
     z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
     return np.stack([x, y, z], axis=-1).reshape(-1, 3)

@@ -98,22 +98,22 @@ class VtkXml:
         self._unpack = _UNPACKERS.get(name or "")
 
     def files(self) -> list[Listed] | None:
-        """The files that a list names; None for a data set."""
+        """Return the files that a list names; None for a data set."""
         if self._type not in _LISTS:
             return None
         tag, attribute = _LISTS[self._type]
         names = {element: parent.get("name", "") for parent in self._root.iter() for element in parent}
-        found = [
+        files = [
             Listed(element.get("name") or names.get(element, ""), element.get(attribute, ""))
             for element in self._root.iter(tag)
             if element.get(attribute)
         ]
-        if not found:
+        if not files:
             raise ClipError(f"got no {tag} with a {attribute}, expected the files of a {self._type}")
-        return found
+        return files
 
     def fields(self) -> tuple[dict[str, np.ndarray], dict[str, Any], list[str]]:
-        """Fields that may be times, what our writer adds, and the names of the other fields."""
+        """Return fields that may be times, what our writer adds, and the names of the other fields."""
         times: dict[str, np.ndarray] = {}
         metadata: dict[str, Any] = {}
         others = []
@@ -129,7 +129,8 @@ class VtkXml:
         return times, metadata, others
 
     def grid(self) -> Grid:
-        """The data set, whose pieces are joined. Raises ClipError, and ValueError and the like for broken files."""
+        """Return the data set, whose pieces are joined. Raises ClipError, and ValueError and the like for broken
+        files."""
         whole = self._root.find(self._type)
         pieces = [] if whole is None else whole.findall("Piece")
         if whole is None or not pieces:
@@ -162,20 +163,20 @@ class VtkXml:
         if points is None:
             if int(piece.get("NumberOfPoints", "-1")) != 0:
                 raise ClipError("got no points, expected some")
-            found = np.zeros((0, 3), np.float32)
+            coordinates = np.zeros((0, 3), np.float32)
         else:
-            found = self._array(points).reshape(-1, int(points.get("NumberOfComponents") or 3))
+            coordinates = self._array(points).reshape(-1, int(points.get("NumberOfComponents") or 3))
         stated = piece.get("NumberOfPoints")
-        if stated is not None and int(stated) != len(found):
-            raise ClipError(f"points: got {len(found)}, expected {int(stated)}")
+        if stated is not None and int(stated) != len(coordinates):
+            raise ClipError(f"points: got {len(coordinates)}, expected {int(stated)}")
         if self._type == "StructuredGrid":
-            types, stops, nodes = self._lattice(piece, len(found))
+            types, stops, nodes = self._lattice(piece, len(coordinates))
         elif self._type == "PolyData":
             types, stops, nodes = poly_cells({tag: self._cells(piece, tag)[1:] for tag in POLY_CELLS})
         else:
             types, stops, nodes = self._cells(piece, "Cells")
         data = [self._arrays(piece, tag) for tag in ("PointData", "CellData")]
-        return Grid(found, types, starts_of(stops), stops, nodes, *data)
+        return Grid(coordinates, types, starts_of(stops), stops, nodes, *data)
 
     def _lattice(self, piece: ElementTree.Element, point_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         ends = [int(number) for number in (piece.get("Extent") or "").split()]
@@ -186,7 +187,7 @@ class VtkXml:
         return lattice_cells(size)
 
     def _cells(self, piece: ElementTree.Element, tag: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Types, ends and nodes of cells; none of what the file does not list."""
+        """Return types, ends and nodes of cells; none of what the file does not list."""
         cells = {element.get("Name"): element for element in piece.findall(f"{tag}/DataArray")}
         none = np.zeros(0, np.int64)
         types, stops, nodes = (
@@ -195,15 +196,15 @@ class VtkXml:
         return types, stops, nodes
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
-        found = {}
+        arrays = {}
         for element in (*piece.findall(f"{tag}/DataArray"), *piece.findall(f"{tag}/Array")):
             name = element.get("Name", "")
-            if element.get("type") not in _TYPES or name in found:
+            if element.get("type") not in _TYPES or name in arrays:
                 self._left_out.append(name)
             else:
                 width, values = int(element.get("NumberOfComponents") or 1), self._array(element)
-                found[name] = values if width == 1 else values.reshape(-1, width)
-        return found
+                arrays[name] = values if width == 1 else values.reshape(-1, width)
+        return arrays
 
     def _integers(self, element: ElementTree.Element) -> np.ndarray:
         values = self._array(element)
@@ -241,7 +242,7 @@ class VtkXml:
         return self._decoded(text[offset:].encode())
 
     def _decoded(self, text: bytes) -> bytes:
-        """Base64: the counts before packed data are encoded by themselves."""
+        """Return bytes from base64, in which the counts before packed data are encoded by themselves."""
         size = self._count.itemsize
         if self._unpack is None:
             length = self._numbers(_from_base64(text, size), 1)[0]
@@ -282,7 +283,7 @@ class VtkXml:
 
 
 def _from_base64(text: bytes, size: int) -> bytes:
-    """The first `size` bytes."""
+    """Return the first `size` bytes."""
     data = base64.b64decode(text[: 4 * ((size + 2) // 3)], validate=False)
     if len(data) < size:
         raise ClipError(f"got {len(data)} bytes of data, expected {size}")
@@ -290,12 +291,12 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
-    """The XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
-    found = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
-    if not found:
+    """Return the XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
+    match = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
+    if not match:
         return data, None
     end = data.rfind(b"</AppendedData>")
-    start = data.find(b"_", found.end()) + 1
-    if not found.end() < start <= end:
+    start = data.find(b"_", match.end()) + 1
+    if not match.end() < start <= end:
         raise ClipError("got no end of the appended data")
-    return data[: found.end()] + data[end:], data[start:end]
+    return data[: match.end()] + data[end:], data[start:end]

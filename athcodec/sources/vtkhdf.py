@@ -39,7 +39,7 @@ SURFACE_CELLS = {"Vertices": ({1: 1}, 2), "Lines": ({2: 3}, 4), "Polygons": ({3:
 
 
 def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watched: Any) -> MotionClip:
-    """The clip in an open file. watched: resource and unchanged as in MotionClip. Raises ClipError."""
+    """Return the clip in an open file. watched: resource and unchanged as in MotionClip. Raises ClipError."""
     budget, name = Budget(options.max_memory), Path(path).stem
     if options.axes is not None:
         raise ClipError(
@@ -57,8 +57,8 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
         time, metadata = times_in_seconds(stored, options.fps)
     steps = JoinedSteps(parts, budget, fspath(path))
     steps.left_out += [name for part in parts for name in part.left_out]
-    said = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}
-    clip = clip_of_steps(steps, time, said, name, options, steps.static(), **watched)
+    facts = metadata if len(parts) == 1 else metadata | {"objects": steps.objects()}
+    clip = clip_of_steps(steps, time, facts, name, options, steps.static(), **watched)
     others = [each for each in file if each != ROOT]
     clip.not_read = {
         **clip.not_read,
@@ -69,7 +69,8 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
 
 
 def _groups(file: h5py.File, only: Sequence[str]) -> tuple[dict[str, h5py.Group], list[str]]:
-    """The meshes of a file by name, and the names of blocks that are none. Raises ClipError where there is no mesh."""
+    """Return the meshes of a file by name, and the names of blocks that are none. Raises ClipError where there is no
+    mesh."""
     root = file[ROOT]
     kind = _kind(root)
     if kind in (GRID, SURFACE):
@@ -92,7 +93,7 @@ def _groups(file: h5py.File, only: Sequence[str]) -> tuple[dict[str, h5py.Group]
 
 
 def _block_names(root: h5py.Group) -> dict[str, str]:
-    """The names that the assembly has for blocks, by the names of their groups."""
+    """Return the names that the assembly has for blocks, by the names of their groups."""
     names: dict[str, str] = {}
     assembly = root.get(ASSEMBLY)
 
@@ -178,7 +179,7 @@ class _Part:
         return values[:count] if values.dtype.kind == "f" else values[:count].astype(np.float64)
 
     def _pieces(self, step: int) -> range:
-        """The pieces of a step, in the arrays that have a number for each."""
+        """Return the pieces of a step, in the arrays that have a number for each."""
         first = self._of_step("PartOffsets", step, 0)
         total = self._group["NumberOfPoints"].shape[0]
         count = self._of_step("NumberOfParts", step, 1 if self._steps is not None else total)
@@ -189,19 +190,19 @@ class _Part:
         return range(first, first + count)
 
     def _points_at(self, step: int) -> tuple[int, int]:
-        """The first point of a step, and their number."""
+        """Return the first point of a step, and their number."""
         pieces = self._pieces(step)
         return self._of_step("PointOffsets", step, 0), sum(self._counts("NumberOfPoints", pieces))
 
     def _cells_at(self, step: int) -> tuple[Any, ...]:
-        """What tells where the cells of a step lie."""
+        """Return what tells where the cells of a step lie."""
         kinds = len(SURFACE_CELLS) if self._is_surface else 1
         pieces = self._pieces(step)
         offsets = [self._of_step(name, step, 0, kind) for name in OFFSETS for kind in range(kinds)]
         return (*offsets, pieces, *self._counts("NumberOfPoints", pieces))
 
     def _data_at(self, step: int, name: str, center: str) -> tuple[int, int]:
-        """The first value of a step, and their number."""
+        """Return the first value of a step, and their number."""
         kinds = len(SURFACE_CELLS) if self._is_surface and center == CELL else 1
         usual = "PointOffsets" if center == NODE else "CellOffsets"
         place = sum(self._of_step(usual, step, 0, kind) for kind in range(kinds))
@@ -209,7 +210,7 @@ class _Part:
         return self._of_step(f"{DATA[center]}Offsets/{name}", step, place), count
 
     def _of_step(self, name: str, step: int, missing: int, column: int = 0) -> int:
-        """A number of a step, in its row of an array of Steps."""
+        """Return a number of a step, in its row of an array of Steps."""
         if self._steps is None or name not in self._steps:
             return missing
         values = self._array(f"Steps/{name}")
@@ -227,23 +228,23 @@ class _Part:
     # ---- reading ----
 
     def _read_cells(self, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Types (C,), where the nodes of each cell start and stop, and the nodes."""
+        """Return types (C,), where the nodes of each cell start and stop, and the nodes."""
         kinds = SURFACE_CELLS if self._is_surface else {"": ({}, 0)}
         pieces = self._pieces(step)
         points = np.cumsum([0, *self._counts("NumberOfPoints", pieces)])
-        found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        cells: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         for piece in range(len(pieces)):
             for column, (prefix, numbers) in enumerate(kinds.items()):
                 types, sizes, nodes = self._cells_of(step, prefix, column, pieces, piece, numbers)
-                found.append((types, sizes, nodes + points[piece]))
-        types, sizes, nodes = (np.concatenate(each) for each in zip(*found))
+                cells.append((types, sizes, nodes + points[piece]))
+        types, sizes, nodes = (np.concatenate(each) for each in zip(*cells))
         stops = np.cumsum(sizes)
         return types, stops - sizes, stops, nodes
 
     def _cells_of(
         self, step: int, prefix: str, column: int, pieces: range, piece: int, numbers: tuple[dict[int, int], int]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Types, numbers of nodes, and nodes of the cells of one kind in a piece."""
+        """Return types, numbers of nodes, and nodes of the cells of one kind in a piece."""
         within = f"{prefix}/" if prefix else ""
         if within and prefix not in self._group:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -264,7 +265,7 @@ class _Part:
         return np.array([by_size.get(size, other) for size in sizes.tolist()], np.int64), sizes, nodes
 
     def _rows(self, name: str, first: int, count: int, whole: bool = False) -> np.ndarray:
-        """Rows of an array; whole: of integers, as int64."""
+        """Return rows of an array; whole: of integers, as int64."""
         dataset = self._dataset(name)
         if not 0 <= first <= first + count <= dataset.shape[0]:
             raise ClipError(f"{name}: got {dataset.shape[0]} rows, expected {count} from {first} on")
@@ -275,7 +276,7 @@ class _Part:
         return values.astype(np.int64) if whole else values.astype(dataset.dtype.newbyteorder("="), copy=False)
 
     def _array(self, name: str) -> np.ndarray:
-        """A small array as a whole, which is kept."""
+        """Return a small array as a whole, which is kept."""
         if name not in self._kept:
             dataset = self._dataset(name)
             self._budget.take(dataset.nbytes, name)

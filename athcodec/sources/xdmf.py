@@ -12,7 +12,6 @@ cells, xdmf_document.py for includes and references and xdmf_items.py for number
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -30,70 +29,27 @@ from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip, frame_rate
 from athcodec.sources import ReadOptions
-from athcodec.sources.cells import NODE_BYTES, NODES, Block, blocks_of
+from athcodec.sources.cells import NODE_BYTES, NODES, Block
 from athcodec.sources.fields import DISPLACEMENTS, clip_of_steps
 from athcodec.sources.mesh import same_values
 from athcodec.sources.parts import CELL, NODE, JoinedSteps
 from athcodec.sources.scene_objects import MATERIAL_NAMES
 from athcodec.sources.timing import times_in_seconds, whole
+from athcodec.sources.xdmf_cells import (
+    PLAIN,
+    RECTILINEAR,
+    STRUCTURED,
+    TOPOLOGIES,
+    WITHOUT_POINTS,
+    mixed_blocks,
+    same_block,
+    structured_blocks,
+    whole_numbers,
+)
 from athcodec.sources.xdmf_document import Element
 from athcodec.sources.xdmf_items import Items
 from athcodec.sources.xpointer import local_name
 
-MIXED = {
-    1: "poly_vertex",
-    2: "poly_line",
-    3: "polygon",
-    4: "triangle",
-    5: "quad",
-    6: "tetra",
-    7: "pyramid",
-    8: "wedge",
-    9: "hexahedron",
-    34: "line3",
-    35: "quad9",
-    36: "triangle6",
-    37: "quad8",
-    38: "tetra10",
-    39: "pyramid13",
-    40: "wedge15",
-    41: "wedge18",
-    48: "hexahedron20",
-    49: "hexahedron24",
-    50: "hexahedron27",
-}
-COUNTED = (1, 2, 3)
-TOPOLOGIES = {
-    "triangle": "triangle",
-    "quadrilateral": "quad",
-    "tetrahedron": "tetra",
-    "hexahedron": "hexahedron",
-    "wedge": "wedge",
-    "pyramid": "pyramid",
-    "edge_3": "line3",
-    "triangle_6": "triangle6",
-    "tri_6": "triangle6",
-    "quadrilateral_8": "quad8",
-    "quad_8": "quad8",
-    "quadrilateral_9": "quad9",
-    "quad_9": "quad9",
-    "tetrahedron_10": "tetra10",
-    "tet_10": "tetra10",
-    "pyramid_13": "pyramid13",
-    "wedge_15": "wedge15",
-    "wedge_18": "wedge18",
-    "hexahedron_20": "hexahedron20",
-    "hex_20": "hexahedron20",
-    "hexahedron_24": "hexahedron24",
-    "hex_24": "hexahedron24",
-    "hexahedron_27": "hexahedron27",
-    "hex_27": "hexahedron27",
-    "line": "line",
-}
-PLAIN = {"polyvertex": "poly_vertex", "polyline": "poly_line", "polygon": "polygon"}
-RECTILINEAR = ("2drectmesh", "3drectmesh", "2dcorectmesh", "3dcorectmesh")
-WITHOUT_POINTS = "save grids without points of their own as unstructured ones"
-STRUCTURED = {"2dsmesh": "quad", "3dsmesh": "hexahedron"}
 KNOWN = ("Grid", "Topology", "Geometry", "Attribute", "Time", "DataItem")  # Elements of a grid that are read.
 COLLECTIONS, UNIFORM = ("collection", "tree"), "uniform"
 MOST_NESTED = 16  # Grids inside grids.
@@ -116,12 +72,13 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
     scene = _Scene(items, fspath(path), options)
-    tracks = scene.chosen()
-    parts = [_Part(items, track, scene.mesh_for(track)) for track in tracks]
+    selection = _Selection(scene)
+    tracks = selection.chosen()
+    parts = [_Part(items, track, selection.mesh_for(track)) for track in tracks]
     time, metadata = scene.times(tracks[0])
     steps = JoinedSteps(parts, items.budget, fspath(path))
     metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
-    steps.left_out += scene.other_fields
+    steps.left_out += selection.other_fields
     clip = clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), items, items.unchanged)
     clip.not_read = {**clip.not_read, **{kind: names for kind, names in scene.not_read.items() if names}}
     return clip
@@ -143,20 +100,19 @@ class Track:
 
 
 class _Scene:
-    """The tracks of a file, and which of them are read."""
+    """Reads the grids of a file as tracks, with their times and what the file says of all of them."""
 
     def __init__(self, items: Items, shown_path: str, options: ReadOptions):
-        self._items, self._documents, self._path, self._options = items, items.documents, shown_path, options
-        self._grid_count, self._said_once = 0, set[str]()
+        self.items, self.documents, self._path, self.options = items, items.documents, shown_path, options
+        self._grid_count, self._warned = 0, set[str]()
         self.not_read: dict[str, list[str]] = {"series": [], "mesh": [], "element": []}
-        self.other_fields: list[str] = []
-        root = self._documents.root
-        self._domains = self._documents.children(root, "Domain")
-        self._said = self._information()
-        grids = [grid for domain in self._domains for grid in self._documents.children(domain, "Grid")]
+        root = self.documents.root
+        self._domains = self.documents.children(root, "Domain")
+        self._facts = self._information()
+        grids = [grid for domain in self._domains for grid in self.documents.children(domain, "Grid")]
         if not grids:
             raise ClipError("got no Grid, expected some in a Domain")
-        self._tracks = [
+        self.tracks = [
             replace(track, families=frozenset([number]))
             for number, grid in enumerate(grids)
             for track in self._tracks_of(grid, 0)
@@ -165,20 +121,20 @@ class _Scene:
     # ---- from grids to tracks ----
 
     def _tracks_of(self, grid: Element, depth: int) -> list[Track]:
-        """The tracks of a grid. Raises ClipError."""
+        """Return the tracks of a grid. Raises ClipError."""
         self._grid_count += 1
-        most = MOST_VISITS + VISITS_PER_ELEMENT * self._documents.size
+        most = MOST_VISITS + VISITS_PER_ELEMENT * self.documents.size
         if depth > MOST_NESTED or self._grid_count > most:
             raise ClipError(f"Grid: got more than {MOST_NESTED} inside each other or {most} in all, expected fewer")
         kind, name = grid.get("GridType", UNIFORM).lower(), grid.get("Name", "")
         self._name_unknown(grid, KNOWN)
         if kind == UNIFORM:
             time = self._time_of(grid)
-            inside = self._documents.children(grid, "Grid")  # Some steps include the grid of their mesh as it is.
+            inside = self.documents.children(grid, "Grid")  # Some steps include the grid of their mesh as it is.
             return [Track(name, [[grid, *inside]], None if time is None else np.array([time]))]
         if kind not in COLLECTIONS:
             raise ClipError(f"Grid {name[:40]!r}: got the type {kind[:40]!r}, expected Uniform, Collection or Tree")
-        grids = self._documents.children(grid, "Grid")
+        grids = self.documents.children(grid, "Grid")
         if kind == "collection" and grid.get("CollectionType", "Spatial").lower() == "temporal":
             return self._series(grid, name, grids, depth)
         tracks = [track for each in grids for track in self._tracks_of(each, depth + 1)]
@@ -190,7 +146,7 @@ class _Scene:
         return time is not None and track.times is None and len(track.steps) == 1
 
     def _series(self, collection: Element, name: str, grids: Sequence[Element], depth: int) -> list[Track]:
-        """The tracks of a temporal collection: each of its grids is a step of all of them."""
+        """Return the tracks of a temporal collection: each of its grids is a step of all of them."""
         steps = [self._tracks_of(grid, depth + 1) for grid in grids]
         if not steps:
             return []
@@ -204,26 +160,28 @@ class _Scene:
             {track.name for track in step} == set(first) for step in steps
         )
         tracks = []
-        for place, own in enumerate(first):
-            row = [next(t for t in step if t.name == own) if by_name else step[place] for step in steps]
+        for place, name_of_part in enumerate(first):
+            row = [next(t for t in step if t.name == name_of_part) if by_name else step[place] for step in steps]
             times = self._series_times(collection, [track.times for track in row], grids)
-            joined = Track(own if len(first) > 1 else name or own, [t.steps[0] for t in row], times, True)
+            joined = Track(
+                name_of_part if len(first) > 1 else name or name_of_part, [t.steps[0] for t in row], times, True
+            )
             tracks.append(_in_order(joined))
         return tracks
 
     # ---- times ----
 
     def _time_of(self, grid: Element) -> float | None:
-        """The time that a grid states for itself alone."""
-        element = self._documents.child(grid, "Time")
+        """Return the time that a grid states for itself alone."""
+        element = self.documents.child(grid, "Time")
         numbers = self._time_elsewhere(grid) if element is None else self._numbers(element)
         if len(numbers) > 1 and grid.get("GridType", UNIFORM).lower() != "collection":
             raise ClipError(f"Time: got {len(numbers)} for the grid {grid.get('Name', '')[:40]!r}, expected one")
         return float(numbers[0]) if len(numbers) == 1 else None
 
     def _time_elsewhere(self, grid: Element) -> np.ndarray:
-        """The time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
-        for element in self._documents.children(grid, "Information", "Attribute"):
+        """Return the time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
+        for element in self.documents.children(grid, "Information", "Attribute"):
             is_whole = local_name(element) == "Information" or element.get("Center", "").lower() == "grid"
             if is_whole and element.get("Name", "").lower() in TIME_NAMES:
                 with suppress(ClipError, ValueError):  # Words, or what is no single number, are no time.
@@ -237,22 +195,22 @@ class _Scene:
 
     def _numbers(self, element: Element) -> np.ndarray:
         text = element.get("Value", "").split()
-        item = self._documents.child(element, "DataItem")
+        item = self.documents.child(element, "DataItem")
         if text:
             return np.array(text, np.float64)
-        return np.zeros(0) if item is None else self._items.read(item).reshape(-1).astype(np.float64)
+        return np.zeros(0) if item is None else self.items.read(item).reshape(-1).astype(np.float64)
 
     def _series_times(
         self, collection: Element, stated: Sequence[np.ndarray | None], grids: Sequence[Element]
     ) -> np.ndarray | None:
-        """The times of a collection's steps: their own, or those of the collection. None where it has none."""
+        """Return the times of a collection's steps: their own, or those of the collection. None where it has none."""
         count = len(stated)
         missing = [number for number, time in enumerate(stated) if time is None]
         if not missing:
             return np.array([float(time[0]) for time in stated if time is not None])
-        common = self._documents.child(collection, "Time")
+        common = self.documents.child(collection, "Time")
         if common is None:
-            if len(missing) < count and self._options.fps is None:
+            if len(missing) < count and self.options.fps is None:
                 raise ClipError(
                     f"Time: got none in step {missing[0]} ({grids[missing[0]].get('Name', '')[:40]!r}) and one in "
                     "others, expected it in all; --fps (fps=) numbers them in place of all times"
@@ -272,42 +230,89 @@ class _Scene:
         return numbers
 
     def times(self, track: Track) -> tuple[np.ndarray, dict[str, Any]]:
-        """(T,) seconds from 0, and what the file says of rate, unit and up axis."""
-        said, stored, count = self._said, track.times, len(track.steps)
-        fps = said.get("fps") if self._options.fps is None else self._options.fps
+        """Return (T,) seconds from 0, and what the file says of rate, unit and up axis."""
+        information, stored, count = self._facts, track.times, len(track.steps)
+        fps = information.get("fps") if self.options.fps is None else self.options.fps
         if stored is None or not track.is_series:
             stored = np.arange(count) / frame_rate({} if fps is None else {"fps": fps})
             if count > 1 and fps is None:
-                self._warn(
+                self.warn(
                     f"Time: the steps have none, and come {frame_rate({}):g} a second; --fps (fps=) states a rate"
                 )
         with np.errstate(all="ignore"):  # Times that are no numbers of seconds are refused by the clip.
             time, metadata = times_in_seconds(stored, fps)
-            if "start_frame" in said:
-                start = float(said["start_frame"]) + stored[0] * frame_rate(metadata)
+            if "start_frame" in information:
+                start = float(information["start_frame"]) + stored[0] * frame_rate(metadata)
                 metadata["start_frame"] = whole(round(start, 6))
-        return time, said | metadata
+        return time, information | metadata
 
-    # ---- which tracks ----
+    def _information(self) -> dict[str, Any]:
+        """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
+        materials that our writer adds as JSON."""
+        information: dict[str, Any] = {}
+        self._name_unknown(self.documents.root, ("Domain", "Information"))
+        for domain in (self.documents.root, *self._domains):
+            if domain is not self.documents.root:
+                self._name_unknown(domain, ("Grid", "Information", "DataItem", *KNOWN))
+            for element in self.documents.children(domain, "Information"):
+                name, value = element.get("Name", ""), element.get("Value", "")
+                if name in ("unit", "up_axis"):
+                    information[name] = value
+                elif name in ("fps", "start_frame"):
+                    information[name] = whole(float(value)) if name == "start_frame" else float(value)
+                elif name in ("objects", MATERIAL_NAMES):
+                    with suppress(ValueError, RecursionError):  # Another program may have written something else here.
+                        information[name] = json.loads(value)
+                else:
+                    self.add_not_read("element", f"Information {name}")
+        frame_rate(information)
+        return information
+
+    def _name_unknown(self, parent: Element, known: Sequence[str]) -> None:
+        """Name the children of an element that are not looked at."""
+        for child in self.documents.children(parent):
+            if local_name(child) not in known and child.get("Name", "").lower() not in TIME_NAMES:
+                self.add_not_read("element", f"{local_name(child)} {child.get('Name', '')}".strip())
+
+    def add_not_read(self, kind: str, name: str) -> None:
+        if name not in self.not_read[kind]:
+            self.not_read[kind].append(name)
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._warned:
+            self._warned.add(text)
+            self.warn(text)
+
+    def warn(self, text: str) -> None:
+        warnings.warn(f"{self._path}: {text}", GuessWarning, stacklevel=2)
+
+
+class _Selection:
+    """Chooses the tracks of a file that are the clip, and names the others."""
+
+    def __init__(self, scene: _Scene):
+        self._scene = scene
+        self.other_fields: list[str] = []
 
     def chosen(self) -> list[Track]:
-        """The tracks that are the clip; the others are named. Raises ClipError where it is not clear which they are."""
-        tracks = self._tracks
-        if self._options.only:
-            tracks = [t for t in tracks if any(fnmatchcase(t.name, pattern) for pattern in self._options.only)]
+        """Return the tracks that are the clip; the others are named. Raises ClipError where it is not clear which they
+        are."""
+        tracks = self._scene.tracks
+        if self._scene.options.only:
+            tracks = [t for t in tracks if any(fnmatchcase(t.name, pattern) for pattern in self._scene.options.only)]
             if not tracks:
-                names = ", ".join(dict.fromkeys(repr(track.name) for track in self._tracks))
+                names = ", ".join(dict.fromkeys(repr(track.name) for track in self._scene.tracks))
                 raise ClipError(f"only: got no grid of these names, expected some of {names}")
         series = [track for track in tracks if track.is_series]
         if not series:
             return self._still(tracks)
         groups = self._groups(series)
-        found = groups if len(groups) == 1 else self._moving(groups)
-        self._name_others(found, [track for track in groups if track not in found])
-        return found
+        chosen = groups if len(groups) == 1 else self._moving(groups)
+        self._name_others(chosen, [track for track in groups if track not in chosen])
+        return chosen
 
     def _still(self, tracks: Sequence[Track]) -> list[Track]:
-        """The meshes of a file without a series: they are one frame."""
+        """Return the meshes of a file without a series: they are one frame."""
         with_points = [track for track in tracks if self._element(track, "Geometry") is not None]
         if not with_points:
             raise ClipError("got no grid with a Geometry, expected points")
@@ -321,20 +326,20 @@ class _Scene:
         return with_points
 
     def _groups(self, series: Sequence[Track]) -> list[Track]:
-        """The series, those of one mesh at the same times in one: that has all their data."""
-        found: list[Track] = []
+        """Return the series, those of one mesh at the same times in one: that has all their data."""
+        groups: list[Track] = []
         for track in series:
-            group = next((each for each in found if self._belong_together(each, track)), None)
+            group = next((each for each in groups if self._belong_together(each, track)), None)
             if group is None:
-                found.append(replace(track, steps=[list(step) for step in track.steps]))
+                groups.append(replace(track, steps=[list(step) for step in track.steps]))
             else:
                 for step, more in zip(group.steps, track.steps):
                     step += more
                 group.families |= track.families
-        return found
+        return groups
 
     def _belong_together(self, one: Track, other: Track) -> bool:
-        """Whether two series are of one mesh, of different grids at the top, at the same times."""
+        """Return whether two series are of one mesh, of different grids at the top, at the same times."""
         if one.families & other.families or len(one.steps) != len(other.steps):
             return False
         if (one.times is None) != (other.times is None) or not np.array_equal(one.times, other.times):
@@ -342,23 +347,24 @@ class _Scene:
         return self._same_mesh(one, other)
 
     def _same_mesh(self, one: Track, other: Track) -> bool:
-        """Whether two tracks have the same points and cells in their first step, in one place or in several."""
+        """Return whether two tracks have the same points and cells in their first step, in one place or in several."""
         geometry = self._element(one, "Geometry"), self._element(other, "Geometry")
         topology = self._element(one, "Topology"), self._element(other, "Topology")
         if None in geometry:
             return False
-        if all(self._documents.source(a) == self._documents.source(b) for a, b in (geometry, topology)):
+        if all(self._scene.documents.source(a) == self._scene.documents.source(b) for a, b in (geometry, topology)):
             return True
         with suppress(ClipError):  # Of a mesh that cannot be read nothing is known; it may be one that nobody wants.
-            parts = [_Part(self._items, track, None) for track in (one, other)]
+            parts = [_Part(self._scene.items, track, None) for track in (one, other)]
             points = [part.points(0) for part in parts]
             blocks = [part.blocks for part in parts]
-            return np.array_equal(*points) and len(blocks[0]) == len(blocks[1]) and all(map(_same_block, *blocks))
+            return np.array_equal(*points) and len(blocks[0]) == len(blocks[1]) and all(map(same_block, *blocks))
         return False
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:
-        """Of several series those that are read: with the field, or that move, at the same times."""
-        wanted = self._options.field
+        """Return the series that are read of several: those with the field, or those that move, all at the same
+        times."""
+        wanted = self._scene.options.field
         if wanted is not None:
             moving = [track for track in groups if wanted in self._fields(track)]
             if not moving:
@@ -366,22 +372,22 @@ class _Scene:
         else:
             moving = [track for track in groups if self._moves(track)] or list(groups)
         families = frozenset[int]().union(*(track.families for track in moving))
-        found = [track for track in groups if track.families & families]
-        times = {None if track.times is None else track.times.tobytes() for track in found}
+        tracks = [track for track in groups if track.families & families]
+        times = {None if track.times is None else track.times.tobytes() for track in tracks}
         if len(times) > 1:
             raise ClipError(
-                f"got {len(found)} series at different times, {self._listed(found)}; expected one: --only (only=) "
+                f"got {len(tracks)} series at different times, {self._listed(tracks)}; expected one: --only (only=) "
                 "names it"
             )
-        return found
+        return tracks
 
     def _moves(self, track: Track) -> bool:
         names = [name.lower() for name in self._fields(track)]
-        part = _Part(self._items, track, None, with_mesh=False)
+        part = _Part(self._scene.items, track, None, with_mesh=False)
         return any(name in DISPLACEMENTS for name in names) or not part.fixed_points()
 
     def _fields(self, track: Track) -> list[str]:
-        return _Part(self._items, track, None, with_mesh=False).names(NODE)
+        return _Part(self._scene.items, track, None, with_mesh=False).names(NODE)
 
     def _listed(self, groups: Sequence[Track]) -> str:
         return "; ".join(
@@ -391,84 +397,48 @@ class _Scene:
 
     def _name_others(self, chosen: Sequence[Track], others: Sequence[Track]) -> None:
         """Name what is not read: fields of other series of a mesh that is, other series, and meshes of no step."""
-        points = {self._documents.source(self._element(track, "Geometry")) for track in chosen}
+        points = {self._scene.documents.source(self._element(track, "Geometry")) for track in chosen}
         for track in others:
             if any(self._same_mesh(track, each) for each in chosen):
                 self.other_fields += [f"{track.name}/{name}" for name in self._fields(track)]
             elif track.is_series:
-                self._add_not_read("series", track.name or "unnamed")
-        for track in self._tracks:
+                self._scene.add_not_read("series", track.name or "unnamed")
+        for track in self._scene.tracks:
             if track.is_series or track in chosen or track in others:
                 continue
             geometry = self._element(track, "Geometry")
-            part = _Part(self._items, track, None, with_mesh=False)
-            if geometry is not None and self._documents.source(geometry) not in points:
-                self._add_not_read("mesh", track.name or "unnamed")
+            part = _Part(self._scene.items, track, None, with_mesh=False)
+            if geometry is not None and self._scene.documents.source(geometry) not in points:
+                self._scene.add_not_read("mesh", track.name or "unnamed")
             else:  # Tags of the mesh that is read, as DOLFINx writes them.
                 self.other_fields += [f"{track.name}/{name}" for center in (NODE, CELL) for name in part.names(center)]
 
     def mesh_for(self, track: Track) -> Element | None:
-        """The grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
+        """Return the grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
         if self._element(track, "Geometry") is not None:
             return None
-        meshes = [each for each in self._tracks if not each.is_series and self._element(each, "Geometry") is not None]
+        meshes = [
+            each for each in self._scene.tracks if not each.is_series and self._element(each, "Geometry") is not None
+        ]
         if len(meshes) != 1:
             names = ", ".join(repr(mesh.name) for mesh in meshes[:LISTED]) or "none"
             raise ClipError(
                 f"Grid {track.name[:40]!r}: got no grid with a Geometry in its steps; expected one, by xi:include or "
                 f"in place, of the meshes in the file: {names}"
             )
-        self._warn(f"the steps of {track.name!r} have no mesh, and that of {meshes[0].name!r} was taken for it")
-        self.not_read["mesh"] = [name for name in self.not_read["mesh"] if name != (meshes[0].name or "unnamed")]
+        self._scene.warn(f"the steps of {track.name!r} have no mesh, and that of {meshes[0].name!r} was taken for it")
+        self._scene.not_read["mesh"] = [
+            name for name in self._scene.not_read["mesh"] if name != (meshes[0].name or "unnamed")
+        ]
         return meshes[0].steps[0][0]
 
     def _element(self, track: Track, tag: str) -> Element | None:
-        found = (self._documents.child(grid, tag) for grid in track.steps[0])
-        return next((element for element in found if element is not None), None)
-
-    def _information(self) -> dict[str, Any]:
-        """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
-        materials that our writer adds as JSON."""
-        said: dict[str, Any] = {}
-        self._name_unknown(self._documents.root, ("Domain", "Information"))
-        for domain in (self._documents.root, *self._domains):
-            if domain is not self._documents.root:
-                self._name_unknown(domain, ("Grid", "Information", "DataItem", *KNOWN))
-            for element in self._documents.children(domain, "Information"):
-                name, value = element.get("Name", ""), element.get("Value", "")
-                if name in ("unit", "up_axis"):
-                    said[name] = value
-                elif name in ("fps", "start_frame"):
-                    said[name] = whole(float(value)) if name == "start_frame" else float(value)
-                elif name in ("objects", MATERIAL_NAMES):
-                    with suppress(ValueError, RecursionError):  # Another program may have written something else here.
-                        said[name] = json.loads(value)
-                else:
-                    self._add_not_read("element", f"Information {name}")
-        frame_rate(said)
-        return said
-
-    def _name_unknown(self, parent: Element, known: Sequence[str]) -> None:
-        """Name the children of an element that are not looked at."""
-        for child in self._documents.children(parent):
-            if local_name(child) not in known and child.get("Name", "").lower() not in TIME_NAMES:
-                self._add_not_read("element", f"{local_name(child)} {child.get('Name', '')}".strip())
-
-    def _add_not_read(self, kind: str, name: str) -> None:
-        if name not in self.not_read[kind]:
-            self.not_read[kind].append(name)
-
-    def _say_once(self, text: str) -> None:
-        if text not in self._said_once:
-            self._said_once.add(text)
-            self._warn(text)
-
-    def _warn(self, text: str) -> None:
-        warnings.warn(f"{self._path}: {text}", GuessWarning, stacklevel=2)
+        elements = (self._scene.documents.child(grid, tag) for grid in track.steps[0])
+        return next((element for element in elements if element is not None), None)
 
 
 def _in_order(track: Track) -> Track:
-    """The track with its steps in the order of time, in which not all programs write them."""
+    """Return the track with its steps in the order of time, in which not all programs write them."""
     if track.times is None or not np.isfinite(track.times).all() or (np.diff(track.times) > 0).all():
         return track
     order = np.argsort(track.times, kind="stable")
@@ -516,7 +486,7 @@ class _Part:
         if self._same(element, first):
             return
         blocks = self._blocks(element, self._element(step, "Geometry"))
-        if len(blocks) != len(self.blocks) or not all(map(_same_block, blocks, self.blocks)):
+        if len(blocks) != len(self.blocks) or not all(map(same_block, blocks, self.blocks)):
             raise ClipError(f"frame {step}: got other cells than in the first; topology that changes cannot be coded")
 
     def names(self, center: str) -> list[str]:
@@ -530,7 +500,8 @@ class _Part:
         return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
 
     def is_static(self, name: str, center: str) -> bool:
-        """By reference, or by value: the last step is compared first, because what moves is not there where it was."""
+        """Return whether a field is the same in all steps, by reference or by value. The last step is compared
+        first: what moves is far from its start there."""
         elements = [step.get((name, center)) for step in self._attributes]
         if any(element is None for element in elements):
             return False
@@ -542,7 +513,7 @@ class _Part:
         return all(same_values(values, self._items.read(item)) for item in others)
 
     def _element(self, step: int, tag: str) -> Element | None:
-        """The Topology or Geometry of a step: its own, that of the first step, or of the mesh that was taken."""
+        """Return the Topology or Geometry of a step: its own, that of the first step, or of the mesh that was taken."""
         for grids in (self._steps[step], self._steps[0], [] if self._mesh is None else [self._mesh]):
             for grid in grids:
                 element = self._documents.child(grid, tag)
@@ -551,23 +522,25 @@ class _Part:
         return None
 
     def _same(self, one: Element | None, other: Element | None) -> bool:
-        """Whether two elements say the same."""
+        """Return whether two elements say the same."""
         return one is other or self._documents.source(one) == self._documents.source(other)
 
     def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
-        """The attributes of a step by name and center. Those of a name that several grids have, as collections that
-        were joined may, are called by their grid as well."""
-        found: dict[tuple[str, str], Element] = {}
+        """Return the attributes of a step by name and center. Those of a name that several grids have, as collections
+        that were joined may, are called by their grid as well."""
+        elements: dict[tuple[str, str], Element] = {}
         for number, grid in enumerate(grids):
             for element in self._documents.children(grid, "Attribute"):
                 name, center = element.get("Name") or "unnamed", element.get("Center", "Node").lower()
                 if element.get("ItemType", "").lower() == "finiteelementfunction":
                     center = FUNCTION_SPACE
                 key = (
-                    (name, center) if (name, center) not in found else (f"{grid.get('Name') or number}/{name}", center)
+                    (name, center)
+                    if (name, center) not in elements
+                    else (f"{grid.get('Name') or number}/{name}", center)
                 )
-                found[key] = element
-        return found
+                elements[key] = element
+        return elements
 
     # ---- cells ----
 
@@ -578,17 +551,17 @@ class _Part:
         if kind == "polyvertex":
             return []
         if kind in STRUCTURED:
-            return _structured(STRUCTURED[kind], element, self._items.budget)
+            return structured_blocks(STRUCTURED[kind], element, self._items.budget)
         if kind in RECTILINEAR:
             raise ClipError(f"Topology: got the type {kind!r}, expected cells between points; {WITHOUT_POINTS}")
         nodes = self._items.first(element)
         if nodes.dtype.kind not in "iu":
-            nodes = _whole_numbers(nodes)
+            nodes = whole_numbers(nodes)
         self._items.budget.need(NODE_BYTES * nodes.size, "Topology")
         first = int(element.get("BaseOffset", 0))
         nodes = nodes.astype(np.int64)
         if kind == "mixed":
-            return [replace(block, nodes=block.nodes - first) for block in _mixed_blocks(nodes.reshape(-1))]
+            return [replace(block, nodes=block.nodes - first) for block in mixed_blocks(nodes.reshape(-1))]
         nodes = nodes - first
         if kind in PLAIN:
             size = int(element.get("NodesPerElement") or nodes.shape[-1])
@@ -607,47 +580,3 @@ class _Part:
                 raise ClipError(f"Topology: got the order {' '.join(order)[:40]!r}, expected 0 to {cells.shape[1] - 1}")
             cells = cells[:, [order.index(str(number)) for number in range(cells.shape[1])]]
         return [Block(TOPOLOGIES[kind], cells, np.arange(len(cells)))]
-
-
-def _same_block(one: Block, other: Block) -> bool:
-    return one.kind == other.kind and np.array_equal(one.nodes, other.nodes) and np.array_equal(one.rows, other.rows)
-
-
-def _structured(kind: str, element: Element, budget: Budget) -> list[Block]:
-    """The cells between the points of a curvilinear grid, whose last dimension is the fastest."""
-    shape = [int(size) for size in (element.get("Dimensions") or element.get("NumberOfElements") or "").split()]
-    if len(shape) != (2 if kind == "quad" else 3) or min(shape) < 1:
-        raise ClipError(f"Topology: got the dimensions {shape}, expected {2 if kind == 'quad' else 3} of points")
-    budget.need(NODE_BYTES * len(shape) ** 2 * math.prod(shape), f"Topology: a grid of {shape} points")
-    numbers = np.arange(int(np.prod(shape))).reshape(shape)
-    sides = [(slice(None, -1), slice(1, None))] * len(shape)
-    around = [(0, 0), (0, 1), (1, 1), (1, 0)]  # Of the last two dimensions, counter-clockwise.
-    places = around if kind == "quad" else [(layer, *each) for layer in (0, 1) for each in around]
-    cells = [numbers[tuple(side[place] for side, place in zip(sides, each))].reshape(-1) for each in places]
-    return [Block(kind, np.stack(cells, axis=1), np.arange(len(cells[0])))]
-
-
-def _whole_numbers(values: np.ndarray) -> np.ndarray:
-    if not np.array_equal(values, np.floor(values)):
-        raise ClipError("Topology: got numbers with fractions, expected vertices")
-    return values
-
-
-def _mixed_blocks(stream: np.ndarray) -> list[Block]:
-    """Cells one behind the other, each with its type before it, and its number of nodes where that varies."""
-    types, starts, stops, at = [], [], [], 0
-    numbers = stream.tolist()
-    while at < len(numbers):
-        kind = numbers[at]
-        if kind not in MIXED:
-            raise ClipError(f"Topology: got the cell type {kind}, expected one of {', '.join(map(str, MIXED))}")
-        counted = kind in COUNTED
-        size = numbers[at + 1] if counted and at + 1 < len(numbers) else NODES.get(MIXED[kind], -1)
-        at += 2 if counted else 1
-        if size < 0 or at + size > len(numbers):
-            raise ClipError("Topology: got the end of the data, expected the nodes of a cell")
-        types.append(kind)
-        starts.append(at)
-        at += size
-        stops.append(at)
-    return blocks_of(np.array(types), np.array(starts, np.int64), np.array(stops, np.int64), stream, MIXED)

@@ -36,20 +36,20 @@ class Documents:
         self.root = self._load(path)
 
     def children(self, element: Element, *tags: str) -> list[Element]:
-        """The children of these tags, or all of them, as the file means them. Raises ClipError."""
-        found = self._included(list(element), MOST_FOLLOWED)
-        return [self._followed(each) for each in found if not tags or local_name(each) in tags]
+        """Return the children of these tags, or all of them, as the file means them. Raises ClipError."""
+        elements = self._included(list(element), MOST_FOLLOWED)
+        return [self._followed(each) for each in elements if not tags or local_name(each) in tags]
 
     def child(self, element: Element, *tags: str) -> Element | None:
-        """The first child of one of these tags; None without any."""
+        """Return the first child of one of these tags; None without any."""
         return next(iter(self.children(element, *tags)), None)
 
     def folder(self, element: Element) -> Path:
-        """The folder of the file that an element is in, from which files that it names are looked for."""
+        """Return the folder of the file that an element is in, from which files that it names are looked for."""
         return self._home.get(element, self._path).parent
 
     def source(self, element: Element | None) -> bytes:
-        """What is the same for two elements that say the same in the same place."""
+        """Return what is the same for two elements that say the same in the same place."""
         if element is None:
             return b""
         return f"{self.folder(element)}\n".encode("utf-8", "surrogateescape") + ElementTree.tostring(element).strip()
@@ -64,19 +64,19 @@ class Documents:
         return root
 
     def _included(self, elements: Sequence[Element], left: int) -> list[Element]:
-        """The elements, with what is included in place of each xi:include."""
+        """Return the elements, with what is included in place of each xi:include."""
         if left <= 0:
             raise ClipError(f"xi:include: got more than {MOST_FOLLOWED} that lead to each other, expected an end")
-        found: list[Element] = []
+        included: list[Element] = []
         for element in elements:
             if local_name(element) == INCLUDE:
-                found += self._included(self._targets(element), left - 1)
+                included += self._included(self._targets(element), left - 1)
             else:
-                found.append(element)
-        return found
+                included.append(element)
+        return included
 
     def _targets(self, include: Element) -> list[Element]:
-        """The elements that an xi:include stands for. Raises ClipError where there are none."""
+        """Return the elements that an xi:include stands for. Raises ClipError where there are none."""
         href, pointer = unquote(include.get("href", "")), include.get("xpointer")
         fallback = next((child for child in include if local_name(child) == FALLBACK), None)
         try:
@@ -85,14 +85,14 @@ class Documents:
             pointer = fragment if pointer is None and fragment else pointer
             if include.get("parse", "xml") != "xml":
                 raise ClipError(f"xi:include: got parse={include.get('parse', '')[:SHOWN]!r}, expected xml")
-            found = [document.root] if pointer is None else document.of_xpointer(pointer)
-            if not found:
+            elements = [document.root] if pointer is None else document.of_xpointer(pointer)
+            if not elements:
                 raise ClipError(f"xi:include: {(pointer or '')[:SHOWN]!r} names nothing in {name or 'the file'}")
         except ClipError:
             if fallback is None:
                 raise
             return list(fallback)
-        return found
+        return elements
 
     def _document(self, name: str, element: Element) -> Pointers:
         home = self._home.get(element, self._path)
@@ -107,18 +107,18 @@ class Documents:
         return self._pointers[path]
 
     def _followed(self, element: Element) -> Element:
-        """The element that a reference stands for, or the element itself."""
+        """Return the element that a reference stands for, or the element itself."""
         for _ in range(MOST_FOLLOWED):
             reference = element.get("Reference")
             if not reference:
                 return element
             path = (element.text or "").strip() if reference.upper() == "XML" else reference
-            found = self._pointers[self._home.get(element, self._path)].find(path, element)
-            if len(found) != 1 or local_name(found[0]) != local_name(element):
-                got = f"{len(found)} elements" if len(found) != 1 else f"a {local_name(found[0])}"
+            elements = self._pointers[self._home.get(element, self._path)].find(path, element)
+            if len(elements) != 1 or local_name(elements[0]) != local_name(element):
+                got = f"{len(elements)} elements" if len(elements) != 1 else f"a {local_name(elements[0])}"
                 raise ClipError(
                     f"{local_name(element)}: got a reference to {path[:SHOWN]!r}, which is {got}; expected one "
                     f"{local_name(element)}"
                 )
-            element = found[0]
+            element = elements[0]
         raise ClipError(f"{local_name(element)}: got references that lead to each other, expected an end")

@@ -65,7 +65,7 @@ class Items:
             file.close()
 
     def read(self, item: Element | None, depth: int = 0) -> np.ndarray:
-        """The array of a DataItem. Raises ClipError."""
+        """Return the array of a DataItem. Raises ClipError."""
         if item is None:
             raise ClipError("got no DataItem, expected one")
         if depth > MOST_NESTED:
@@ -89,7 +89,7 @@ class Items:
         return _shaped(values, shape)
 
     def first(self, element: Element) -> np.ndarray:
-        """The array of the first DataItem of an element. Raises ClipError."""
+        """Return the array of the first DataItem of an element. Raises ClipError."""
         return self.read(self.documents.child(element, "DataItem"))
 
     def _text(self, item: Element) -> np.ndarray:
@@ -219,7 +219,7 @@ class _Function:
         raise self._unknown()
 
     def _alike(self, *values: Any) -> tuple[Any, ...]:
-        """Operands that have as many numbers in another shape get the shape of the first."""
+        """Return operands that have as many numbers in another shape get the shape of the first."""
         shape = max((np.shape(value) for value in values), key=math.prod)
         if any(np.size(value) not in (1, math.prod(shape)) for value in values):
             shapes = " and ".join(str(np.shape(value)) for value in values)

@@ -13,8 +13,8 @@ _NAMED_DOCTYPE = re.compile(rb"""<!DOCTYPE\s+[\w.:-]+(\s+SYSTEM\s+("[^"<>]*"|'[^
 
 
 def parse_xml(data: bytes, tag: str, budget: Budget) -> ElementTree.Element:
-    """The root element, of this tag. A DOCTYPE with declarations is refused: entities, and the defaults of attributes,
-    can grow without end. Raises ClipError."""
+    """Return the root element, of this tag. A DOCTYPE with declarations is refused: entities, and the defaults of
+    attributes, can grow without end. Raises ClipError."""
     if b"<!DOCTYPE" in _NAMED_DOCTYPE.sub(b"", data, count=1) or b"\0" in data:
         raise ClipError("got XML with declarations in its DOCTYPE or in UTF-16, expected plain UTF-8 without any")
     budget.need_for(data, b"<=", XML_BYTES, "XML")

@@ -36,43 +36,44 @@ class Pointers:
         self.visited = 0
 
     def find(self, path: str, start: Element | None = None) -> list[Element]:
-        """The elements of an XPath, which may be relative to `start`. Raises ClipError for one that is not known."""
+        """Return the elements of an XPath, which may be relative to `start`. Raises ClipError for one that is not
+        known."""
         key = path if start is None or path.lstrip().startswith("/") else ""
         if key not in self._found or not key:
-            found = _Parser(path).parsed()(self, self._top if start is None else start)
-            self._found[key] = [element for element in found if element is not self._top]
+            elements = _Parser(path).parsed()(self, self._top if start is None else start)
+            self._found[key] = [element for element in elements if element is not self._top]
         return self._found[key]
 
     def of_xpointer(self, pointer: str) -> list[Element]:
-        """The elements of an XPointer: the first of its parts that names any. Raises ClipError."""
-        found: list[Element] = []
+        """Return the elements of an XPointer: the first of its parts that names any. Raises ClipError."""
+        elements: list[Element] = []
         for scheme, text in _parts(pointer):
             if scheme in ("xpointer", "xpath1", "xpath"):
-                found = self.find(text)
+                elements = self.find(text)
             elif scheme == "element":
-                found = self._by_numbers(text)
+                elements = self._by_numbers(text)
             elif scheme == "":
-                found = self._by_id(text)
+                elements = self._by_id(text)
             elif scheme != "xmlns":
                 raise ClipError(f"xpointer: got the scheme {scheme[:SHOWN]!r}, expected xpointer or element")
-            if found:
+            if elements:
                 break
-        return found
+        return elements
 
     def _by_id(self, name: str) -> list[Element]:
         ids = ("id", "ID", "{http://www.w3.org/XML/1998/namespace}id")
-        found = [each for each in self._descendants(self._top) if any(each.get(key) == name for key in ids)]
-        return found[:1]
+        elements = [each for each in self._descendants(self._top) if any(each.get(key) == name for key in ids)]
+        return elements[:1]
 
     def _by_numbers(self, text: str) -> list[Element]:
-        """The element of /1/2/3, or of that below an id."""
+        """Return the element of /1/2/3, or of that below an id."""
         name, *numbers = text.strip().split("/")
-        found = self._by_id(name) if name else [self._top]
+        elements = self._by_id(name) if name else [self._top]
         for number in numbers:
             if not number.isascii() or not number.isdigit():
                 raise ClipError(f"xpointer: got element({text[:SHOWN]}), expected numbers")
-            found = [child for each in found for place, child in enumerate(each, 1) if place == int(number)]
-        return found
+            elements = [child for each in elements for place, child in enumerate(each, 1) if place == int(number)]
+        return elements
 
     def _descendants(self, element: Element) -> Iterator[Element]:
         for each in element.iter():
@@ -83,7 +84,7 @@ class Pointers:
                 yield each
 
     def along(self, axis: str, element: Element) -> list[Element]:
-        """The elements along an axis from one."""
+        """Return the elements along an axis from one."""
         if axis == "self":
             return [element]
         if axis == "child":
@@ -190,10 +191,10 @@ class _Parser:
             steps.append(self._step())
 
         def find(document: Pointers, start: Element) -> list[Element]:
-            found = [document.top if is_absolute else start]
+            elements = [document.top if is_absolute else start]
             for step in steps:
-                found = _once(step(document, each) for each in found)
-            return found
+                elements = _once(step(document, each) for each in elements)
+            return elements
 
         return find
 
@@ -211,8 +212,8 @@ class _Parser:
         is_name, tests = self._name_test(), self._predicates()
 
         def find(document: Pointers, element: Element) -> list[Element]:
-            found = [each for each in document.along(axis, element) if is_name(each)]
-            return _filtered(document, found, tests)
+            elements = [each for each in document.along(axis, element) if is_name(each)]
+            return _filtered(document, elements, tests)
 
         return find
 
@@ -315,16 +316,16 @@ _FUNCTIONS: dict[tuple[str, int], Callable[..., Any]] = {
 }
 
 
-def _filtered(document: Pointers, found: list[Element], tests: list[Test]) -> list[Element]:
+def _filtered(document: Pointers, elements: list[Element], tests: list[Test]) -> list[Element]:
     """Return the elements that pass all tests; a number is the place of the one that does."""
     for test in tests:
-        values = [test(document, each, place, len(found)) for place, each in enumerate(found, 1)]
-        found = [
+        values = [test(document, each, place, len(elements)) for place, each in enumerate(elements, 1)]
+        elements = [
             each
-            for place, (each, value) in enumerate(zip(found, values), 1)
+            for place, (each, value) in enumerate(zip(elements, values), 1)
             if (value == place if type(value) is int else bool(value))
         ]
-    return found
+    return elements
 
 
 def local_name(element: Element) -> str:
@@ -334,4 +335,4 @@ def local_name(element: Element) -> str:
 
 def _once(lists: Any) -> list[Element]:
     """Return the elements of several lists, each once."""
-    return list({id(each): each for found in lists for each in found}.values())
+    return list({id(each): each for element in lists for each in element}.values())

@@ -294,10 +294,10 @@ if (bytes instanceof Uint8Array) return bytes;
 throw new TypeError("bytes: got something else, expected a Uint8Array");
 }
 function asOut(out, length, types) {
-const given = out === undefined ? new types[0](length) : out;
-if (types.some((Type) => given instanceof Type) && given.length >= length) return given;
+const target = out === undefined ? new types[0](length) : out;
+if (types.some((Type) => target instanceof Type) && target.length >= length) return target;
 const names = types.map((Type) => Type.name).join(" or ");
-const got = `${given?.constructor?.name} of ${given?.length}`;
+const got = `${target?.constructor?.name} of ${target?.length}`;
 throw new RangeError(`out: got ${got}, expected ${names} of ${length}`);
 }
 const utf8 = new TextDecoder("utf-8", { fatal: true, ignoreBOM: true });
@@ -531,8 +531,8 @@ return whole(segment, 0, this.info.segmentCount - 1, "segment");
 // Its number, given that or its name.
 #clip(clip) {
 if (typeof clip !== "string") return whole(clip, 0, this.clips.length - 1, "clip");
-const found = this.clips.findIndex(({ name }) => name === clip);
-if (found >= 0) return found;
+const index = this.clips.findIndex(({ name }) => name === clip);
+if (index >= 0) return index;
 throw new RangeError(`clip: got ${clip}, expected one of ${this.clips.map(({ name }) => name).join(", ")}`);
 }
 // ---- what it holds ----
@@ -727,7 +727,7 @@ return result;
 }
 // An array with a row per corner or vertex, as floats; null where there is none that fits.
 #rows(name, sizes, perCorner, rows) {
-const found = this.attribute(name), { shape, array } = found ?? {};
+const stored = this.attribute(name), { shape, array } = stored ?? {};
 if (shape?.length !== 2 || shape[0] !== rows || !sizes.includes(shape[1]) || typeof array[0] !== "number") return null;
 const scale = array instanceof Uint8Array ? 1 / 255 : 1;
 return { values: Float32Array.from(array, (value) => value * scale), size: shape[1], perCorner };
@@ -750,11 +750,11 @@ first = Uint32Array.from(kept);
 source = first.map((corner) => corners[corner]);
 at = (corner) => of[corner];
 }
-const taken = (rows, size) => rows && Float32Array.from({ length: size * source.length }, (_, i) => {
+const rowsOfCorners = (rows, size) => rows && Float32Array.from({ length: size * source.length }, (_, i) => {
 const from = rows.perCorner ? first[Math.floor(i / size)] : source[Math.floor(i / size)], k = i % size;
 return k < rows.size ? rows.values[from * rows.size + k] : 1;
 });
-return new Mesh(source, fans(faces, at), taken(uv, 2), taken(colors, 4));
+return new Mesh(source, fans(faces, at), rowsOfCorners(uv, 2), rowsOfCorners(colors, 4));
 }
 // ---- bytes ----
 // First chunk that ends behind `offset`.
@@ -961,11 +961,11 @@ return this.#fill(out, length, (at) => call(array, pointers.length, at), () => t
 }
 // What is wrong where none of the segments has a frame, and what prepares one that has. levels: those that are needed.
 #lacking(segments, frame, levels = []) {
-const there = Array.from(segments).filter((segment) => segment && !segment.freed), own = this.#segmentAt(frame);
+const there = Array.from(segments).filter((segment) => segment && !segment.freed), segmentOfFrame = this.#segmentAt(frame);
 const got = there.map(({ index, level }) => `segment ${index} at level ${level}`).join(", ") || "no segment";
-const wanted = levels.length > 0 ? levels : [there[0]?.level ?? Math.max(this.readyLevel(own), 0)];
-const calls = [...new Set(wanted)].map((level) => `prepare(${own}, ${level})`).join(" and ");
-return `frame ${frame}: got ${got}, expected segment ${own}, the one of ${this.info.segmentCount} that has this frame: pass `
+const wanted = levels.length > 0 ? levels : [there[0]?.level ?? Math.max(this.readyLevel(segmentOfFrame), 0)];
+const calls = [...new Set(wanted)].map((level) => `prepare(${segmentOfFrame}, ${level})`).join(" and ");
+return `frame ${frame}: got ${got}, expected segment ${segmentOfFrame}, the one of ${this.info.segmentCount} that has this frame: pass `
 + `what ${calls} returns; segmentOf(Math.floor(frame)) is its number`;
 }
 // The segment that has a frame, which may be fractional or beyond the file's.
@@ -1016,9 +1016,9 @@ fade.levels.forEach((level, i) => shares.set(level, (shares.get(level) ?? 0) + f
 const sum = new Float64Array(length), all = Array.from(segments).filter((segment) => segment && !segment.freed);
 for (const [level, weight] of shares) {
 if (weight === 0) continue;
-const own = all.filter((segment) => segment.level === level);
-if (own.length === 0) throw this.#core.error(NOT_PREPARED, this.#lacking(segments, frame, [level]));
-shown(own).forEach((value, i) => { sum[i] += weight * value; });
+const segmentsOfLevel = all.filter((segment) => segment.level === level);
+if (segmentsOfLevel.length === 0) throw this.#core.error(NOT_PREPARED, this.#lacking(segments, frame, [level]));
+shown(segmentsOfLevel).forEach((value, i) => { sum[i] += weight * value; });
 }
 result.set(sum);
 return result;
@@ -1033,11 +1033,11 @@ const start = Math.ceil((table + 4 * pointers.flat().length) / 16) * 16;
 return core.with(start + scratch, (at) => {
 let next = at + table;
 for (const [i, { frame, weight }] of shares.entries()) {
-const own = pointers[i];
-core.view(Uint32Array, next, own.length).set(own);
-core.view(Int32Array, at + i * SHARE_SIZE, 2).set([next, own.length]);
+const pointer = pointers[i];
+core.view(Uint32Array, next, pointer.length).set(pointer);
+core.view(Int32Array, at + i * SHARE_SIZE, 2).set([next, pointer.length]);
 core.view(Float64Array, at + i * SHARE_SIZE + 8, 2).set([number(frame, "frame"), number(weight, "weight")]);
-next += 4 * own.length;
+next += 4 * pointer.length;
 }
 return this.#fill(result, length, (to) =>
 c.ath_blended_positions(this.#at, at, count, which, to, 12, at + start, scratch), () => {

@@ -87,29 +87,29 @@ class BuildError(Exception):
 
 
 def decoder_sources() -> list[Path]:
-    """The C files that a player needs, as core/CMakeLists.txt lists them."""
-    found = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES\s([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
-    if len(found) != 2:
-        raise BuildError(f"{CORE / 'CMakeLists.txt'}: got {len(found)} lists of C files, expected decoder and GPU form")
-    return [CORE / name for names in found for name in names.split()]
+    """Return the C files that a player needs, as core/CMakeLists.txt lists them."""
+    lists = re.findall(r"set\(ATH_(?:DECODER|GPU)_SOURCES\s([^)]*)\)", (CORE / "CMakeLists.txt").read_text("utf-8"))
+    if len(lists) != 2:
+        raise BuildError(f"{CORE / 'CMakeLists.txt'}: got {len(lists)} lists of C files, expected decoder and GPU form")
+    return [CORE / name for names in lists for name in names.split()]
 
 
 def exports(template: str) -> list[str]:
-    """The C functions that the template calls."""
+    """Return the C functions that the template calls."""
     return sorted(set(re.findall(r"\bc\.(ath_\w+)\(", template)))
 
 
 def check_compiler() -> None:
     try:
-        found = version("ziglang")
+        installed = version("ziglang")
     except PackageNotFoundError:
-        found = "none"
-    if found != ZIG:
-        raise BuildError(f"package ziglang: got version {found}, expected {ZIG}; pip install ziglang=={ZIG}")
+        installed = "none"
+    if installed != ZIG:
+        raise BuildError(f"package ziglang: got version {installed}, expected {ZIG}; pip install ziglang=={ZIG}")
 
 
 def compile_decoder(template: str) -> bytes:
-    """The decoder as a WebAssembly module."""
+    """Return the decoder as a WebAssembly module."""
     check_compiler()
     wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
     # functions of one kind beside each other compress better
@@ -131,26 +131,26 @@ def _zig(folder: str, *arguments: str) -> None:
 
 
 def pack(template: str, wasm: bytes) -> str:
-    """The module's text."""
+    """Return the module's text."""
     payload = base64.b64encode(zstandard.ZstdCompressor(level=PACKING).compress(wasm)).decode("ascii")
     head, code = template.split("\n\n", 1)
     pieces = INCLUDE.split(code)  # Text of the template and names of files take turns.
     texts = [(VIEWER / text).read_text("utf-8") if i % 2 else text for i, text in enumerate(pieces)]
     lean = "".join(_lean(text) for text in texts)
-    return PAYLOAD.sub(lambda found: found[1] + payload + found[3], f"{head}\n\n{lean}", count=1)
+    return PAYLOAD.sub(lambda match: match[1] + payload + match[3], f"{head}\n\n{lean}", count=1)
 
 
 def _lean(text: str) -> str:
-    """Text without comments and indentation, none of whose strings goes over several lines."""
+    """Return text without comments and indentation. No string in it may go over several lines."""
     text = re.sub(r"^/\*\*.*?\*/\n", "", text, flags=re.MULTILINE | re.DOTALL)
     return re.sub(r"^ +|^ *//.*\n|^\n|^export (?=function)", "", text, flags=re.MULTILINE)
 
 
 def unpack(module: str) -> tuple[str, bytes]:
-    """(text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
-    found = PAYLOAD.search(module)
+    """Return (text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
+    match = PAYLOAD.search(module)
     try:
-        return PAYLOAD.sub("", module, count=1), zstandard.ZstdDecompressor().decompress(base64.b64decode(found[2]))
+        return PAYLOAD.sub("", module, count=1), zstandard.ZstdDecompressor().decompress(base64.b64decode(match[2]))
     except (TypeError, ValueError, zstandard.ZstdError):
         return "", b""
 

@@ -35,10 +35,10 @@ class BuildError(Exception):
 
 
 def modules() -> Path:
-    """A folder with the packages of package-lock.json, installed where it is not there yet."""
+    """Return a folder with the packages of package-lock.json, installed where it is not there yet."""
     lock = (VIEWER / "package-lock.json").read_bytes()
     cache = Path(os.environ.get(CACHE_VARIABLE) or DEFAULT_CACHE).expanduser() / hashlib.sha256(lock).hexdigest()[:16]
-    found = cache / "node_modules"
+    folder = cache / "node_modules"
     if not (cache / "complete").exists():
         npm = shutil.which("npm")
         if npm is None:
@@ -48,7 +48,7 @@ def modules() -> Path:
             shutil.copy(VIEWER / name, cache)
         _run([npm, "ci", "--ignore-scripts", "--no-audit", "--no-fund"], cwd=cache)
         (cache / "complete").touch()
-    return found
+    return folder
 
 
 def build(folder: Path) -> None:
@@ -68,7 +68,7 @@ def _run(command: list[str], **options) -> None:
 
 
 def differences(built: Path, committed: Path) -> list[str]:
-    """Names of the files that are not the same in both folders."""
+    """Return names of the files that are not the same in both folders."""
     contents = [{path.name: path.read_bytes() for path in folder.glob("*")} for folder in (built, committed)]
     names = sorted(contents[0].keys() | contents[1].keys())
     return [name for name in names if contents[0].get(name) != contents[1].get(name)]

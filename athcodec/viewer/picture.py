@@ -58,7 +58,7 @@ _DRAWN = """async (seconds) => {
 
 
 def browser_path() -> str | None:
-    """Chromium's program; None where none is found."""
+    """Return the path of Chromium's program, or None."""
     return os.environ.get(BROWSER_VARIABLE) or shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -72,7 +72,7 @@ def save_picture(
     time: float = 0.0,
     host_mesh: HostMesh | None = None,
 ) -> int:
-    """Writes a picture of a plant at full detail.
+    """Write a picture of a plant at full detail.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def save_picture(
 
 
 def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
-    """A plant as WebP, late in its clip, when it has grown where it grows; raises as
+    """Return a plant as WebP, late in its clip, when it has grown where it grows; raises as
     `save_picture`."""
     image = _packages()
     with open_ath(path) as decoder:
@@ -132,7 +132,7 @@ def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
 
 
 def can_draw() -> bool:
-    """Whether all is there that pictures take."""
+    """Return whether all is there that pictures take."""
     try:
         _packages()
     except MissingExtra:
@@ -141,7 +141,7 @@ def can_draw() -> bool:
 
 
 def _packages() -> Any:
-    """Pillow's module of images, once all that is needed is there."""
+    """Return Pillow's module of images if all packages that a picture needs are installed."""
     try:
         import playwright.sync_api  # noqa: F401
         from PIL import Image
@@ -169,7 +169,7 @@ def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
 
 
 def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
-    """Each picture as PNG, with all of the scenery, also without a graphics processor."""
+    """Yield each picture as PNG, with all of the scenery, also without a graphics processor."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip
         steps = max(playing.frame_count - 1, 1)

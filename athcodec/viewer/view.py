@@ -58,7 +58,7 @@ def export_page(
     host_mesh: HostMesh | None = None,
     floor: Floor | None = None,
 ) -> int:
-    """Writes one page that plays an .ath file without any other file or server.
+    """Write one page that plays an .ath file without any other file or server.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _read_floor(floor: Floor | None) -> list[tuple[bytes, float]]:
 def _checked(
     path: Any, clip: str | None, host_mesh: HostMesh | None, has_mesh: bool = False
 ) -> tuple[bytes | None, str]:
-    """Opens the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one
+    """Open the file as the page will; gives the host's mesh as the page takes it, float32, for a file that needs one
     and is not in a GLB that has it, and a still picture. Raises AthError, OSError."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         return None if has_mesh else _mesh_of(decoder), still_svg(decoder)
@@ -154,8 +154,8 @@ def self_contained(
     floor: Sequence[tuple[bytes, float]] = (),
     still: str = "",
 ) -> str:
-    """The page with everything inside: styles, modules as data URLs, the worker and the file as text. still: an SVG
-    element, for browsers that run no scripts."""
+    """Return the page with everything inside: styles, modules as data URLs, the worker and the file as text. still: an
+    SVG element, for browsers that run no scripts."""
     text = PAGE.read_text("utf-8")
     modules = ("three", "model") if _is_glb(data) else ("three",)
     inside = json.dumps({"imports": {name: _data_url(_module(f"{name}.js")) for name in modules}})
@@ -189,7 +189,7 @@ def self_contained(
 
 
 def _module(file: str) -> str:
-    """A module of the page, which names others as the import map of an exported page does."""
+    """Return a module of the page, which names others as the import map of an exported page does."""
     return _BESIDE.sub(r'\1"\2"', (WEB / file).read_text("utf-8"))
 
 
@@ -198,7 +198,7 @@ def _data_url(text: str) -> str:
 
 
 def _script(text: str) -> str:
-    """Text that cannot end the script element that it is put into."""
+    """Return text that cannot end the script element that it is put into."""
     return text.replace("</script", "<\\/script").replace("<!--", "<\\!--")
 
 
@@ -216,7 +216,7 @@ def serve(
     forest: bool = False,
     floor: Floor | None = None,
 ) -> None:
-    """Serves the viewer with an .ath file on 127.0.0.1 until it is interrupted.
+    """Serve the viewer with an .ath file on 127.0.0.1 until it is interrupted.
 
     Parameters
     ----------
@@ -283,15 +283,15 @@ def _check_server(path: FilePath) -> None:
 
 
 def _refuse_other_urls(path: FilePath) -> None:
-    """The server passes on what http and https have; for others there is --export."""
+    """Refuse URLs of other kinds than http and https, which the server cannot pass on; for others there is --export."""
     if is_url(path) and urlsplit(path).scheme.lower() not in ("http", "https"):
         scheme = urlsplit(path).scheme
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
 def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None = None, still: str | None = None):
-    """The aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which only
-    the page's address tells; at other such places what goes with it, such as the host's mesh. still: an SVG of the
+    """Yield the aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which
+    only the page's address tells; at other such places what goes with it, such as the host's mesh. still: an SVG of the
     plant, for browsers that run no scripts."""
     from aiohttp import ClientSession, web
 
@@ -348,6 +348,6 @@ def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None =
 
 
 def open_browser(address: str) -> None:
-    """Opens the page where there is a browser; where there is none, its address has been printed."""
+    """Open the page where there is a browser; where there is none, its address has been printed."""
     with suppress(webbrowser.Error):
         webbrowser.open(address)

@@ -43,18 +43,18 @@ class Source:
         return hierarchy_of(self.clip)
 
     def part(self, vertices: int) -> Source:
-        """About so many vertices: some runs of branches, evenly spaced, with all that carries them."""
+        """Return a clip of about so many vertices: some runs of branches, evenly spaced, with all that carries them."""
         hierarchy, count = self.hierarchy, self.positions.shape[1]
         run = max(1, vertices // RUNS)
-        taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
-        taken[0] = True
-        for branch in range(len(taken) - 1, 0, -1):
-            if taken[branch] and hierarchy.branch_parent[branch] >= 0:
-                taken[hierarchy.branch_parent[branch]] = True
-        number = np.cumsum(taken) - 1
-        parent = hierarchy.branch_parent[taken]
+        is_taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
+        is_taken[0] = True
+        for branch in range(len(is_taken) - 1, 0, -1):
+            if is_taken[branch] and hierarchy.branch_parent[branch] >= 0:
+                is_taken[hierarchy.branch_parent[branch]] = True
+        number = np.cumsum(is_taken) - 1
+        parent = hierarchy.branch_parent[is_taken]
         of_vertex = hierarchy.vertex_branch()
-        kept = taken[of_vertex]
+        kept = is_taken[of_vertex]
         source = hierarchy.vertex_source[kept]
         clip = athcodec.MotionClip(
             np.ascontiguousarray(self.positions[:, source]),
@@ -80,13 +80,13 @@ class Codec(Protocol):
     settings: dict  # Settings that the last encode chose.
 
     def missing(self) -> str | None:
-        """The reason why it cannot run here, in one line; None if it can."""
+        """Return the reason why it cannot run here, in one line; None if it can."""
 
     def encode(self, source: Source, bound: float) -> bytes:
-        """The smallest encoding found within `bound`, in scene units."""
+        """Return the smallest encoding found within `bound`, in scene units."""
 
     def decode(self, data: bytes) -> np.ndarray:
-        """(T, N, 3) float32, in the source's order."""
+        """Return (T, N, 3) float32, in the source's order."""
 
 
 class BoundBroken(Exception):
@@ -94,13 +94,13 @@ class BoundBroken(Exception):
 
 
 def blocks(values: np.ndarray) -> Iterator[slice]:
-    """Slices of the first axis, short enough for float64 copies to stay small."""
+    """Return slices of the first axis, short enough for float64 copies to stay small."""
     length = max(1, BLOCK // values[0].size)
     return (slice(start, start + length) for start in range(0, len(values), length))
 
 
 def largest_error(positions: np.ndarray, decoded: np.ndarray) -> float:
-    """Largest Euclidean distance of any vertex in any frame; infinite where something is not a number."""
+    """Return the largest Euclidean distance of any vertex in any frame; infinite if something is not a number."""
     largest = 0.0
     for block in blocks(positions):
         difference = decoded[block].astype(np.float64) - positions[block]
@@ -110,7 +110,7 @@ def largest_error(positions: np.ndarray, decoded: np.ndarray) -> float:
 
 
 def check(codec: Codec, source: Source, bound: float) -> tuple[bytes, np.ndarray]:
-    """Encodes and decodes. Raises BoundBroken if the error exceeds the bound, or the shape or type differs."""
+    """Return encodes and decodes. Raises BoundBroken if the error exceeds the bound, or the shape or type differs."""
     data = codec.encode(source, bound)
     decoded = codec.decode(data)
     if decoded.shape != source.positions.shape or decoded.dtype != np.float32:

@@ -112,7 +112,7 @@ class _Track:
         self.codes = np.zeros((len(self.error), segments, SEGMENT, 3), np.int64)
 
     def write(self, some: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        """Codes numbers (M, T, 3) of some bones; returns what a reader gets."""
+        """Code numbers (M, T, 3) of some bones; returns what a reader gets."""
         padded = np.pad(numbers, ((0, 0), (0, -self.frames % SEGMENT), (0, 0)), "edge")
         padded = padded.reshape(len(some), -1, SEGMENT, 3) / self.unit[some, None, None, None]
         self.low[some] = np.floor(padded.min(axis=2))
@@ -122,12 +122,12 @@ class _Track:
         return self.values(some)
 
     def _rates(self, some: np.ndarray | slice) -> np.ndarray:
-        """(M, segments) bits of a number: its steps are at most two errors apart."""
+        """Return (M, segments) bits of a number: its steps are at most two errors apart."""
         steps = self.extent[some].max(axis=2) / (2 * RANGE_STEPS)
         return np.where(steps <= 1, 0, np.minimum(np.ceil(np.log2(1 + steps)), MOST_BITS)).astype(np.int64)
 
     def values(self, some: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(M, T, 3)"""
+        """Return (M, T, 3)"""
         most = ((1 << self._rates(some)) - 1)[:, :, None, None]
         share = np.where(most > 0, self.codes[some] / np.maximum(most, 1), 0.5)
         numbers = (self.low[some][:, :, None] + share * self.extent[some][:, :, None]) * self.unit[
@@ -136,7 +136,7 @@ class _Track:
         return numbers.reshape(len(numbers), -1, 3)[:, : self.frames]
 
     def between(self) -> np.ndarray:
-        """(M, T, 3) with frames of odd numbers from those beside them."""
+        """Return (M, T, 3) with frames of odd numbers from those beside them."""
         numbers = self.values()
         last = self.frames - 1 & ~1
         numbers[:, 1:last:2] = (numbers[:, :last:2] + numbers[:, 2 : last + 1 : 2]) / 2
@@ -144,7 +144,7 @@ class _Track:
         return numbers
 
     def ranges(self) -> list[np.ndarray]:
-        """Two tables, one row per bone."""
+        """Return two tables, one row per bone."""
         low = np.diff(self.low, axis=1, prepend=0)
         return [table.reshape(len(table), -1) for table in (low, self.extent)]
 
@@ -152,13 +152,13 @@ class _Track:
         self.low, self.extent = np.cumsum(low.reshape(self.low.shape), axis=1), extent.reshape(self.low.shape)
 
     def _layout(self, tier: int) -> tuple[np.ndarray, np.ndarray]:
-        """Bits of each number of a tier, in order, and where they begin."""
+        """Return bits of each number of a tier, in order, and where they begin."""
         rates = self._rates(slice(None))[:, :, None, None]
         rates = np.broadcast_to(rates, (*rates.shape[:2], SEGMENT // 2, 3)).ravel()
         return rates, np.cumsum(rates) - rates
 
     def bits(self, tier: int) -> np.ndarray:
-        """Bits, one per byte, of the frames of even (0) or odd (1) number."""
+        """Return bits, one per byte, of the frames of even (0) or odd (1) number."""
         (rates, begin), codes = self._layout(tier), self.codes[:, :, tier::2].ravel()
         bits = np.zeros(rates.sum(), np.uint8)
         for bit in range(rates.max(initial=0)):
@@ -207,7 +207,7 @@ class Bones:
         yield from np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def fitted(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Turns (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
+        """Return turns (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
         centre, turns = self.parts.rigid_maps(self.parts.fit_rigid(positions))
         shifts = np.moveaxis(centre, 1, 2) - (turns @ self.parts.centre[:, None, :, None])[..., 0]
         hinges = self.parts.centre.copy()
@@ -224,9 +224,8 @@ class Bones:
         return turns, shifts, hinges
 
     def follow(self, hinges: np.ndarray, frames: int, tracks: Follow) -> tuple[np.ndarray, np.ndarray]:
-        """Turns and shifts, parents first. tracks(bones, turns of the parents, where these take the hinges) gives
-        vectors of quaternions and offsets, (2, M, T, 3).
-        """
+        """Return turns and shifts, parents first. tracks(bones, turns of the parents, where these take the hinges)
+        gives vectors of quaternions and offsets, (2, M, T, 3)."""
         turns, shifts = np.empty((self.count, frames, 3, 3)), np.empty((self.count, frames, 3))
         for some in self.generations():
             below = self.parent[some]
@@ -239,7 +238,7 @@ class Bones:
         return turns, shifts
 
     def skin(self, turns: np.ndarray, shifts: np.ndarray, blend: bool) -> np.ndarray:
-        """(N, 3, T) vertices under the maps of their own bone and of the nearest other one of the branch."""
+        """Return (N, 3, T) vertices under the maps of their own bone and of the nearest other one of the branch."""
         along = (self.place - self._first_place()[self.of_vertex] + 0.5) / self.length - 0.5
         other = np.clip(self.of_vertex + np.where(along < 0, -1, 1), 0, self.count - 1)
         weight = np.abs(along) * blend * (self.branch[other] == self.branch[self.of_vertex])
@@ -254,17 +253,17 @@ class Bones:
         return positions
 
     def _first_place(self) -> np.ndarray:
-        """(bones,) place of the first vertex on the branch."""
+        """Return (bones,) place of the first vertex on the branch."""
         return self.place[np.unique(self.of_vertex, return_index=True)[1]]
 
 
 def _moved(turns: np.ndarray, shifts: np.ndarray | float, points: np.ndarray) -> np.ndarray:
-    """(M, T, 3) points (M, 3) under maps."""
+    """Return (M, T, 3) points (M, 3) under maps."""
     return (turns @ points[:, None, :, None])[..., 0] + shifts
 
 
 def _turns(vector: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of the vector parts of unit quaternions with positive scalars."""
+    """Return (..., 3, 3) of the vector parts of unit quaternions with positive scalars."""
     square = (vector**2).sum(axis=-1, keepdims=True)
     vector = vector / np.sqrt(np.maximum(square, 1.0))
     w = np.sqrt(np.maximum(1 - square, 0.0))[..., None]

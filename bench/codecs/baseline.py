@@ -45,7 +45,7 @@ class Ladder:
         return cls(values, 0).starting_at(start)
 
     def starting_at(self, value: float) -> Ladder:
-        """The same numbers; the search starts at the one nearest to `value`."""
+        """Return the same numbers; the search starts at the one nearest to `value`."""
         return replace(self, start=int(np.argmin(np.abs(np.log(np.array(self.values) / value)))))
 
 
@@ -145,15 +145,15 @@ class Baseline(ABC):
 
     @abstractmethod
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
-        """The settings that are searched, in the order of the search."""
+        """Return the settings that are searched, in the order of the search."""
 
     @abstractmethod
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
-        """The lossy part, in the order of vertices that is returned."""
+        """Return the lossy part, in the order of vertices that is returned."""
 
     @abstractmethod
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
-        """(N, 3, T) float64 positions of the lossy part, and their order."""
+        """Return (N, 3, T) float64 positions of the lossy part, and their order."""
 
     def encode(self, source: Source, bound: float) -> bytes:
         self.settings = self._searched(source, bound)
@@ -195,7 +195,7 @@ class Baseline(ABC):
 
 
 def quantised(units: np.ndarray, dead_zone: float) -> np.ndarray:
-    """Integers of numbers in steps: 0 below the dead zone, with rounding biased towards 0 by the same amount."""
+    """Return integers of numbers in steps: 0 below the dead zone, with rounding biased towards 0 by the same amount."""
     magnitude = np.abs(units)
     magnitude += 1 - dead_zone
     np.floor(magnitude, out=magnitude)

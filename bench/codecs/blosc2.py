@@ -24,7 +24,7 @@ class Blosc2(Program):
     sample_values = 90_000
 
     def choices(self, form: str) -> list:
-        """(layout, filter, zigzag)."""
+        """Return (layout, filter, zigzag)."""
         return list(product(FLAT_LAYOUTS, FILTERS, (True, False) if form == "integers" else (False,)))
 
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:
@@ -74,7 +74,7 @@ class Blosc2(Program):
 
 
 def _rounded(values: np.ndarray, bits: int) -> np.ndarray:
-    """To so many bits of mantissa, to the nearest."""
+    """Return values rounded to the nearest with so many bits of mantissa."""
     cut = MANTISSA - bits
     if cut == 0:
         return values

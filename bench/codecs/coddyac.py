@@ -71,25 +71,25 @@ class Coddyac(Baseline):
 
 
 def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
-    """(N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
+    """Return (N, 1, 1): distance of a vertex from the one before, over the distance of that from its own; 0: none."""
     before, before2 = order.before, order.before2
-    own = np.linalg.norm(pose - pose[before], axis=1)
+    length = np.linalg.norm(pose - pose[before], axis=1)
     last = np.linalg.norm(pose[before] - pose[before2], axis=1)
-    ratio = np.divide(own, last, out=np.ones_like(own), where=last > 0)
+    ratio = np.divide(length, last, out=np.ones_like(length), where=last > 0)
     return np.where(before2 >= 0, np.minimum(ratio, 2), 0)[:, None, None]
 
 
 def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
-    """(2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
+    """Return (2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
     some = np.flatnonzero(order.before >= 0)
-    own, near = units[some], units[order.before[some]]
+    target, near = units[some], units[order.before[some]]
     step = step_ratio[some] * (near - units[order.before2[some]])
     noise = np.minimum(1 / 12, (units**2).mean(axis=(0, 1)))
-    along, r1, r2 = own.shape[0] * own.shape[1], step_ratio[some].mean(), (step_ratio[some] ** 2).mean()
+    along, r1, r2 = target.shape[0] * target.shape[1], step_ratio[some].mean(), (step_ratio[some] ** 2).mean()
     a = (near**2).sum(axis=(0, 1)) + noise * along
     b = (near * step).sum(axis=(0, 1)) + noise * along * r1
     c = (step**2).sum(axis=(0, 1)) + 2 * noise * along * r2
-    p, s = (near * own).sum(axis=(0, 1)), (step * own).sum(axis=(0, 1))
+    p, s = (near * target).sum(axis=(0, 1)), (step * target).sum(axis=(0, 1))
     determinant = np.maximum(a * c - b * b, 1e-9 * a * c + 1e-30)
     weights = np.stack([(p * c - s * b) / determinant, (s * a - p * b) / determinant])
     return np.rint(WEIGHT_STEPS * np.clip(weights, -2, 2)).astype(np.int64)

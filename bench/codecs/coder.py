@@ -49,9 +49,9 @@ class DamagedStream(Exception):
 
 
 def compiler() -> list[str] | None:
-    """The C compiler and its first options, from CC or the usual names."""
-    found = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
-    return found.split() if found else None
+    """Return the C compiler and its first options, from CC or the usual names."""
+    command = os.environ.get("CC") or next(filter(shutil.which, ("cc", "gcc", "clang")), None)
+    return command.split() if command else None
 
 
 def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
@@ -75,7 +75,7 @@ def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
 
 @cache
 def library(writes: bool) -> ctypes.CDLL:
-    """coder.c for one direction; compiled once per process."""
+    """Return coder.c for one direction; compiled once per process."""
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
@@ -114,9 +114,8 @@ def _read(name: str, data: bytes, *arguments) -> None:
 
 
 def _code_rows(rows: np.ndarray, unit: int) -> bytes:
-    """(R, 3, F) int32 below 2^30, `unit` rows of which belong together, as motion coefficients or as a table, whichever
-    is smaller.
-    """
+    """Return (R, 3, F) int32 below 2^30, `unit` rows of which belong together, as motion coefficients or as a table,
+    whichever is smaller."""
     parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
     coded = [
         _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data) for part in parts
@@ -138,7 +137,7 @@ def _read_rows(data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarra
 
 
 def _code_table(table: np.ndarray) -> bytes:
-    """(R, C) int32 below 2^30."""
+    """Return (R, C) int32 below 2^30."""
     table = table.copy()
     return _written("bench_table", 4096 + 2 * table.size, *table.shape, table.ctypes.data)
 
@@ -154,7 +153,7 @@ def _blocks(frames: int) -> range:
 
 
 def _join(streams: list[bytes]) -> bytes:
-    """Concatenated streams; all but the last have their length in front."""
+    """Return concatenated streams; all but the last have their length in front."""
     return b"".join(varint(len(stream)) + stream for stream in streams[:-1]) + streams[-1]
 
 
@@ -216,7 +215,7 @@ class Writer:
         return b"".join(self.parts)
 
     def echo(self) -> Echo:
-        """A reader of the written values, without decoding."""
+        """Return a reader of the written values, without decoding."""
         return Echo(self.values)
 
     def count(self, value: int) -> int:
@@ -227,13 +226,13 @@ class Writer:
         return self._add(struct.pack("<f", value), value)
 
     def rows(self, rows: np.ndarray, unit: int = 1) -> np.ndarray:
-        """(R, 3, F) integers, coded as motion coefficients are; see bench_rows for `unit`."""
+        """Return (R, 3, F) integers, coded as motion coefficients are; see bench_rows for `unit`."""
         head = b"".join(map(varint, (len(rows), rows.shape[2], unit)))
         coded, wide = self._integers(rows, lambda part: _code_rows(part, unit))
         return self._add(head + coded, wide)
 
     def table(self, table: np.ndarray) -> np.ndarray:
-        """(R, C) integers of any kind; best if neighbours are of similar magnitude."""
+        """Return (R, C) integers of any kind; best if neighbours are of similar magnitude."""
         head = b"".join(map(varint, table.shape))
         coded, wide = self._integers(table, _code_table)
         return self._add(head + coded, wide)
@@ -254,17 +253,17 @@ class Writer:
         return varint(len(streams)) + b"".join(varint(len(stream)) + stream for stream in streams), integers
 
     def bits(self, bits: np.ndarray) -> np.ndarray:
-        """Bits, one per byte, packed and not compressed."""
+        """Return bits, one per byte, packed and not compressed."""
         return self._add(varint(len(bits)) + np.packbits(bits).tobytes(), bits)
 
     def pose(self, branches: np.ndarray, lags: Sequence[np.ndarray], step: float, pose: np.ndarray) -> np.ndarray:
-        """(N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
+        """Return (N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
         coded = []
-        for own in lags:
-            branches["lag"] = own
+        for lag in lags:
+            branches["lag"] = lag
             rest = streams.encode_rest(branches, step, pose)
             table = Writer()
-            table.table(own[None])
+            table.table(lag[None])
             coded.append((table.data(), rest))
         head, rest = min(coded, key=lambda some: len(some[0]) + len(some[1].stream))
         return self._add(head + varint(len(rest.stream)) + rest.stream, rest.decoded)
@@ -298,6 +297,7 @@ class Reader:
         self._data, self.at = data, at
 
     def count(self) -> int:
+        """Read a number, 7 bits a byte."""
         value, self.at = read_varint(self._data, self.at)
         return value
 
@@ -330,7 +330,7 @@ class Reader:
         return np.unpackbits(np.frombuffer(self.take(-(-count // 8)), np.uint8), count=count)
 
     def pose(self, branches: np.ndarray, step: float) -> np.ndarray:
-        """Sets the lags of the branches."""
+        """Set the lags of the branches."""
         branches["lag"] = self.table()[0]
         pose, stream = np.zeros((int(branches["count"].sum()), 3)), self.take(self.count())
         _read("bench_pose", stream, branches.ctypes.data, len(branches), step, pose.ctypes.data)
@@ -359,7 +359,7 @@ class Reader:
 
 
 def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -> bytes:
-    """Corrects (N, 3, T) float32 positions in place, so that every vertex is within `limit` of `wanted`, float64.
+    """Correct (N, 3, T) float32 positions in place, so that every vertex is within `limit` of `wanted`, float64.
 
     As in athcodec, in segments of SEGMENT_FRAMES frames: the step, then a length and a stream for each segment.
     """
@@ -368,19 +368,19 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
     while factor > 1e-3:
         step = quantise.single(quantise.CORRECTION_STEP * limit * factor)
         parts = [np.ascontiguousarray(positions[:, :, at : at + SEGMENT_FRAMES]) for at in starts]
-        found = [
+        coded = [
             streams.find_corrections(
                 part, np.ascontiguousarray(wanted[:, :, at : at + SEGMENT_FRAMES]), np.zeros(3), limit, step
             )
             for at, part in zip(starts, parts, strict=True)
         ]
-        if all(rows is not None for rows in found):
+        if all(rows is not None for rows in coded):
             break
         factor *= 0.5
     else:
         raise ValueError(f"corrections: got a limit of {limit:.3g}; expected one that float32 positions can keep")
     result = struct.pack("<f", step)
-    for at, part, rows in zip(starts, parts, found, strict=True):
+    for at, part, rows in zip(starts, parts, coded, strict=True):
         positions[:, :, at : at + SEGMENT_FRAMES] = part
         stream = streams.encode_corrections(rows, len(part), part.shape[2]) if len(rows) else b""
         result += varint(len(stream)) + stream
@@ -388,7 +388,7 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
 
 
 def read_corrections(positions: np.ndarray, reader: Reader) -> None:
-    """Applies them in place to contiguous (N, 3, T) float32."""
+    """Apply them in place to contiguous (N, 3, T) float32."""
     vertices, _, frames = positions.shape
     step = reader.single()
     for at in range(0, frames, SEGMENT_FRAMES):

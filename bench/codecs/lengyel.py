@@ -86,7 +86,7 @@ class Lengyel(Baseline):
 
 
 def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Settings) -> np.ndarray:
-    """Tracks (parts, k, 3, T) by athcodec's waves or by a learned basis in time; returns what a reader will decode."""
+    """Write tracks (parts, k, 3, T) by athcodec's waves or a learned basis; return what a reader will decode."""
     parts, count, _, frames = exact.shape
     writer.count(count)
     if writer.count(settings["learned"]):
@@ -115,7 +115,7 @@ def _read_tracks(reader: Reader, parts: int, frames: int, step: float) -> np.nda
 
 
 def part_of_vertex(hierarchy: Hierarchy, depth: int) -> np.ndarray:
-    """(N,): branches of less than `depth` on their own, those of `depth` with all that they carry."""
+    """Return (N,): branches of less than `depth` on their own, those of `depth` with all that they carry."""
     part = np.arange(hierarchy.branch_count)
     for branch, parent in enumerate(hierarchy.branch_parent.tolist()):
         if hierarchy.branch_depth[branch] > depth:
@@ -133,14 +133,14 @@ class Parts:
         self.pose, self.around = pose, pose - self.centre[of_vertex]
 
     def sum_of(self, values: np.ndarray) -> np.ndarray:
-        """Per part, of (N, ...)."""
+        """Return the sums of (N, ...) values over each part."""
         by_part = np.argsort(self.of_vertex, kind="stable")
         return np.add.reduceat(values[by_part], np.cumsum(self.sizes) - self.sizes, axis=0)
 
     # affine: displacement = sum of orthonormal functions of the pose times their tracks
 
     def functions(self) -> np.ndarray:
-        """(N, 4): a constant and up to three linear functions, orthonormal over each part; 0 where it is
+        """Return (N, 4): a constant and up to three linear functions, orthonormal over each part; 0 where it is
         flat.
         """
         spread = self.sum_of(self.around[:, :, None] * self.around[:, None])
@@ -152,7 +152,7 @@ class Parts:
         return np.concatenate([constant[self.of_vertex, None], linear[:, ::-1]], axis=1)
 
     def fit_affine(self, positions: np.ndarray) -> np.ndarray:
-        """(parts, 4, 3, T) tracks."""
+        """Return (parts, 4, 3, T) tracks."""
         motion, functions = positions - self.pose[:, :, None], self.functions()
         return np.stack([self.sum_of(functions[:, i, None, None] * motion) for i in range(4)], axis=1)
 
@@ -165,12 +165,12 @@ class Parts:
     # rigid: a shift and a turn of each part, weighted so that a step moves its vertices alike
 
     def _lever(self) -> np.ndarray:
-        """Root of the sum of squares that a unit turn moves the vertices by, (parts, 1, 1)."""
+        """Return root of the sum of squares that a unit turn moves the vertices by, (parts, 1, 1)."""
         square = self.sum_of((self.around**2).sum(axis=1)) * 2 / 3
         return np.sqrt(np.maximum(square, 1e-12))[:, None, None]
 
     def fit_rigid(self, positions: np.ndarray) -> np.ndarray:
-        """(parts, 2, 3, T): shifts and rotation vectors."""
+        """Return (parts, 2, 3, T): shifts and rotation vectors."""
         centre = self.sum_of(positions) / self.sizes[:, None, None]
         around = positions - centre[self.of_vertex]
         spread = np.stack([self.sum_of(around * self.around[:, i, None, None]) for i in range(3)], axis=2)
@@ -184,7 +184,7 @@ class Parts:
         return np.stack([shifts, turns * self._lever()], axis=1)
 
     def rigid_maps(self, tracks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where the centres are, (parts, 3, T), and turns about them, (parts, T, 3, 3)."""
+        """Return where the centres are, (parts, 3, T), and turns about them, (parts, T, 3, 3)."""
         centre = self.centre[:, :, None] + tracks[:, 0] / np.sqrt(self.sizes)[:, None, None]
         return centre, _rotations(np.moveaxis(tracks[:, 1] / self._lever(), 1, 2))
 
@@ -198,7 +198,7 @@ class Parts:
 
 
 def _rotations(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of (..., 3), by the formula of Rodrigues."""
+    """Return (..., 3, 3) of (..., 3), by the formula of Rodrigues."""
     angle = np.maximum(np.linalg.norm(vectors, axis=-1), 1e-12)[..., None, None]
     cross = np.zeros((*vectors.shape, 3))
     cross[..., 0, 1], cross[..., 0, 2], cross[..., 1, 2] = -vectors[..., 2], vectors[..., 1], -vectors[..., 0]
@@ -207,7 +207,7 @@ def _rotations(vectors: np.ndarray) -> np.ndarray:
 
 
 def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
-    """(parts, T, 3) of (parts, T, 3, 3), each the one nearest to that of the frame before (which half turns
+    """Return (parts, T, 3) of (parts, T, 3, 3), each the one nearest to that of the frame before (which half turns
     need).
     """
     quaternion = quaternions(rotation)
@@ -220,7 +220,7 @@ def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
 
 
 def quaternions(rotation: np.ndarray) -> np.ndarray:
-    """(..., 4), scalar first and positive: the eigenvector of the largest eigenvalue."""
+    """Return (..., 4), scalar first and positive: the eigenvector of the largest eigenvalue."""
     m = rotation
     trace = np.trace(m, axis1=-2, axis2=-1)
     k = np.zeros((*trace.shape, 4, 4))

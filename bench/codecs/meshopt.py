@@ -18,7 +18,7 @@ class Meshopt(Program):
     name, module, package = "meshoptimizer", "meshoptimizer", "meshoptimizer"
 
     def choices(self, form: str) -> list:
-        """(elements, how many of the others each holds; 0: as many as fit, zigzag)."""
+        """Return (elements, how many of the others each holds; 0: as many as fit, zigzag)."""
         elements = [
             ("vertices", 1),
             ("vertices", 4),
@@ -59,7 +59,7 @@ class Meshopt(Program):
 
 
 def _buffers(numbers: np.ndarray, elements: str, count: int) -> list[np.ndarray]:
-    """(elements, bytes) each, their width a multiple of four."""
+    """Return (elements, bytes) each, their width a multiple of four."""
     turned = numbers if elements == "frames" else numbers.transpose(1, 0, 2)
     buffers = []
     for first, last in _spans(turned.shape[1], count, numbers.itemsize):

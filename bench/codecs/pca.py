@@ -53,9 +53,9 @@ GRID: dict[str, Ladder | Choice] = {
 }
 
 
-def grid_of(names: str, **own: Ladder | Choice) -> dict[str, Ladder | Choice]:
-    """Settings by name, in the order of the search: those of GRID, and the codec's own."""
-    return {name: own.get(name) or GRID[name] for name in names.split()}
+def grid_of(names: str, **parameters: Ladder | Choice) -> dict[str, Ladder | Choice]:
+    """Return settings by name, in the order of the search: those of GRID, and the codec's own."""
+    return {name: parameters.get(name) or GRID[name] for name in names.split()}
 
 
 # ---- trajectories and bases ----
@@ -69,14 +69,14 @@ class Trajectories:
     frames: int
 
     def rows(self, motion: np.ndarray) -> np.ndarray:
-        """Of (N, 3, T)."""
+        """Return the rows of (N, 3, T) motion."""
         return motion.reshape(-1, 3 * self.frames if self.joint else self.frames)
 
     def motion(self, rows: np.ndarray) -> np.ndarray:
         return rows.reshape(-1, 3, self.frames)
 
     def to_axes(self, coefficients: np.ndarray) -> np.ndarray:
-        """(N, 3, F) for code_row of coefficients (rows, K): joint components take the axes by turns."""
+        """Return (N, 3, F) for code_row of coefficients (rows, K): joint components take the axes by turns."""
         if not self.joint:
             return coefficients.reshape(-1, 3, coefficients.shape[1])
         missing = -coefficients.shape[1] % 3
@@ -90,19 +90,19 @@ class Trajectories:
 
 
 def principal(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Singular values, descending, and orthonormal rows (min(shape), length)."""
+    """Return singular values, descending, and orthonormal rows (min(shape), length)."""
     values, vectors = np.linalg.eigh(rows.T @ rows)
     count = min(rows.shape)
     return np.sqrt(np.maximum(values[::-1][:count], 0)), np.ascontiguousarray(vectors[:, ::-1][:, :count].T)
 
 
 def mean_of(source: Source, order: VertexOrder) -> np.ndarray:
-    """(N, 3) mean of each vertex."""
+    """Return (N, 3) mean of each vertex."""
     return memo(source, ("mean", order.hierarchy is not None), lambda: ordered(source, order).mean(axis=2))
 
 
 def mean_motion(source: Source, order: VertexOrder) -> np.ndarray:
-    """(N, 3, T) motion about the mean."""
+    """Return (N, 3, T) motion about the mean."""
     return ordered(source, order) - mean_of(source, order)[:, :, None]
 
 
@@ -113,7 +113,7 @@ def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories)
 
 
 def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories) -> np.ndarray:
-    """Basis rows (K, length), each at about its step; returns what a reader will decode."""
+    """Return basis rows (K, length), each at about its step; returns what a reader will decode."""
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
@@ -138,7 +138,7 @@ def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
 
 
 def _in_threes(tracks: np.ndarray) -> np.ndarray:
-    """(R, T) as rows of three axes."""
+    """Return (R, T) as rows of three axes."""
     return np.pad(tracks, ((0, -len(tracks) % 3), (0, 0))).reshape(-1, 3, tracks.shape[1])
 
 
@@ -161,7 +161,7 @@ def write_coefficients(
 
 
 def _cost(q: np.ndarray) -> np.ndarray:
-    """About the bits of each component."""
+    """Return about the bits of each component."""
     return sum(np.log2(1 + np.abs(q[some])).sum(axis=(0, 1)) for some in blocks(q))
 
 
@@ -181,7 +181,7 @@ def significant(
     trajectories: Trajectories,
     least: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The basis vectors that are worth their bytes, at least `least`, and the step of each."""
+    """Return the basis vectors that are worth their bytes, at least `least`, and the step of each."""
     values, basis = spectrum
     count = max(least, int((values > settings["keep"] * step * np.sqrt(len(rows))).sum()))
     steps = settings["basis"] * step * np.sqrt(len(rows) / trajectories.frames) / np.maximum(values[:count], 1e-30)
@@ -218,12 +218,13 @@ def write_group(
 
 
 def _inverse(normal: np.ndarray) -> np.ndarray:
-    """Of the normal matrix of least squares, regularised for components that are quantised to zero."""
+    """Return the inverse of the normal matrix of least squares, regularised for components that are quantised to
+    zero."""
     return np.linalg.inv(normal + max(1e-12 * np.trace(normal) / len(normal), 1e-30) * np.eye(len(normal)))
 
 
 def fitted_to(basis: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Least-squares coefficients of rows."""
+    """Return least-squares coefficients of rows."""
     return rows @ (basis.T @ _inverse(basis @ basis.T))
 
 
@@ -242,7 +243,7 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
 def write_front(
     writer: Writer, source: Source, bound: float, settings: Settings
 ) -> tuple[VertexOrder, Trajectories, np.ndarray, np.ndarray, float]:
-    """Order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
+    """Write order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
     order = vertex_order(source, settings.get("order", "hierarchy"))
     write_order(writer, order)
     positions = ordered(source, order)
@@ -253,7 +254,7 @@ def write_front(
 
 
 def read_front(reader: Reader) -> tuple[VertexOrder, Trajectories, np.ndarray, float]:
-    """Order, kind of trajectories, mean pose (N, 3) and step."""
+    """Return order, kind of trajectories, mean pose (N, 3) and step."""
     order, frames = read_order(reader), reader.count()
     return order, Trajectories(bool(reader.count()), frames), read_pose(reader, order), reader.single()
 
@@ -311,7 +312,7 @@ class ClusteredPca(Baseline):
         return positions, order
 
     def _clusters(self, source: Source, order: VertexOrder, count: int, trajectories: Trajectories):
-        """Cluster of each vertex (N,), and the spectrum of each cluster."""
+        """Return cluster of each vertex (N,), and the spectrum of each cluster."""
 
         def make():
             motion = mean_motion(source, order)
@@ -323,7 +324,7 @@ class ClusteredPca(Baseline):
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
     def _lloyd(self, coefficients: np.ndarray, count: int, vertices: int) -> np.ndarray:
-        """Clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
+        """Return clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
         by_vertex = coefficients.reshape(vertices, -1, coefficients.shape[1])
         some = by_vertex[:: -(-vertices // self.moved)]
         groups = np.arange(len(some)) * count // len(some)

@@ -77,7 +77,7 @@ def inflate(data: bytes) -> bytes:
 
 
 def planes(values: np.ndarray) -> bytes:
-    """All first bytes, then all second bytes ..."""
+    """Return all first bytes, then all second bytes ..."""
     return values.reshape(-1, 1).view(np.uint8).T.tobytes()
 
 
@@ -87,7 +87,7 @@ def from_planes(data: bytes, dtype: np.dtype | str) -> np.ndarray:
 
 
 def zigzag(values: np.ndarray) -> np.ndarray:
-    """Signed int32 as uint32: small ones of either sign are small."""
+    """Return signed int32 as uint32, in which small integers of either sign are small."""
     return ((values << 1) ^ (values >> 31)).view(np.uint32)
 
 
@@ -97,7 +97,7 @@ def from_zigzag(values: np.ndarray) -> np.ndarray:
 
 
 def narrowest(values: np.ndarray) -> np.ndarray:
-    """The same integers in the narrowest type of their signedness that holds them."""
+    """Return the same integers in the narrowest type of their signedness that holds them."""
     low, high = (int(values.min()), int(values.max())) if values.size else (0, 0)
     kind = values.dtype.kind
     for size in (1, 2):
@@ -108,7 +108,7 @@ def narrowest(values: np.ndarray) -> np.ndarray:
 
 
 def pack_integers(values: np.ndarray) -> bytes:
-    """(N, k) int32, coded by their differences of order 0 to 2 along N, the order that is smallest."""
+    """Return (N, k) int32, coded by their differences of order 0 to 2 along N, the order that is smallest."""
     rows = np.ascontiguousarray(values.T)
     coded = []
     for order in range(3):
@@ -128,7 +128,7 @@ def unpack_integers(data: bytes, count: int) -> np.ndarray:
 
 
 def arrays_of(values: np.ndarray, layout: str) -> list[np.ndarray]:
-    """(T, N, 3) as the arrays that a program gets."""
+    """Return (T, N, 3) as the arrays that a program gets."""
     frames, vertices, _ = values.shape
     turned = np.ascontiguousarray(values.transpose(AXES[layout]))
     if "|" in layout:
@@ -142,14 +142,14 @@ def array_shapes(shape: tuple[int, int, int], layout: str) -> list[tuple[int, ..
 
 
 def from_arrays(pieces: Sequence[np.ndarray], layout: str, shape: tuple[int, int, int]) -> np.ndarray:
-    """The inverse of arrays_of."""
+    """Return the inverse of arrays_of."""
     turned = np.concatenate([piece.reshape(-1) for piece in pieces])
     turned = turned.reshape([shape[axis] for axis in AXES[layout]])
     return np.ascontiguousarray(turned.transpose(np.argsort(AXES[layout])))
 
 
 def _difference(values: np.ndarray, axis: int) -> np.ndarray:
-    """Modulo 2**32, the first ones as they are."""
+    """Return differences modulo 2**32; the first rows stay as they are."""
     first = np.take(values, [0], axis=axis)
     return np.concatenate([first, np.diff(values, axis=axis)], axis=axis)
 
@@ -159,7 +159,7 @@ def _sum(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def predict(values: np.ndarray, predictor: str) -> np.ndarray:
-    """(T, N, 3) int32 residuals; exact, modulo 2**32."""
+    """Return (T, N, 3) int32 residuals; exact, modulo 2**32."""
     for axis in _predictor_axes(predictor):
         values = _difference(values, axis)
     return values
@@ -177,7 +177,7 @@ def _predictor_axes(predictor: str) -> list[int]:
 
 
 def ordered_bits(values: np.ndarray) -> np.ndarray:
-    """float32 as int32 in the same order; its own inverse but for the types."""
+    """Return float32 as int32 in the same order; the inverse is the same function with the types exchanged."""
     bits = np.ascontiguousarray(values, np.float32).view(np.int32)
     return np.where(bits < 0, bits ^ np.int32(0x7FFFFFFF), bits)
 
@@ -244,7 +244,7 @@ class Case:
         return self.rest if name == "rest" else self.positions[0]
 
     def grid(self, bound: float, search: bool) -> Grid:
-        """The coarsest grid that keeps the bound; on a piece, where `search` is off, one that nearly does."""
+        """Return the coarsest grid that keeps the bound; on a piece, where `search` is off, one that nearly does."""
         if "grid" not in self._known:
             origin = tuple(self.positions.reshape(-1, 3).min(axis=0).astype(float).tolist())
             grids = [Grid(CORNER * bound * factor, origin) for factor in COARSER]
@@ -260,26 +260,26 @@ class Case:
             return None
 
     def integers(self, bound: float, search: bool) -> np.ndarray:
-        """On the grid, or the bits of the floats where all must come back."""
+        """Return positions on the grid, or the bits of the floats if all must come back."""
         if "integers" not in self._known:
             turn = ordered_bits if self.exact else self.grid(bound, search).integers
             self._known["integers"] = turn(self.positions)
         return self._known["integers"]
 
     def piece(self, values: int) -> Case:
-        """Neighbouring vertices and frames, about so many numbers."""
+        """Return neighbouring vertices and frames, about so many numbers."""
         frames, vertices, _ = self.positions.shape
         length = min(frames, SAMPLE_FRAMES)
         width = min(vertices, max(64, values // (3 * length)))
         first, start = (vertices - width) // 2, (frames - length) // 2
-        taken = slice(first, first + width)
-        positions = np.ascontiguousarray(self.positions[start : start + length, taken])
-        order = None if self.order is None else self.order[taken]
-        return Case(positions, self.rest[taken], self.exact, order)
+        columns = slice(first, first + width)
+        positions = np.ascontiguousarray(self.positions[start : start + length, columns])
+        order = None if self.order is None else self.order[columns]
+        return Case(positions, self.rest[columns], self.exact, order)
 
 
 def cases_of(source: Source, exact: bool) -> dict[str, Case]:
-    """By order; the hierarchy's only where it is another."""
+    """Return a case for each order of vertices; the hierarchy's order only if it differs from the source's."""
     cases = {"source": Case(source.positions, source.rest, exact)}
     order = np.asarray(source.hierarchy.vertex_source)
     if not np.array_equal(order, np.arange(len(order))):
@@ -393,7 +393,7 @@ class Program:
         return placed
 
     def _words(self, setup: Setup) -> dict:
-        """The setup without settings that its form does not use."""
+        """Return the setup without settings that its form does not use."""
         unused = "predictor" if setup.form == "floats" else "pose_step"
         words = {name: value for name, value in asdict(setup).items() if name != unused}
         if setup.pose == "none":
@@ -403,7 +403,7 @@ class Program:
     # -- choosing --
 
     def _descend(self, form: str, order: str, size: Callable[[Setup], float]) -> None:
-        """Searches the program's settings, then poses for the best few, and both once more."""
+        """Search the program's settings, then poses for the best few, and both once more."""
         integers = form == "integers"
         predictors = self.predictors if integers else ("none",)
         steps = (1.0,) if integers else POSE_STEPS
@@ -413,11 +413,11 @@ class Program:
         pose, step = poses[-1]
         heads = [Setup(form, order, pose, step)]
         for _ in range(2):
-            own = [
+            candidates = [
                 replace(heads[0], predictor=predictor, choice=choice)
                 for predictor, choice in product(predictors, range(len(self.choices(form))))
             ]
-            heads = sorted(own, key=size)[:BEAM]
+            heads = sorted(candidates, key=size)[:BEAM]
             heads = sorted(
                 (replace(head, pose=pose, pose_step=step) for head, (pose, step) in product(heads, poses)), key=size
             )
@@ -501,7 +501,7 @@ class Program:
         return [numbers, packed, data]
 
     def _pose_of_floats(self, case: Case, setup: Setup, bound: float) -> tuple[bytes, bytes, np.ndarray]:
-        """Its grid, its bytes, and as it will be decoded."""
+        """Return its grid, its bytes, and as it will be decoded."""
         if setup.pose == "none":
             return b"", b"", np.zeros((1, 3), np.float32)
         key = (setup.pose, setup.pose_step)
@@ -532,7 +532,7 @@ class Program:
 
 
 def _pack_exact(pose: np.ndarray) -> bytes:
-    """(N, 3) float32 and zstd: row after row, axis after axis, or their bits as integers."""
+    """Return (N, 3) float32 and zstd: row after row, axis after axis, or their bits as integers."""
     ways = {b"r": deflate(pose.tobytes()), b"a": deflate(pose.T.tobytes()), b"i": pack_integers(ordered_bits(pose))}
     way = min(ways, key=lambda name: len(ways[name]))
     return way + ways[way]
@@ -546,7 +546,7 @@ def _unpack_exact(data: bytes, count: int) -> np.ndarray:
 
 
 def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[int], bound: float) -> bytes:
-    """Bisects for the first of the strengths, exactest last, that keeps the bound."""
+    """Return bisects for the first of the strengths, exactest last, that keeps the bound."""
     data, error = encode(strengths[-1])
     if not error <= bound:
         raise CannotKeep("exactest setting: beyond the bound")
@@ -562,7 +562,8 @@ def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[i
 
 
 def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials: int) -> bytes:
-    """The smallest within the bound: the allowed error is adjusted until the resulting error just keeps the bound."""
+    """Return the smallest within the bound: the allowed error is adjusted until the resulting error just keeps the
+    bound."""
     allowed, kept, broken, best = bound / np.sqrt(3), 0.0, np.inf, None
     for trial in range(trials + 20):
         data, error = encode(allowed)
@@ -583,14 +584,14 @@ def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials
 
 
 def encode_arrays(encode: Callable[[np.ndarray], bytes], values: np.ndarray, layout: str) -> bytes:
-    """Encodes every array of a layout separately."""
+    """Encode every array of a layout separately."""
     return join([encode(part) for part in arrays_of(values, layout)])
 
 
 def decode_arrays(
     decode: Callable[[bytes, tuple[int, ...]], np.ndarray], data: bytes, layout: str, shape: tuple[int, int, int]
 ) -> np.ndarray:
-    """The inverse of encode_arrays: `decode` gets bytes and a shape."""
+    """Return the inverse of encode_arrays: `decode` gets bytes and a shape."""
     blobs: Iterable[bytes] = split(data)
     return from_arrays(
         [decode(blob, part) for blob, part in zip(blobs, array_shapes(shape, layout), strict=True)], layout, shape

@@ -87,7 +87,7 @@ class Simple:
 
 
 def _on_grid(positions: np.ndarray, bound: float) -> tuple[float, np.ndarray]:
-    """The step, a float32, and (T, N, 3) int64 within 31 bits of each other. CannotKeep where there is none."""
+    """Return the step, a float32, and (T, N, 3) int64 within 31 bits of each other. CannotKeep where there is none."""
     for factor in FINER:
         step = float(np.float32(CORNER * bound * factor))
         integers = np.rint(positions.astype(np.float64) / step).astype(np.int64)
@@ -103,7 +103,7 @@ def _positions(integers: np.ndarray, step: float) -> np.ndarray:
 
 
 def _packed(numbers: np.ndarray, setup: Setup, level: int) -> bytes:
-    """The width of the residuals in bytes, and these."""
+    """Return the width of the residuals in bytes, and these."""
     for axis in _axes(setup):
         numbers = np.diff(numbers, axis=axis, prepend=np.int32(0))  # modulo 2**32
     [row] = arrays_of(narrowest(zigzag(numbers)), LAYOUTS[setup.layout])

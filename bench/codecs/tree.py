@@ -93,7 +93,7 @@ def read_order(reader: Reader) -> VertexOrder:
 
 
 def memo(source: Source, key: tuple, make):
-    """The value of `make`, cached with the source; of each kind, key[0], the KEPT last used ones."""
+    """Return the value of `make`, cached with the source; of each kind, key[0], the KEPT last used ones."""
     kind = source.__dict__.setdefault("_known", {}).setdefault(key[0], {})
     kind[key] = kind.pop(key) if key in kind else make()
     if len(kind) > KEPT:
@@ -102,7 +102,7 @@ def memo(source: Source, key: tuple, make):
 
 
 def ordered(source: Source, order: VertexOrder) -> np.ndarray:
-    """(N, 3, T) float64 positions."""
+    """Return (N, 3, T) float64 positions."""
 
     def make() -> np.ndarray:
         return np.ascontiguousarray(source.positions[:, order.source].transpose(1, 2, 0), np.float64)
@@ -111,7 +111,7 @@ def ordered(source: Source, order: VertexOrder) -> np.ndarray:
 
 
 def differences(q: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
-    """Residuals of integers (N, ...) predicted from the vertices before: constant (degree 1) or linear (2)."""
+    """Return residuals of integers (N, ...) predicted from the vertices before: constant (degree 1) or linear (2)."""
     if degree == 0:
         return q
     expected = np.where(_shaped(order.before >= 0, q), q[order.before], 0)
@@ -121,7 +121,7 @@ def differences(q: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
 
 
 def sums(residual: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
-    """The inverse of differences."""
+    """Return the inverse of differences."""
     if degree == 0:
         return residual
     if order.hierarchy is None:
@@ -143,7 +143,7 @@ def _shaped(mask: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float) -> np.ndarray:
-    """A static pose, (N, 3), at a step, as a rest pose of a file; returns what a reader will get."""
+    """Return a static pose, (N, 3), at a step, as a rest pose of a file; returns what a reader will get."""
     step = writer.single(step)
     return writer.pose(order.branches, _lags(order, pose, step), step, pose)
 
@@ -153,7 +153,7 @@ def read_pose(reader: Reader, order: VertexOrder) -> np.ndarray:
 
 
 def _lags(order: VertexOrder, pose: np.ndarray, step: float) -> list[np.ndarray]:
-    """Of all branches: beams, and what is best for the first branch of so many vertices."""
+    """Return the lags of all branches: those of beams, or the best one for the first branch of so many vertices."""
     counts = order.branches["count"]
     sizes, examples, kinds = np.unique(counts, return_index=True, return_inverse=True)
     stems = (pose[order.branches["first"][b] :][:size] for size, b in zip(sizes, examples))

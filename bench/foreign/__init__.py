@@ -51,7 +51,7 @@ class Foreign:
     version: int = 1  # goes up when the maker gives other motion
 
     def missing(self) -> str | None:
-        """Why the clip cannot be made here; None if it can."""
+        """Return why the clip cannot be made here; None if it can."""
         title, needs = PROGRAMS[self.program]
         absent = [package for module, package in needs.items() if find_spec(module) is None]
         return f"{title}: not installed, expected `pip install {' '.join(absent)}`" if absent else None

@@ -17,7 +17,8 @@ NODES, LEAVES = 110, 5  # Leaves: on each node that carries foliage.
 
 
 def armature(path: Path, seed: int) -> None:
-    """A tree of the skin modifier on the bones that Blender makes for it, each with noise on its keyed rotation."""
+    """Make a tree of the skin modifier on the bones that Blender makes for it, each with noise on its keyed
+    rotation."""
     rng = np.random.default_rng(seed)
     plant = grow(NODES, 2, 4.0, seed)
     tree = _tree(plant)
@@ -83,7 +84,7 @@ def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
     quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
     def petal(angle: float, size: float, opened: float, curl: float) -> np.ndarray:
-        """Points of a petal that leans outwards by an angle, and the more the farther it is from its foot."""
+        """Return points of a petal that leans outwards by an angle, and the more the farther it is from its foot."""
         lean = np.radians(10 + 70 * opened) * along + np.radians(25) * opened + curl * along**2
         step = size / (rows - 1)
         out, up = np.cumsum(np.sin(lean) * step, axis=0), np.cumsum(np.cos(lean) * step, axis=0)
@@ -235,13 +236,13 @@ def _z_up(points: np.ndarray) -> np.ndarray:
 
 
 def _tree(plant: Plant) -> Any:
-    """An empty scene with the skeleton of a tree under a skin modifier."""
+    """Return an empty scene with the skeleton of a tree under a skin modifier."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return _bark(plant, "tree")
 
 
 def _bark(plant: Plant, name: str) -> Any:
-    """The skeleton of a tree under a skin modifier, beside what is there."""
+    """Return the skeleton of a tree under a skin modifier, beside what is there."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(_z_up(plant.position).tolist(), plant.edges.tolist(), [])
     tree = bpy.data.objects.new(name, mesh)

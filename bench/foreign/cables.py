@@ -92,7 +92,7 @@ def _write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, has_faces:
 
 
 def _stems(moved: np.ndarray) -> covers.Stems:
-    """What covers need, of (T, S, P, 3) rods: the smallest turns of their pieces from their first directions."""
+    """Return what covers need, of (T, S, P, 3) rods: the smallest turns of their pieces from their first directions."""
     along = np.gradient(moved, axis=2)
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     heading = along[0, :, 0]
@@ -100,13 +100,14 @@ def _stems(moved: np.ndarray) -> covers.Stems:
 
 
 def _in_groups(rods: np.ndarray, young: float, wind: Wind) -> np.ndarray:
-    """The same of rods that stand in the ground, a few at a time: no rod touches another, and few are solved faster."""
+    """Return the same of rods that stand in the ground, a few at a time: no rod touches another, and few are solved
+    faster."""
     groups = np.array_split(rods, -(-len(rods) // GROUP))
     return np.concatenate([_moved(group, "0 1", young, wind, SIDE_BY_SIDE) for group in groups], axis=1)
 
 
 def _moved(rods: np.ndarray, pins: str, young: float, wind: Wind, frame_count: int) -> np.ndarray:
-    """(T, S, P, 3) nodes of rods in the wind."""
+    """Return (T, S, P, 3) nodes of rods in the wind."""
     count = rods.shape[1]
     lengths = np.linalg.norm(np.diff(rods, axis=1), axis=2)
     elements = " ".join(f"{i} {i + 1}" for i in range(count - 1))

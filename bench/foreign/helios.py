@@ -64,7 +64,7 @@ def _grown(
 
 
 def _side_by_side(files: Sequence[str]) -> Usd.Stage:
-    """A stage that has the files' stages as prims beside each other."""
+    """Return a stage that has the files' stages as prims beside each other."""
     first, stage = Usd.Stage.Open(files[0]), Usd.Stage.CreateInMemory()
     for name in ("timeCodesPerSecond", "framesPerSecond", "startTimeCode", "endTimeCode", "upAxis", "metersPerUnit"):
         if first.HasAuthoredMetadata(name):

@@ -56,7 +56,7 @@ def flutter(path: Path, seed: int, shape: float, refine: int) -> None:
 
 
 def _swing(force: np.ndarray, hertz: float) -> np.ndarray:
-    """Response of a damped oscillator to noise, sampled FPS times a second."""
+    """Return response of a damped oscillator to noise, sampled FPS times a second."""
     rate = 2 * np.pi * hertz / FPS
     decay = np.exp(-0.06 * rate)
     return lfilter([1.0], [1.0, -2 * decay * np.cos(rate), decay**2], force)

@@ -48,7 +48,8 @@ def bush(path: Path, seed: int, stems: int, nodes: int, height: float) -> None:
 
 
 def _moved(plant: Plant, rest: np.ndarray, wind: Wind) -> tuple[np.ndarray, np.ndarray]:
-    """Places (T, N, 3) and rotations (T, N, 3, 3) of the ends of a plant's elements; the lowest one stands still."""
+    """Return places (T, N, 3) and rotations (T, N, 3, 3) of the ends of a plant's elements; the lowest one stands
+    still."""
     below = plant.parent
     piece = rest - rest[np.maximum(below, 0)]
     lengths = np.linalg.norm(piece, axis=1)
@@ -92,7 +93,8 @@ def _moved(plant: Plant, rest: np.ndarray, wind: Wind) -> tuple[np.ndarray, np.n
 
 
 def _preorder(children: list[list[int]]) -> np.ndarray:
-    """The nodes above the lowest in the order of their bodies: each before what it carries, subtree after subtree."""
+    """Return the nodes above the lowest in the order of their bodies: each before what it carries, subtree after
+    subtree."""
     order, waiting = [], children[0][::-1]
     while waiting:
         node = waiting.pop()

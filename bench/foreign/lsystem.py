@@ -53,7 +53,7 @@ def sequence(path: Path, plant: str, seed: int, is_split: bool = False) -> None:
 
 
 def _derived(grammar: Grammar) -> list[tuple[str, int]]:
-    """Symbols with the derivation step of their birth."""
+    """Return symbols with the derivation step of their birth."""
     word = [("A", 0)]
     for step in range(grammar.steps):
         word = [

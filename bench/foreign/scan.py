@@ -28,9 +28,9 @@ def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
     scan = trimesh.Trimesh(points, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
     scan = scan.subdivide()
     scan.vertices += rng.normal(0, 0.006, scan.vertices.shape)
-    found = skeletor.skeletonize.by_wavefront(scan, waves=1, step_size=1, progress=False)
-    rest = np.array(found.vertices) + rng.normal(0, 0.004, found.vertices.shape)
-    edges = np.array(found.edges, np.int32)
+    extracted = skeletor.skeletonize.by_wavefront(scan, waves=1, step_size=1, progress=False)
+    rest = np.array(extracted.vertices) + rng.normal(0, 0.004, extracted.vertices.shape)
+    edges = np.array(extracted.edges, np.int32)
     graph = coo_array((np.ones(len(edges)), edges.T), shape=2 * (len(rest),))
     order, parent = breadth_first_order(graph, np.argmin(rest[:, 1]), directed=False)
     if len(order) != len(rest):
@@ -46,7 +46,7 @@ def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
 
 
 def _swayed(rest: np.ndarray, order: np.ndarray, parent: np.ndarray, wind: Wind, seconds: float) -> np.ndarray:
-    """Every piece turns with the one below and a little more, across the wind where it is."""
+    """Return every piece turns with the one below and a little more, across the wind where it is."""
     push = wind.at(rest, seconds)
     axis = np.cross([0, 1, 0], push) * (0.002 + 0.006 * rest[:, 1:2] / rest[:, 1].max())
     above = order[1:]

@@ -43,7 +43,7 @@ class _Tree:
         self.height = height
 
     def at(self, seconds: float) -> np.ndarray:
-        """The positions that the shader gives."""
+        """Return the positions that the shader gives."""
         edge, phase, swing = self.colours.T
         phases = np.stack([self.points @ np.full(3, 0.7) + phase, phase], axis=1)
         waves = np.abs(((seconds + phases)[:, [0, 0, 1, 1]] * WAVES * 0.7 + 0.5) % 1.0 * 2 - 1)
@@ -90,7 +90,7 @@ def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames
 
 
 def willow(path: Path, seed: int, leaves: int, pairs: int, height: float, frames: int) -> None:
-    """The same of leaves alone."""
+    """Make the morphs of a willow's leaves alone."""
     _write(path, _Willow(leaves, pairs, height, seed), "leaves", frames)
 
 

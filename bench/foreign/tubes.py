@@ -8,7 +8,7 @@ from bench.trees.plant import Plant
 
 
 def tubes(plant: Plant, sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N * sides, 3) points, those of each node together, and (F, 4) faces."""
+    """Return (N * sides, 3) points, those of each node together, and (F, 4) faces."""
     along = plant.elements + (plant.parent < 0)[:, None] * [0.0, 1.0, 0.0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     first = np.cross(along, [0.3, 0.2, 1.0])

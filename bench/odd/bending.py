@@ -52,15 +52,14 @@ class Bones:
         return np.stack([self.parent[1:], np.arange(1, len(self.parent))], axis=1).astype(np.int32)
 
     def bent(self, turns: np.ndarray, length: np.ndarray | None = None) -> np.ndarray:
-        """(T, N, 3) positions of stems that bend by rotation vectors (T, B, 3), from base to tip and beside their
-        parent; length: (T, B) factors on their elements.
-        """
+        """Return (T, N, 3) positions of stems that bend by rotation vectors (T, B, 3), from base to tip and beside
+        their parent; length: (T, B) factors on their elements."""
         share = 1.0 / np.bincount(self.branch)[self.branch]
         positions = np.empty((len(turns), len(self.parent), 3))
         frames = np.empty((len(self.parent), len(turns), 3, 3))
         for node, (below, branch) in enumerate(zip(self.parent.tolist(), self.branch.tolist(), strict=True)):
-            own = rotations(share[node] * turns[:, branch])
-            frames[node] = own if below < 0 else frames[below] @ own
+            turn = rotations(share[node] * turns[:, branch])
+            frames[node] = turn if below < 0 else frames[below] @ turn
             step = frames[node] @ self.element[node]
             if length is not None:
                 step *= length[:, branch, None]
@@ -69,28 +68,30 @@ class Bones:
 
 
 def gusty(time: np.ndarray, branches: int, amount: float, lean: float, rng: np.random.Generator) -> np.ndarray:
-    """(T, B, 3) rotation vectors of stems: the lean is about one horizontal axis, as are the gusts; radians."""
+    """Return (T, B, 3) rotation vectors of stems: the lean is about one horizontal axis, as are the gusts; radians."""
     across = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
     seen = time[:, None] - rng.uniform(0.0, LATEST, branches)  # each stem's own time in the gusts
     phase = rng.uniform(0, 2 * np.pi, GUSTS)
     gust = np.sin(2 * np.pi * rng.uniform(*GUST_HERTZ, GUSTS) * seen[..., None] + phase).mean(axis=-1)
-    own = np.sin(2 * np.pi * rng.uniform(*STEM_HERTZ, branches) * time[:, None] + rng.uniform(0, 2 * np.pi, branches))
+    along_own_axis = np.sin(
+        2 * np.pi * rng.uniform(*STEM_HERTZ, branches) * time[:, None] + rng.uniform(0, 2 * np.pi, branches)
+    )
     axes = rng.normal(size=(branches, 3))
     strength = rng.uniform(0.5, 1.5, branches)
     along = (lean * strength + 2.0 * amount * strength * gust)[..., None] * across
-    return along + 0.3 * amount * own[..., None] * axes
+    return along + 0.3 * amount * along_own_axis[..., None] * axes
 
 
 def swaying(
     bones: Bones, frames: int, rng: np.random.Generator, amount: float = 0.15, lean: float = 0.0, fps: float = FPS
 ) -> np.ndarray:
-    """(T, N, 3) positions in wind."""
+    """Return (T, N, 3) positions in wind."""
     time = np.arange(frames) / fps
     return bones.bent(gusty(time, len(bones.branch_parent), amount, lean, rng))
 
 
 def clip_of(bones: Bones, positions: np.ndarray, fps: float = FPS, rest: np.ndarray | None = None) -> MotionClip:
-    """The motion as a clip with named branches; rest: that of the bones by default."""
+    """Return the motion as a clip with named branches; rest: that of the bones by default."""
     return MotionClip(
         positions.astype(np.float32),
         np.arange(len(positions)) / fps,
@@ -105,26 +106,26 @@ def clip_of(bones: Bones, positions: np.ndarray, fps: float = FPS, rest: np.ndar
 def swaying_tree(
     seed: int, frames: int, vertices: int, orders: int = 2, amount: float = 0.15, fps: float = FPS
 ) -> MotionClip:
-    """A tree of 8 m that sways."""
+    """Return a tree of 8 m that sways."""
     bones = Bones.of(grow(vertices, orders, 8.0, seed))
     return clip_of(bones, swaying(bones, frames, np.random.default_rng(seed), amount, fps=fps), fps)
 
 
 def moved_tree(seed: int, frames: int, vertices: int, every: int) -> MotionClip:
-    """A tree that sways and is put down elsewhere every so many frames."""
+    """Return a tree that sways and is put down elsewhere every so many frames."""
     clip = swaying_tree(seed, frames, vertices)
     places = np.random.default_rng([seed, 1]).uniform(-20, 20, (-(-frames // every), 3)) * [1, 0, 1]
     return clip.replace(positions=(clip.positions + places[np.arange(frames) // every, None]).astype(np.float32))
 
 
 def held_tree(seed: int, frames: int, vertices: int, repeats: int) -> MotionClip:
-    """A tree that sways and keeps each pose for so many frames."""
+    """Return a tree that sways and keeps each pose for so many frames."""
     clip = swaying_tree(seed, -(-frames // repeats), vertices, fps=FPS / repeats)
     return clip.replace(positions=np.repeat(clip.positions, repeats, axis=0)[:frames], time=np.arange(frames) / FPS)
 
 
 def far_tree(seed: int, frames: int, vertices: int, distance: float) -> MotionClip:
-    """A tree in centimetres that sways so far from the origin that float32 leaves few bits for its motion."""
+    """Return a tree in centimetres that sways so far from the origin that float32 leaves few bits for its motion."""
     clip = swaying_tree(seed, frames, vertices)
     place = np.array([1.0, 0.0, 0.0]) * distance
     positions, rest = ((100.0 * array + place).astype(np.float32) for array in (clip.positions, clip.rest))
@@ -132,14 +133,15 @@ def far_tree(seed: int, frames: int, vertices: int, distance: float) -> MotionCl
 
 
 def scanned_tree(seed: int, frames: int, stems: int, longest: int, lean: float) -> MotionClip:
-    """A tree as scans give it, a trunk and short stems of one to a few vertices, blown far from its rest pose."""
+    """Return a tree as scans give it, a trunk and short stems of one to a few vertices, blown far from its rest
+    pose."""
     rng = np.random.default_rng(seed)
     bones = _twiggy(rng, stems, longest)
     return clip_of(bones, swaying(bones, frames, rng, 0.15, lean))
 
 
 def _twiggy(rng: np.random.Generator, stems: int, longest: int, trunk: int = 12) -> Bones:
-    """Stems of 1 to `longest` vertices on the trunk or on one of the last stems before them."""
+    """Return stems of 1 to `longest` vertices on the trunk or on one of the last stems before them."""
     below = np.concatenate([[-1], [_host(rng, stem) for stem in range(1, stems)]]).astype(np.int32)
     count = np.concatenate([[trunk], rng.integers(1, longest + 1, stems - 1)])
     first = np.cumsum(count) - count

@@ -15,7 +15,8 @@ ORDERS = ("blades", "interleaved", "shuffled")
 def grass(
     seed: int, blades: int = 800, points: int = 7, frames: int = 160, named: bool = True, order: str = "blades"
 ) -> MotionClip:
-    """A meadow in which the gusts of one wind travel; points without faces, a branch per blade where they are `named`.
+    """Return a meadow in which the gusts of one wind travel; points without faces, a branch per blade where they are
+    `named`.
 
     order: of the vertices, blade after blade, all lowest points before all second ones ("interleaved"), or at random.
     """
@@ -37,7 +38,8 @@ def grass(
 
 
 def _bending(rng: np.random.Generator, blades: int, points: int, time: np.ndarray) -> np.ndarray:
-    """(T, blades, points, 3): the lowest points stand still, every other one keeps its distance to the one below."""
+    """Return (T, blades, points, 3): the lowest points stand still, every other one keeps its distance to the one
+    below."""
     side = np.sqrt(blades / DENSITY)
     foot = np.stack([rng.uniform(0, side, blades), np.zeros(blades), rng.uniform(0, side, blades)], axis=-1)
     length, limp = rng.uniform(0.25, 0.5, blades), rng.uniform(0.6, 1.4, blades)
@@ -57,7 +59,7 @@ def _bending(rng: np.random.Generator, blades: int, points: int, time: np.ndarra
 
 
 def _gusts(rng: np.random.Generator, time: np.ndarray, foot: np.ndarray) -> np.ndarray:
-    """(T, blades) strengths about 0, which travel with the wind along x."""
+    """Return (T, blades) strengths about 0, which travel with the wind along x."""
     hertz, phase = rng.uniform(0.15, 1.2, GUSTS), rng.uniform(0, 2 * np.pi, GUSTS)
     across = rng.normal(0, 0.5, GUSTS)
     late = foot[:, :1] / 2.0 + across * foot[:, 2:]  # seconds

@@ -21,9 +21,9 @@ WOOD = 0.8  # Share of the time of growth after which a sapling's branches have 
 def growth(
     seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False, flowing: bool = False
 ) -> MotionClip:
-    """A tree whose branches grow out of their parents when these have stopped, and stop too, or, `flowing`, as soon as
-    the parent's tip has passed. Until then they wait where they will be attached, or are `carried` there by what grows.
-    """
+    """Return a tree whose branches grow out of their parents when these have stopped, and stop too, or, `flowing`, as
+    soon as the parent's tip has passed. Until then they wait where they will be attached, or are `carried` there by
+    what grows."""
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
     rng = np.random.default_rng(seed)
     times = flowing_begin_and_end(bones, frames, rng) if flowing else begin_and_end(bones, frames, rng)
@@ -36,7 +36,8 @@ def growth(
 
 
 def growth_in_wind(seed: int, frames: int, vertices: int, amount: float = 0.15) -> MotionClip:
-    """A tree whose branches grow out of their parents, on which they are carried, while all that is there sways."""
+    """Return a tree whose branches grow out of their parents, on which they are carried, while all that is there
+    sways."""
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
     rng = np.random.default_rng(seed)
     grown = growing(begin_and_end(bones, frames, rng), frames, eased=True)
@@ -45,13 +46,14 @@ def growth_in_wind(seed: int, frames: int, vertices: int, amount: float = 0.15) 
 
 
 def attach_node(bones: Bones) -> np.ndarray:
-    """(B,) the node that each branch grows out of; the root for the trunk."""
+    """Return (B,) the node that each branch grows out of; the root for the trunk."""
     first = np.unique(bones.branch, return_index=True)[1]
     return np.maximum(bones.parent[first], 0)
 
 
 def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """(B, 2) frames at which branches begin and stop growing: after their parent has stopped, one by one along it."""
+    """Return (B, 2) frames at which branches begin and stop growing: after their parent has stopped, one by one along
+    it."""
     part = frames / PARTS
     times = np.zeros((len(bones.branch_parent), 2))
     times[0] = part * np.array([0.1, 0.8])
@@ -65,7 +67,7 @@ def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.nda
 
 
 def flowing_begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """(B, 2) frames at which branches begin and stop growing: as the eased tip of their parent passes, so that
+    """Return (B, 2) frames at which branches begin and stop growing: as the eased tip of their parent passes, so that
     something grows in every frame but those of the last second."""
     times = np.zeros((len(bones.branch_parent), 2))
     times[0] = 0.0, 1.0
@@ -81,7 +83,7 @@ def flowing_begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -
 
 
 def growing(begin_and_end: np.ndarray, frames: int, eased: bool) -> np.ndarray:
-    """(T, B) lengths of the branches, from 0 to 1, in a straight line or `eased` at both ends."""
+    """Return (T, B) lengths of the branches, from 0 to 1, in a straight line or `eased` at both ends."""
     begin, end = begin_and_end.T
     share = np.clip((np.arange(frames)[:, None] - begin) / (end - begin), 0.0, 1.0)
     return share * share * (3.0 - 2.0 * share) if eased else share
@@ -157,7 +159,7 @@ ROWS, WIDE = 6, 3  # vertices of a leaf along and across
 
 
 def unfolding_leaves(seed: int, frames: int, leaves: int) -> MotionClip:
-    """A twig whose leaves, folded at the midrib and rolled up, open and stretch out one after the other."""
+    """Return a twig whose leaves, folded at the midrib and rolled up, open and stretch out one after the other."""
     rng = np.random.default_rng(seed)
     twig = np.linspace(0.0, 1.0, leaves + 1)[:, None] * [0.1, 1.0, 0.0]
     open_share = np.clip((np.arange(frames)[:, None] / frames - np.linspace(0.05, 0.7, leaves)) / 0.2, 0.0, 1.0)
@@ -180,7 +182,7 @@ def unfolding_leaves(seed: int, frames: int, leaves: int) -> MotionClip:
 
 
 def _leaves(feet: np.ndarray, open_share: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(T, leaves, ROWS, WIDE, 3) vertices; a leaf's own axes: along, across, upwards."""
+    """Return (T, leaves, ROWS, WIDE, 3) vertices; a leaf's own axes: along, across, upwards."""
     count = len(feet)
     closed = 1.0 - open_share[..., None]
     curl = (1.2 * closed + 0.05) * np.arange(ROWS)  # the angle of each row, rolled up by up to 6 rad
@@ -192,12 +194,12 @@ def _leaves(feet: np.ndarray, open_share: np.ndarray, rng: np.random.Generator) 
     side = np.arange(WIDE) - WIDE // 2
     across = (width * np.cos(fold))[..., None] * [0.0, 1.0, 0.0]
     lift = (width * np.sin(fold))[..., None] * upwards
-    own = midrib[..., None, :] + side[:, None] * across[..., None, :] + np.abs(side)[:, None] * lift[..., None, :]
-    own *= 0.15 * rng.uniform(0.8, 1.2, count)[:, None, None, None] * (0.3 + 0.7 * open_share[..., None, None, None])
+    blade = midrib[..., None, :] + side[:, None] * across[..., None, :] + np.abs(side)[:, None] * lift[..., None, :]
+    blade *= 0.15 * rng.uniform(0.8, 1.2, count)[:, None, None, None] * (0.3 + 0.7 * open_share[..., None, None, None])
     azimuth = 2.4 * np.arange(count)
     along = sideways(np.tile([0.0, 1.0, 0.0], (count, 1)), azimuth, np.radians(60.0))
     beside = np.cross([0.0, 1.0, 0.0], along)
     beside /= np.linalg.norm(beside, axis=1, keepdims=True)
     axes = np.stack([along, beside, np.cross(along, beside)], axis=1)
     droop = rotations((0.6 * closed) * beside)  # a closed leaf stands upright
-    return feet[:, None, None] + np.einsum("tlrwa,lak,tljk->tlrwj", own, axes, droop)
+    return feet[:, None, None] + np.einsum("tlrwa,lak,tljk->tlrwj", blade, axes, droop)

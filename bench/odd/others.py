@@ -13,9 +13,8 @@ from bench.trees.wind import Wind
 
 
 def captured_stem(seed: int, frames: int, points: int, noise: float, fps: float = 120.0) -> MotionClip:
-    """A stem with markers that sways, as a capture gives it: the same noise on every coordinate; noise: RMS over the
-    diagonal.
-    """
+    """Return a stem with markers that sways, as a capture gives it: the same noise on every coordinate; noise: RMS over
+    the diagonal."""
     rng = np.random.default_rng(seed)
     stem = np.linspace(0.0, 2.0, points)[:, None] * [0.0, 1.0, 0.0]
     element = np.diff(stem, axis=0, prepend=0.0)
@@ -27,13 +26,13 @@ def captured_stem(seed: int, frames: int, points: int, noise: float, fps: float 
 
 
 def white_noise(seed: int, frames: int, points: int) -> MotionClip:
-    """Points that are somewhere else in every frame."""
+    """Return points that are somewhere else in every frame."""
     positions = np.random.default_rng(seed).normal(size=(frames, points, 3))
     return _unnamed(positions)
 
 
 def still_mesh(seed: int, frames: int, nodes: int, leaves: int) -> MotionClip:
-    """The mesh of a tree, tubes and leaf cards, all frames alike."""
+    """Return the mesh of a tree, tubes and leaf cards, all frames alike."""
     plant = grow(nodes, 2, 8.0, seed)
     tree = clip_of(Bones.of(plant), plant.position[None])
     tree.attributes["radius"] = plant.radius
@@ -44,9 +43,8 @@ def still_mesh(seed: int, frames: int, nodes: int, leaves: int) -> MotionClip:
 def morph_targets(
     seed: int, frames: int, points: int, targets: int, active: int, key: int, reach: tuple[float, float]
 ) -> MotionClip:
-    """A ball of radius 1 with bumps of such reach, few of them at a time, by weights that are straight between keys
-    `key` frames apart.
-    """
+    """Return a ball of radius 1 with bumps of such reach, few of them at a time, by weights that are straight between
+    keys `key` frames apart."""
     rng = np.random.default_rng(seed)
     base = _ball(points)
     centre = base[rng.integers(0, points, targets)]
@@ -63,7 +61,7 @@ def morph_targets(
 
 
 def rippling_sheet(seed: int, side: int, frames: int, bumps: int) -> MotionClip:
-    """A square of triangles over which smooth bumps move."""
+    """Return a square of triangles over which smooth bumps move."""
     rng = np.random.default_rng(seed)
     plane = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, side)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     time = np.arange(frames)[:, None] / FPS
@@ -80,7 +78,7 @@ def rippling_sheet(seed: int, side: int, frames: int, bumps: int) -> MotionClip:
 
 
 def drifting_points(seed: int, points: int, frames: int, noise: float) -> MotionClip:
-    """Points of a cube without faces, each on a smooth way of its own, and a little noise."""
+    """Return points of a cube without faces, each on a smooth way of its own, and a little noise."""
     rng = np.random.default_rng(seed)
     time = np.arange(frames)[:, None, None] / FPS
     waves = (np.sin(2 * np.pi * rng.uniform(0.3, 2.0) * time) * rng.normal(0, 0.03, (points, 3)) for _ in range(3))
@@ -88,7 +86,7 @@ def drifting_points(seed: int, points: int, frames: int, noise: float) -> Motion
 
 
 def _ball(points: int) -> np.ndarray:
-    """(points, 3) evenly over the unit sphere, along a spiral."""
+    """Return (points, 3) evenly over the unit sphere, along a spiral."""
     height = 1.0 - 2.0 * (np.arange(points) + 0.5) / points
     angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(points)
     radius = np.sqrt(1.0 - height**2)
@@ -96,7 +94,7 @@ def _ball(points: int) -> np.ndarray:
 
 
 def one_vertex(seed: int, frames: int) -> MotionClip:
-    """A single vertex on a smooth way."""
+    """Return a single vertex on a smooth way."""
     rng = np.random.default_rng(seed)
     time = np.arange(frames)[:, None, None] / FPS
     waves = np.sin(2 * np.pi * rng.uniform(0.2, 1.0, (4, 1)) * time + rng.uniform(0, 6.28, (4, 3)))
@@ -104,7 +102,7 @@ def one_vertex(seed: int, frames: int) -> MotionClip:
 
 
 def tumbling_cube(seed: int, frames: int) -> MotionClip:
-    """A cube of 24 vertices, four to a side, thrown and turning."""
+    """Return a cube of 24 vertices, four to a side, thrown and turning."""
     rng = np.random.default_rng(seed)
     square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]) / 2.0
     sides = [[0, 0, 0], [0, 0.5, 0], [0, 1, 0], [0, 1.5, 0], [0.5, 0, 0], [1.5, 0, 0]]
@@ -135,7 +133,7 @@ def triangulated_leaf(seed: int, frames: int, points: int) -> MotionClip:
 
 
 def _unnamed(positions: np.ndarray, **more: np.ndarray) -> MotionClip:
-    """A clip without branches; its rest pose is the first frame."""
+    """Return a clip without branches; its rest pose is the first frame."""
     return MotionClip(
         positions.astype(np.float32),
         np.arange(len(positions)) / FPS,

@@ -23,21 +23,21 @@ class Scene:
     standing: MotionClip | None = None
 
     def bare(self) -> MotionClip:
-        """The clip as a source without branches gives it."""
+        """Return the clip as a source without branches gives it."""
         return bare(self.clip)
 
     def without_faces(self) -> Scene:
         return replace(self, clip=self.clip.replace(faces=None))
 
     def part(self, plant: int) -> MotionClip:
-        """One plant alone, without branches."""
+        """Return one plant alone, without branches."""
         kept = np.flatnonzero(self.plant == plant)
         number = np.full(len(self.plant), -1, np.int32)
         number[kept] = np.arange(len(kept))
         faces = self.clip.faces
         if faces is not None:
-            mine = number[faces]
-            faces = mine[(mine >= 0).any(axis=1)]  # Corners that are not there stay -1.
+            corners = number[faces]
+            faces = corners[(corners >= 0).any(axis=1)]  # Corners that are not there stay -1.
             faces = faces if len(faces) else None
         return MotionClip(
             self.clip.positions[:, kept],

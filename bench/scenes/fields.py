@@ -17,7 +17,7 @@ def _time(frames: int = FRAMES) -> np.ndarray:
 
 
 def _outwards(rng: np.random.Generator, stems: Stems, stem: np.ndarray, angle: float) -> np.ndarray:
-    """(M, 3) directions away from stems, before they bend."""
+    """Return (M, 3) directions away from stems, before they bend."""
     return sideways(stems.heading[stem], rng.uniform(0, 2 * np.pi, len(stem)), angle)
 
 
@@ -38,14 +38,14 @@ def _on(
     foot, base = stems.feet(stem, point)
     heading = _outwards(rng, stems, stem, angle)
     lengths = length * rng.uniform(0.6, 1.4, len(stem))
-    moved = swayed(rng, _time(len(foot)), foot[0], bend, own=1.0)
+    moved = swayed(rng, _time(len(foot)), foot[0], bend, flutter=1.0)
     return bent(foot, heading, lengths, points, moved, base), stem
 
 
 def _leaves(
     scene: Assembly, rng: np.random.Generator, stems: Stems, branch: np.ndarray, each: int, size: float
 ) -> None:
-    """Leaves of three pairs of vertices."""
+    """Return leaves of three pairs of vertices."""
     leaves, stem = _on(rng, stems, each, 2, np.radians(60), size, 3, 0.3)
     width = size * np.array([0.05, 0.3, 0.05])
     scene.add(*covers.ribbons(leaves, rng.uniform(0, 2 * np.pi, len(stem)), width), branch[stem])
@@ -58,7 +58,7 @@ def _field(rng: np.random.Generator, foot: np.ndarray, height: float, points: in
 
 
 def ribbons(seed: int, plants: int, points: int) -> Scene:
-    """Blades of wheat, 400 on a square metre."""
+    """Return blades of wheat, 400 on a square metre."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, np.sqrt(plants / 400), np.sqrt(plants / 400))
     blades = _field(rng, foot, 0.8, points, 0.35)
@@ -68,7 +68,7 @@ def ribbons(seed: int, plants: int, points: int) -> Scene:
 
 
 def tubes(seed: int, plants: int, rings: int, sides: int) -> Scene:
-    """Stems of a hedge, 60 to a metre, that lean through each other."""
+    """Return stems of a hedge, 60 to a metre, that lean through each other."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, plants / 60, 0.4)
     shoots = _field(rng, foot, 1.4, rings, 0.2)
@@ -78,7 +78,7 @@ def tubes(seed: int, plants: int, rings: int, sides: int) -> Scene:
 
 
 def hedge_ribbons(seed: int, plants: int, points: int) -> Scene:
-    """Wide leaves of a hedge that stand in the ground."""
+    """Make wide leaves of a hedge that stand in the ground."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, plants / 90, 0.3)
     blades = _field(rng, foot, 1.1, points, 0.25)
@@ -88,7 +88,7 @@ def hedge_ribbons(seed: int, plants: int, points: int) -> Scene:
 
 
 def stems(seed: int, plants: int) -> Scene:
-    """Stems of a hedge, each with two twigs and six leaves."""
+    """Return stems of a hedge, each with two twigs and six leaves."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, plants / 40, 0.4)
     _shrubs(scene, rng, _field(rng, foot, 1.3, 12, 0.2), twigs=2, leaves=6)
@@ -96,7 +96,7 @@ def stems(seed: int, plants: int) -> Scene:
 
 
 def bush(seed: int, stems: int) -> Scene:
-    """Stems that leave one patch of ground to all sides, with three twigs and eight leaves each."""
+    """Return stems that leave one patch of ground to all sides, with three twigs and eight leaves each."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = rng.normal(0, 0.08, (stems, 3)) * [1, 0, 1]
     heading = headings(rng, stems, 0.35) + 2.0 * foot
@@ -116,7 +116,7 @@ def _shrubs(scene: Assembly, rng: np.random.Generator, shoots: Stems, twigs: int
 
 
 def stalks(seed: int, plants: int) -> Scene:
-    """Stalks of twelve rings of four vertices, 300 on a square metre."""
+    """Return stalks of twelve rings of four vertices, 300 on a square metre."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot = covers.ground(rng, plants, np.sqrt(plants / 300), np.sqrt(plants / 300))
     shoots = _field(rng, foot, 0.9, 12, 0.3)
@@ -125,7 +125,7 @@ def stalks(seed: int, plants: int) -> Scene:
 
 
 def kelp(seed: int, plants: int) -> Scene:
-    """Stipes on the sea's ground that a swell moves to and fro, with six blades each."""
+    """Return stipes on the sea's ground that a swell moves to and fro, with six blades each."""
     rng, scene = np.random.default_rng(seed), Assembly()
     foot, time = covers.ground(rng, plants, 2.0, 2.0), _time()
     swell = gusts(rng, time, foot, speed=1.0, fastest=0.4)

@@ -18,13 +18,13 @@ NO_FACES = np.empty((0, 4), np.int32)
 
 
 def willow(seed: int, leaves: int) -> Scene:
-    """Leaves of ten pairs of vertices on hanging twigs that are not in the clip."""
+    """Return leaves of ten pairs of vertices on hanging twigs that are not in the clip."""
     rng, scene, time = np.random.default_rng(seed), Assembly(), np.arange(FRAMES) / FPS
     plant = grow(500, 3, 7.0, seed)
     nodes = swaying(Bones.of(plant), FRAMES, rng, 0.2)
     node = np.sort(rng.choice(np.flatnonzero(plant.foliage > 0), leaves))
     heading = headings(rng, leaves, 0.4) * [1, -1, 1]
-    flutter = swayed(rng, time, nodes[0, node], 0.3, lean=0.3, own=0.8)
+    flutter = swayed(rng, time, nodes[0, node], 0.3, lean=0.3, flutter=0.8)
     base = rotations(swayed(rng, time, nodes[0, node], 0.3, lean=0.0))
     blades = bent(nodes[:, node], heading, rng.uniform(0.15, 0.25, leaves), 10, flutter, base)
     width = 0.012 * np.sin(np.linspace(0.2, np.pi - 0.1, 10))
@@ -45,7 +45,7 @@ def _sample() -> MotionClip:
 
 
 def tree_on_terrain(side: int) -> Scene:
-    """The sample tree, as points, in the middle of a still square of hills."""
+    """Return the sample tree, as points, in the middle of a still square of hills."""
     tree = _sample()
     size = 3.0 * float(np.ptp(tree.rest[:, 1]))
     x, z = np.meshgrid(*[np.linspace(-0.5, 0.5, side) * size] * 2, indexing="ij")
@@ -68,7 +68,7 @@ def tree_on_terrain(side: int) -> Scene:
 
 
 def turning_tree() -> Scene:
-    """The sample tree on a turntable that turns once."""
+    """Return the sample tree on a turntable that turns once."""
     tree = _sample()
     angle = np.linspace(0, 2 * np.pi, tree.frame_count)[:, None] * [0.0, 1.0, 0.0]
     turned = np.einsum("tij,tnj->tni", rotations(angle), tree.positions).astype(np.float32)
@@ -76,7 +76,7 @@ def turning_tree() -> Scene:
 
 
 def storm(seed: int) -> Scene:
-    """A mesh of bark and leaves in a wind of 14 m/s, as the suites' canopies are made."""
+    """Return a mesh of bark and leaves in a wind of 14 m/s, as the suites' canopies are made."""
     from bench.data import Canopy  # Makes more than this one; data knows the suites.
 
     clip = Canopy(300, 2, FRAMES, 6.0, 14.0, 700, "broadleaf", seed).make()
@@ -84,7 +84,7 @@ def storm(seed: int) -> Scene:
 
 
 def cloth_leaf(seed: int, frames: int, along: int = 40, across: int = 17) -> Scene:
-    """A leaf of cloth, held at its stalk: masses on springs in gusts."""
+    """Return a leaf of cloth, held at its stalk: masses on springs in gusts."""
     rng = np.random.default_rng(seed)
     u, v = np.meshgrid(np.linspace(0, 1, along), np.linspace(-1, 1, across), indexing="ij")
     width = 0.25 * np.sin(np.pi * (0.06 + 0.9 * u)) ** 0.8
@@ -131,7 +131,7 @@ def cloth_leaf(seed: int, frames: int, along: int = 40, across: int = 17) -> Sce
 
 
 def trellis(seed: int) -> Scene:
-    """Stems of a vine that are tied to bars that stand still, and move between these; leaves on the stems."""
+    """Return stems of a vine that are tied to bars that stand still, and move between these; leaves on the stems."""
     rng, scene, time = np.random.default_rng(seed), Assembly(), np.arange(FRAMES) / FPS
     still = np.zeros((FRAMES, 9, 3))
     posts = np.stack([np.linspace(-1, 1, 9), np.zeros(9), np.zeros(9)], axis=1)
@@ -158,7 +158,7 @@ def trellis(seed: int) -> Scene:
 
 
 def ivy(seed: int) -> Scene:
-    """A trunk with limbs that sways, and ivy that clings to it with its leaves."""
+    """Return a trunk with limbs that sways, and ivy that clings to it with its leaves."""
     rng, scene, time = np.random.default_rng(seed), Assembly(), np.arange(FRAMES) / FPS
     rings = 30
     trunk = bent(
@@ -197,13 +197,13 @@ def ivy(seed: int) -> Scene:
 
 
 def _cards(scene: Assembly, rng: np.random.Generator, stems: Stems, branch: np.ndarray, each: int, size: float) -> None:
-    """Leaves of three pairs of vertices on points of stems, each with a flutter of its own."""
+    """Return leaves of three pairs of vertices on points of stems, each with a flutter of its own."""
     stem = np.repeat(np.arange(len(branch)), each)
     foot, base = stems.feet(stem, rng.integers(3, stems.centres.shape[2], len(stem)))
     time = np.arange(FRAMES) / FPS
     heading = sideways(stems.heading[stem], rng.uniform(0, 6.3, len(stem)), 1.2)
     moved = bent(
-        foot, heading, size * rng.uniform(0.6, 1.4, len(stem)), 3, swayed(rng, time, foot[0], 0.3, own=1.0), base
+        foot, heading, size * rng.uniform(0.6, 1.4, len(stem)), 3, swayed(rng, time, foot[0], 0.3, flutter=1.0), base
     )
     width = size * np.array([0.05, 0.4, 0.05])
     scene.add(*covers.ribbons(moved, rng.uniform(0, 6.3, len(stem)), width), branch[stem])

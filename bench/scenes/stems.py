@@ -22,7 +22,7 @@ class Stems:
     heading: np.ndarray
 
     def feet(self, stem: np.ndarray, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (T, M, 3) and rotations (T, M, 3, 3) at points of stems, on which others grow."""
+        """Return places (T, M, 3) and rotations (T, M, 3, 3) at points of stems, on which others grow."""
         return self.centres[:, stem, point], self.turns[:, stem, point]
 
 
@@ -34,7 +34,7 @@ def bent(
     bend: np.ndarray,
     base: np.ndarray | None = None,
 ) -> Stems:
-    """Stems of equal pieces whose tips are turned by `bend` (T, S, 3) against their bases, in even shares.
+    """Return stems of equal pieces whose tips are turned by `bend` (T, S, 3) against their bases, in even shares.
 
     foot: (S, 3), or (T, S, 3) where it moves; base: (T, S, 3, 3) rotations of the feet.
     """
@@ -50,7 +50,7 @@ def bent(
 
 
 def ribbons(stems: Stems, azimuth: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(T, S, 2 P, 3) pairs of vertices and (F, 4) faces; width: (P,) or (S, P), of half a ribbon."""
+    """Return (T, S, 2 P, 3) pairs of vertices and (F, 4) faces; width: (P,) or (S, P), of half a ribbon."""
     side = sideways(stems.heading, azimuth, np.pi / 2)
     across = (stems.turns @ side[:, None, :, None])[..., 0] * np.broadcast_to(width, stems.centres.shape[1:3])[
         ..., None
@@ -61,7 +61,7 @@ def ribbons(stems: Stems, azimuth: np.ndarray, width: np.ndarray) -> tuple[np.nd
 
 
 def tubes(stems: Stems, radius: np.ndarray, sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """(T, S, P * sides, 3) rings and (F, 4) faces; radius: (P,) or (S, P)."""
+    """Return (T, S, P * sides, 3) rings and (F, 4) faces; radius: (P,) or (S, P)."""
     angle = 2 * np.pi * np.arange(sides) / sides
     around = np.stack([sideways(stems.heading, np.full(len(stems.heading), one), np.pi / 2) for one in angle], axis=1)
     offsets = np.einsum("tspij,skj->tspki", stems.turns, around, optimize=True)
@@ -75,7 +75,7 @@ def tubes(stems: Stems, radius: np.ndarray, sides: int) -> tuple[np.ndarray, np.
 def gusts(
     rng: np.random.Generator, time: np.ndarray, place: np.ndarray, speed: float = 2.0, fastest: float = 1.2
 ) -> np.ndarray:
-    """(T, S) strengths about 0 of one wind that travels along x over (S, 3) places."""
+    """Return (T, S) strengths about 0 of one wind that travels along x over (S, 3) places."""
     hertz, phase = rng.uniform(0.15, fastest, GUSTS), rng.uniform(0, 2 * np.pi, GUSTS)
     late = place[:, :1] / speed + rng.normal(0, 0.5, GUSTS) * place[:, 2:] / speed
     waves = np.sin(2 * np.pi * hertz * (time[:, None, None] - late) + phase)
@@ -83,24 +83,29 @@ def gusts(
 
 
 def swayed(
-    rng: np.random.Generator, time: np.ndarray, place: np.ndarray, amount: float, lean: float = 0.2, own: float = 0.25
+    rng: np.random.Generator,
+    time: np.ndarray,
+    place: np.ndarray,
+    amount: float,
+    lean: float = 0.2,
+    flutter: float = 0.25,
 ) -> np.ndarray:
-    """(T, S, 3) bends of stems that stand at places: a lean of each, the wind, and an oscillation of each."""
+    """Return (T, S, 3) bends of stems that stand at places: a lean of each, the wind, and an oscillation of each."""
     count = len(place)
     limp = rng.uniform(0.6, 1.4, count)
     still = rng.normal(0, lean, (count, 3)) * [1, 0, 1]
     push = (limp * (amount + gusts(rng, time, place) * amount))[..., None] * [0.0, 0.0, -1.0]
     waves = np.sin(2 * np.pi * rng.uniform(0.8, 2.5, count) * time[:, None] + rng.uniform(0, 2 * np.pi, count))
-    strength = rng.uniform(0.5, 1.5, count) * own * amount
+    strength = rng.uniform(0.5, 1.5, count) * flutter * amount
     return still + push + (waves * strength)[..., None] * rng.normal(size=(count, 3)) * [1, 0.3, 1]
 
 
 def headings(rng: np.random.Generator, count: int, spread: float) -> np.ndarray:
-    """(S, 3) unit vectors about upwards."""
+    """Return (S, 3) unit vectors about upwards."""
     vectors = UP + rng.normal(0, spread, (count, 3)) * [1, 0, 1]
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 def ground(rng: np.random.Generator, count: int, width: float, depth: float) -> np.ndarray:
-    """(S, 3) feet in a rectangle."""
+    """Return (S, 3) feet in a rectangle."""
     return rng.uniform(-0.5, 0.5, (count, 3)) * [width, 0.0, depth]

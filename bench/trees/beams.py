@@ -37,7 +37,7 @@ CALM_SECONDS, SPIN_UP_SECONDS = 1.0, 4.0  # The wind rises over the former; the 
 def bend(
     plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: float = 0.05, spin_up: float = SPIN_UP_SECONDS
 ) -> np.ndarray:
-    """(T, N, 3) float32 positions of the plant's nodes, from `spin_up` seconds after the wind began."""
+    """Return (T, N, 3) float32 positions of the plant's nodes, from `spin_up` seconds after the wind began."""
     from scipy.sparse.linalg import splu
 
     stiffness, mass, drag = _stiffness(plant), node_mass(plant), node_drag(plant)
@@ -66,7 +66,7 @@ def bend(
 
 
 def _clamped(numbers: np.ndarray) -> np.ndarray:
-    """Of the root, which is held, all are zero."""
+    """Return values with zeros for the root, which is held."""
     numbers[:6] = 0.0
     return numbers
 
@@ -78,9 +78,8 @@ def _diagonal(numbers: np.ndarray) -> csc_matrix:
 
 
 def _stiffness(plant: Plant) -> csc_matrix:
-    """(6N, 6N) for displacements and turns of the nodes, from what every element resists: stretch, twist, and the
-    turns of its two ends against its chord.
-    """
+    """Return (6N, 6N) for displacements and turns of the nodes, from what every element resists: stretch, twist, and
+    the turns of its two ends against its chord."""
     from scipy.sparse import coo_matrix
 
     element = plant.elements[1:]
@@ -117,7 +116,7 @@ def _stiffness(plant: Plant) -> csc_matrix:
 
 
 def node_mass(plant: Plant) -> np.ndarray:
-    """(6N,) masses and moments of inertia of the nodes, with half of each element beside them."""
+    """Return (6N,) masses and moments of inertia of the nodes, with half of each element beside them."""
     length, section = plant.lengths, np.square(plant.radius)
     half = 0.5 * DENSITY * np.pi * section * length
     turned = half * (np.square(length) / 12 + section)
@@ -131,25 +130,25 @@ def node_mass(plant: Plant) -> np.ndarray:
 
 
 def node_drag(plant: Plant) -> np.ndarray:
-    """(6N,) force over the square of the wind's speed."""
+    """Return (6N,) force over the square of the wind's speed."""
     wood = DRAG_OF_WOOD * 2 * plant.radius * plant.lengths
     drag = 0.5 * AIR * (wood + foliage_area(plant))
     return np.stack([drag, 0 * drag], axis=1).repeat(3, axis=1).ravel()
 
 
 def foliage_area(plant: Plant) -> np.ndarray:
-    """(N,) drag coefficient times area of each node's foliage, m2."""
+    """Return (N,) drag coefficient times area of each node's foliage, m2."""
     return FOLIAGE_AREA * (plant.height * plant.height) * plant.foliage
 
 
 def rayleigh(lowest: float, damping: float) -> tuple[float, float]:
-    """Factors of mass and stiffness: `damping` at the lowest frequency and at SECOND_DAMPED times it."""
+    """Return factors of mass and stiffness: `damping` at the lowest frequency and at SECOND_DAMPED times it."""
     high = SECOND_DAMPED * lowest
     return 2 * damping * lowest * high / (lowest + high), 2 * damping / (lowest + high)
 
 
 def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:
-    """Of the undamped plant at rest, rad/s."""
+    """Return the lowest frequency of the undamped plant at rest, rad/s."""
     from scipy.sparse.linalg import eigsh
 
     start = np.ones(len(mass))  # A fixed start makes every run equal.
@@ -157,7 +156,7 @@ def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:
 
 
 def _placed(plant: Plant, displacement: np.ndarray) -> np.ndarray:
-    """(N, 3) nodes of elements that keep their lengths and turn as their chords do."""
+    """Return (N, 3) nodes of elements that keep their lengths and turn as their chords do."""
     element = plant.elements
     change = displacement - displacement[np.maximum(plant.parent, 0)]
     square = np.maximum((element**2).sum(axis=1, keepdims=True), 1e-30)

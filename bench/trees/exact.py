@@ -41,7 +41,7 @@ class Numbers:
         return low + (high - low) * ((self._bits.random_raw(shape) >> np.uint64(11)) * 2.0**-53)
 
     def normal(self, *shape: int) -> np.ndarray:
-        """Sums of four uniform numbers, with mean 0 and variance 1."""
+        """Return sums of four uniform numbers, with mean 0 and variance 1."""
         return reduce(add, self.uniform(-1.0, 1.0, 4, *shape)) * np.sqrt(0.75)
 
 
@@ -72,12 +72,12 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def product(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """(6, M, N) products of (6, 6, N) matrices with (6, M, N) matrices."""
+    """Return (6, M, N) products of (6, 6, N) matrices with (6, M, N) matrices."""
     return reduce(add, (left[:, k, None] * right[k] for k in range(6)))
 
 
 def inverses(matrices: np.ndarray) -> np.ndarray:
-    """(6, 6, N) inverses of symmetric positive definite matrices, by Gauss-Jordan elimination."""
+    """Return (6, 6, N) inverses of symmetric positive definite matrices, by Gauss-Jordan elimination."""
     result = matrices.copy()
     for k in range(6):
         pivot = 1.0 / result[k, k]
@@ -88,7 +88,7 @@ def inverses(matrices: np.ndarray) -> np.ndarray:
 
 
 def grow(orders: tuple[tuple[int, int], ...], height: float, seed: int) -> Plant:
-    """A plant with so many stems of so many elements in all, for each order from the trunk on."""
+    """Return a plant with so many stems of so many elements in all, for each order from the trunk on."""
     numbers = Numbers(seed)
     parent, branch, branch_parent = np.array([-1]), np.array([0]), np.array([-1])
     heading, position, length = UP, np.zeros((3, 1)), np.ones(1)
@@ -133,7 +133,7 @@ def grow(orders: tuple[tuple[int, int], ...], height: float, seed: int) -> Plant
 
 
 def _side(heading: np.ndarray, azimuth: np.ndarray, numbers: Numbers) -> np.ndarray:
-    """Directions of side stems, at an angle to the stems and turned around them by azimuths in turns."""
+    """Return directions of side stems, at an angle to the stems and turned around them by azimuths in turns."""
     helper = np.where(np.abs(heading[2]) < 0.9, [[0.0], [0.0], [1.0]], [[1.0], [0.0], [0.0]])
     across = unit(cross(heading, helper))
     out = cosine(azimuth) * across + sine(azimuth) * cross(heading, across)
@@ -169,7 +169,7 @@ class Gusts:
         self._mean = speed * profile * DIRECTION[:, None]
 
     def at(self, time: float) -> np.ndarray:
-        """(3, N) velocities in m/s."""
+        """Return (3, N) velocities in m/s."""
         air = self._mean.copy()
         along, across = cosine(self._rate * time), sine(self._rate * time)
         for k in range(WAVES):
@@ -194,18 +194,18 @@ class Equations:
             self._groups.append((nodes, below, inverse, passed, passed.transpose(1, 0, 2).copy()))
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """(6, N) displacements and turns under (6, N) loads."""
+        """Return (6, N) displacements and turns under (6, N) loads."""
         load, moved = load.copy(), np.zeros_like(load)
         for nodes, below, _, passed, _ in self._groups:
             load[:, below] -= reduce(add, (passed * load[:, nodes]).transpose(1, 0, 2))
-        for nodes, below, inverse, _, taken in reversed(self._groups):
-            held = reduce(add, (taken * moved[:, below]).transpose(1, 0, 2))
+        for nodes, below, inverse, _, factors in reversed(self._groups):
+            held = reduce(add, (factors * moved[:, below]).transpose(1, 0, 2))
             moved[:, nodes] = reduce(add, (inverse * load[:, nodes]).transpose(1, 0, 2)) - held
         return moved
 
 
 def _stiffness(plant: Plant, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """(6, 6, N) blocks of the nodes, and those between each node's parent (rows) and the node (columns)."""
+    """Return (6, 6, N) blocks of the nodes, and those between each node's parent (rows) and the node (columns)."""
     element = plant.elements.T.copy()
     element[:, 0] = UP[:, 0]
     length = np.sqrt(dot(element, element))
@@ -229,7 +229,7 @@ def _blocks(*parts: np.ndarray) -> np.ndarray:
 
 
 def _tips_first(plant: Plant) -> Iterator[np.ndarray]:
-    """Every node but the root after those it carries, in groups of which no two nodes have one parent."""
+    """Yield every node but the root after those it carries, in groups of which no two nodes have one parent."""
     for nodes in reversed(plant.generations[1:]):
         while len(nodes):
             first = np.unique(plant.parent[nodes], return_index=True)[1]
@@ -240,7 +240,7 @@ def _tips_first(plant: Plant) -> Iterator[np.ndarray]:
 def bend(
     plant: Plant, gusts: Gusts, speed: float, frames: int, hertz: float, damping: float, spin_up: float
 ) -> np.ndarray:
-    """(T, N, 3) float32 positions of the plant's nodes; beams.bend, with the lowest frequency given in Hz."""
+    """Return (T, N, 3) float32 positions of the plant's nodes; beams.bend, with the lowest frequency given in Hz."""
     mass, drag = (part(plant).reshape(-1, 6).T for part in (node_mass, node_drag))
     mass_factor, stiffness_factor = rayleigh(2 * np.pi * hertz, damping)
     friction = drag * speed
@@ -269,7 +269,8 @@ def bend(
 
 
 def _placed(plant: Plant, displacement: np.ndarray) -> np.ndarray:
-    """(3, N) nodes of elements that keep their lengths and turn as their chords do; a turn t is by 2 arctan(t / 2)."""
+    """Return (3, N) nodes of elements that keep their lengths and turn as their chords do; a turn t is by 2 arctan(t /
+    2)."""
     element = plant.elements.T
     change = displacement - displacement[:, np.maximum(plant.parent, 0)]
     half = 0.5 * cross(element, change) / np.maximum(dot(element, element), 1e-30)
@@ -346,7 +347,7 @@ class Cards:
         )
 
     def _turns(self, numbers: Numbers) -> np.ndarray:
-        """(T, 4, N) quaternions, scalar first; frames between keys halve the turn, twice for four frames."""
+        """Return (T, 4, N) quaternions, scalar first; frames between keys halve the turn, twice for four frames."""
         half = numbers.normal(self.keys, 3, self.cards) * (np.array(self.degrees)[:, None] / 720.0)
         half[0] = 0.0
         x, y, z = (_about(axis, half[:, axis]) for axis in range(3))
@@ -363,7 +364,7 @@ class Cards:
 
 
 def _about(axis: int, half: np.ndarray) -> np.ndarray:
-    """(K, 4, N) quaternions of turns about a coordinate axis, from half of the angles in turns."""
+    """Return (K, 4, N) quaternions of turns about a coordinate axis, from half of the angles in turns."""
     result = np.zeros((len(half), 4, half.shape[1]))
     result[:, 0], result[:, 1 + axis] = cosine(half), sine(half)
     return result

@@ -36,7 +36,7 @@ SETTLING_SECONDS = 24.0
 def leafed(
     nodes: int, orders: int, height: float, sprays: int, frames: int, winds: Mapping[str, float], seed: int, fps: float
 ) -> MotionClip:
-    """The tree in one loop for each of the winds (m/s)."""
+    """Return the tree in one loop for each of the winds (m/s)."""
     plant = grow(nodes, orders, height, seed)
 
     def moved(wind: Wind) -> MotionClip:
@@ -48,7 +48,7 @@ def leafed(
 def in_winds(
     moved: Callable[[Wind], MotionClip], winds: Mapping[str, float], height: float, frames: int, fps: float, seed: int
 ) -> MotionClip:
-    """One loop for each of the winds, whose speeds (m/s) are those at `height`."""
+    """Return one loop for each of the winds, whose speeds (m/s) are those at `height`."""
     parts = {}
     for name, speed in winds.items():
         part = moved(Wind(speed, height, seed=seed, period=frames / fps))
@@ -101,7 +101,7 @@ class _Dressed:
 
 
 def leaf_uv(along: np.ndarray, shade: np.ndarray) -> np.ndarray:
-    """(V L, 2) of leaves with pairs of vertices across them, at these shares of their lengths."""
+    """Return (V L, 2) of leaves with pairs of vertices across them, at these shares of their lengths."""
     card = np.stack([np.tile([0.0, 1.0], len(along)), np.repeat(along, 2)], axis=1)
     uv = np.tile(card, (len(shade), 1))
     uv[:, 0] += 1 + 2 * np.repeat(shade, len(card))
@@ -112,7 +112,7 @@ _LEAF = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
 
 
 def _spray() -> Species:
-    """Leaves along a short twig, one at its end, lying about in one plane as light lets them."""
+    """Return the species of leaves along a short twig, one at its end, lying about in one plane as light lets them."""
     points, quads = _LEAF
     cards = []
     for number in range(LEAVES_OF_SPRAY):
@@ -128,7 +128,7 @@ def _spray() -> Species:
 
 
 def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
-    """The stems as splines, their motion twice over: leaves settle in the first round."""
+    """Return the stems as splines, their motion twice over: leaves settle in the first round."""
     time = np.arange(len(nodes)) / fps
     bare = Skeleton(nodes, plant.position, plant.parent, plant.branch, plant.branch_parent, plant.radius, time)
     splines = _Splines(bare, FINER)
@@ -141,7 +141,7 @@ def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
 
 
 def _drawn_radius(plant: Plant, splines: _Splines, rest: np.ndarray) -> np.ndarray:
-    """(V,) with a thicker trunk, its foot wider, and tips that end thin."""
+    """Return (V,) with a thicker trunk, its foot wider, and tips that end thin."""
     start, end = splines.controls[:, 1], splines.controls[:, 2]
     same = plant.branch[start] == plant.branch[end]
     share = splines.share
@@ -177,7 +177,7 @@ class _Splines:
 
 
 def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 4) nodes and weights of vertices that lie at the fractions t of the elements below `node`."""
+    """Return (V, 4) nodes and weights of vertices that lie at the fractions t of the elements below `node`."""
     parent, branch = skeleton.parent, skeleton.branch
     start = np.maximum(parent[node], 0)
     before = np.where((branch[start] == branch[node]) & (start > 0), parent[start], -1)

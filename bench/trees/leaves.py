@@ -65,14 +65,14 @@ class Species:
 
 
 def sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices in pairs across the leaf, and the quads between them."""
+    """Return vertices in pairs across the leaf, and the quads between them."""
     pairs = [[(x, -y, z), (x, y, z)] for x, y, z in zip(along, half, fold, strict=True)]
     first = 2 * np.arange(len(along) - 1)[:, None]
     return np.array(pairs).reshape(-1, 3), first + [0, 1, 3, 2]
 
 
 def _leaflets(places: list[tuple[float, float, float]], size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Quads at (along, across) that point away by an angle."""
+    """Return quads at (along, across) that point away by an angle."""
     card, quad = sheet([0.0, size], [0.2 * size, 0.2 * size], [0.0, 0.0])
     blades = []
     for along, across, angle in places:
@@ -111,7 +111,7 @@ class Leaves:
         self.stiffness = rng.uniform(0.7, 1.4, count)
 
     def at(self, nodes: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """(..., V L, 3) vertices from (..., N, 3) nodes and (..., L, 4) quaternions."""
+        """Return (..., V L, 3) vertices from (..., N, 3) nodes and (..., L, 4) quaternions."""
         local = np.einsum("...lij,vj->...lvi", _matrices(turns), self.species.blade) * self.length[:, None, None]
         carried = self.skeleton.turns(nodes, self.node) @ self.axes
         points = nodes[..., self.node, None, :] + np.einsum("...lij,...lvj->...lvi", carried, local)
@@ -123,21 +123,21 @@ class Leaves:
         return (first + self.species.faces).reshape(-1, 4)
 
     def unturned(self) -> np.ndarray:
-        """(L, 4)"""
+        """Return (L, 4)"""
         return np.repeat([[1.0, 0.0, 0.0, 0.0]], len(self.node), axis=0)
 
     def flown(self, wind: Wind) -> np.ndarray:
-        """(T, L, 4) float32 quaternions, from the pose as grown to its own in the wind."""
+        """Return (T, L, 4) float32 quaternions, from the pose as grown to its own in the wind."""
         feet = self.skeleton.rest[self.node]
         share = sheltered(feet, self.area(), LEE_CELL * self.skeleton.height)[:, None]
         return self.turned(lambda points, seconds: share * wind.at(points, seconds), Plates(self))
 
     def area(self) -> np.ndarray:
-        """(L,) m2."""
+        """Return (L,) m2."""
         return self.species.width * self.species.chord * self.length**2
 
     def turned(self, air: Air, plates: Plates) -> np.ndarray:
-        """(T, L, 4) float32 quaternions of plates that start as they are."""
+        """Return (T, L, 4) float32 quaternions of plates that start as they are."""
         frames = len(self.skeleton.time)
         step = 1.0 / 30.0 if frames < 2 else float(self.skeleton.time[1] - self.skeleton.time[0])
         turns = np.empty((frames, len(self.node), 4), np.float32)
@@ -214,7 +214,7 @@ class Plates:
         self.turn = _advanced(self.turn, seconds * self.speed)
 
     def _pressed(self, wind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(3, L) moments of the wind about the hinges, and how they fall with the angular velocities."""
+        """Return (3, L) moments of the wind about the hinges, and how they fall with the angular velocities."""
         flat = np.hypot(wind[0], wind[1])
         speed = np.sqrt(flat**2 + wind[2] ** 2) + LEAST_WIND
         sine = np.abs(wind[2]) / speed
@@ -229,7 +229,8 @@ class Plates:
 
 
 def sheltered(points: np.ndarray, area: np.ndarray, cell: float) -> np.ndarray:
-    """(L,) the share of the wind that is left behind the leaves that stand up wind, in columns along the wind."""
+    """Return (L,) the share of the wind that is left behind the leaves that stand up wind, in columns along the
+    wind."""
     side = np.cross(DIRECTION, [0.0, 1.0, 0.0])
     column = np.floor(np.stack([points @ side, points[:, 1]]) / cell)
     order = np.lexsort((points @ DIRECTION, *column))
@@ -242,27 +243,27 @@ def sheltered(points: np.ndarray, area: np.ndarray, cell: float) -> np.ndarray:
 
 
 def _minor(a: np.ndarray, b: np.ndarray, i: int) -> np.ndarray:
-    """Component i of the cross product of (3, L)."""
+    """Return component i of the cross product of (3, L)."""
     j, k = (i + 1) % 3, (i + 2) % 3
     return a[j] * b[k] - a[k] * b[j]
 
 
 def _turned_back(turn: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Vectors (3, L) by the inverse of unit quaternions (4, L)."""
+    """Return vectors (3, L) turned by the inverse of unit quaternions (4, L)."""
     axis = turn[1:]
     first = np.stack([2 * _minor(vectors, axis, i) for i in range(3)])
     return vectors + turn[0] * first + np.stack([_minor(first, axis, i) for i in range(3)])
 
 
 def _rotation_vectors(turn: np.ndarray) -> np.ndarray:
-    """(3, L) of unit quaternions (4, L), the shorter way round."""
+    """Return (3, L) of unit quaternions (4, L), the shorter way round."""
     sine = np.sqrt((turn[1:] ** 2).sum(axis=0))
     half = np.arctan2(sine, np.abs(turn[0]))
     return np.where(turn[0] < 0, -2.0, 2.0) * half / np.maximum(sine, 1e-12) * turn[1:]
 
 
 def _advanced(turn: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Quaternions (4, L) after turns about their own axes by small rotation vectors (3, L)."""
+    """Return quaternions (4, L) after turns about their own axes by small rotation vectors (3, L)."""
     half = 0.5 * angle
     w, v = turn[0], turn[1:]
     moved = np.empty_like(turn)
@@ -273,7 +274,7 @@ def _advanced(turn: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def _matrices(turns: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) of quaternions (..., 4)."""
+    """Return (..., 3, 3) of quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(turns.astype(np.float64), -1, 0)
     rows = [
         *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

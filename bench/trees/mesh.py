@@ -19,7 +19,7 @@ SIDES = 6
 def dress(
     clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar", sides: int = SIDES
 ) -> MotionClip:
-    """The first frames of a simulated clip as a mesh with so many leaves, and tubes of so many sides."""
+    """Return the first frames of a simulated clip as a mesh with so many leaves, and tubes of so many sides."""
     skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
     tubes = Tubes(skeleton, sides)
     cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
@@ -64,7 +64,7 @@ class Tubes:
         self.faces = _tube_faces(ring_branch, sides)
 
     def _circles(self, radius: np.ndarray) -> np.ndarray:
-        """(rings, sides, 3) around the elements of the rest pose, without twist from ring to ring."""
+        """Return (rings, sides, 3) around the elements of the rest pose, without twist from ring to ring."""
         along = self.skeleton.direction(self.skeleton.rest, self.carrier)
         helper = np.eye(3)[np.abs(self._chords()).argmin(axis=1)]
         first = np.cross(along, helper)
@@ -74,7 +74,7 @@ class Tubes:
         return radius[:, None, None] * around.transpose(1, 0, 2)
 
     def _chords(self) -> np.ndarray:
-        """(rings, 3) base to tip of the ring's stem: one helper axis per stem keeps its rings aligned."""
+        """Return (rings, 3) base to tip of the ring's stem: one helper axis per stem keeps its rings aligned."""
         branch = self.skeleton.branch
         last = len(branch) - 1 - np.unique(branch[::-1], return_index=True)[1]
         first = np.unique(branch, return_index=True)[1]
@@ -89,7 +89,7 @@ class Tubes:
 
 
 def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
-    """(F, 4) quads between each ring and the next one of its stem."""
+    """Return (F, 4) quads between each ring and the next one of its stem."""
     lower = sides * np.flatnonzero(ring_branch[1:] == ring_branch[:-1])[:, None]
     side, following = np.arange(sides), (np.arange(sides) + 1) % sides
     upper = lower + sides
@@ -97,7 +97,7 @@ def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
 
 
 def bark_uv(skeleton: Skeleton, tubes: Tubes) -> np.ndarray:
-    """(count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
+    """Return (count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
     below = skeleton.rest[np.maximum(skeleton.parent, 0)]
     length = np.linalg.norm(skeleton.rest - below, axis=1)
     girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])

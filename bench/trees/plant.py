@@ -74,7 +74,7 @@ class Plant:
         return np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def clip(self, positions: np.ndarray, time: np.ndarray, fps: float, **metadata: Any) -> MotionClip:
-        """The motion of its nodes, (T, N, 3) positions at (T,) seconds."""
+        """Return the motion of its nodes, (T, N, 3) positions at (T,) seconds."""
         return MotionClip(
             positions,
             time,
@@ -88,7 +88,7 @@ class Plant:
 
 
 def grow(nodes: int, orders: int, height: float, seed: int) -> Plant:
-    """A plant of exactly `nodes` nodes with stems of the orders 0 to `orders`. ValueError for too few."""
+    """Return a plant of exactly `nodes` nodes with stems of the orders 0 to `orders`. ValueError for too few."""
     fewest = 1 + SMALLEST_STEM * (orders + 1)
     if nodes < fewest:
         raise ValueError(f"plant: got {nodes} nodes for orders 0 to {orders}, expected at least {fewest}")
@@ -115,7 +115,7 @@ class _Grower:
         self.shortening = 0.1 ** (1.0 / max(2, orders))
 
     def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int, order: int) -> None:
-        """A stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
+        """Grow a stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
         branch = len(self.branch_parent)
         self.branch_parent.append(below)
         count, budgets = self._share(budget, self.orders - order)
@@ -130,7 +130,7 @@ class _Grower:
             self.stem(nodes[fork], branch, side, side_length, int(side_budget), order + 1)
 
     def _share(self, budget: int, levels_above: int) -> tuple[int, np.ndarray]:
-        """Elements of the stem itself, and of each of its side stems with all they carry."""
+        """Return elements of the stem itself, and of each of its side stems with all they carry."""
         if levels_above == 0:
             return budget, np.zeros(0, int)
         reserve = SMALLEST_STEM * levels_above
@@ -145,7 +145,7 @@ class _Grower:
     def _elements(
         self, base: int, branch: int, direction: np.ndarray, length: float, count: int, order: int
     ) -> tuple[list[int], list[np.ndarray]]:
-        """Appends the stem's nodes; gives their numbers and the directions of their elements."""
+        """Append the stem's nodes; gives their numbers and the directions of their elements."""
         nodes, directions = [], []
         for _ in range(count):
             upwards = 0.0 if order == 0 else 0.6 / count
@@ -169,7 +169,7 @@ def _side_direction(direction: np.ndarray, azimuth: float, angle: float) -> np.n
 
 
 def sum_above(parent: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """(N,) each node's value and those of all nodes that it carries."""
+    """Return (N,) each node's value and those of all nodes that it carries."""
     total = values.astype(np.float64).copy()
     for node in range(len(parent) - 1, 0, -1):
         total[parent[node]] += total[node]

@@ -29,7 +29,7 @@ class Skeleton:
 
     @classmethod
     def of(cls, clip: MotionClip, frames: int) -> Skeleton:
-        """The first `frames` frames of a clip as bench.data makes it from a simulation."""
+        """Return the first `frames` frames of a clip as bench.data makes it from a simulation."""
         parent = np.full(clip.vertex_count, -1)
         parent[clip.edges[:, 1]] = clip.edges[:, 0]
         return cls(
@@ -47,29 +47,29 @@ class Skeleton:
         return float(self.rest[:, 1].max())
 
     def direction(self, positions: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """(..., M, 3) unit vectors along the nodes' elements; the root has that of the node after it."""
+        """Return (..., M, 3) unit vectors along the nodes' elements; the root has that of the node after it."""
         nodes = np.maximum(nodes, 1)
         along = positions[..., nodes, :] - positions[..., self.parent[nodes], :].astype(np.float64)
         return along / np.linalg.norm(along, axis=-1, keepdims=True)
 
     def turns(self, positions: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """(..., M, 3, 3) the smallest rotations of the nodes' elements from the rest pose."""
+        """Return (..., M, 3, 3) the smallest rotations of the nodes' elements from the rest pose."""
         return smallest_turns(self.direction(self.rest, nodes), self.direction(positions, nodes))
 
     def outer_nodes(self) -> np.ndarray:
-        """Nodes on stems that carry no others."""
+        """Return nodes on stems that carry no others."""
         return np.flatnonzero(~np.isin(self.branch, self.branch_parent))
 
 
 def smallest_turns(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) rotations that take unit vectors to unit vectors, by Rodrigues' formula without angles."""
+    """Return (..., 3, 3) rotations that take unit vectors to unit vectors, by Rodrigues' formula without angles."""
     axis, cosine = np.cross(start, end), (start * end).sum(axis=-1)
     cross = cross_matrices(axis)
     return np.eye(3) + cross + cross @ cross / np.maximum(1.0 + cosine, 1e-6)[..., None, None]
 
 
 def rotations(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) rotations by rotation vectors (axis times angle)."""
+    """Return (..., 3, 3) rotations by rotation vectors (axis times angle)."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
     cross = cross_matrices(vectors)
     half = np.sinc(angle / (2 * np.pi))
@@ -77,14 +77,14 @@ def rotations(vectors: np.ndarray) -> np.ndarray:
 
 
 def cross_matrices(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) matrices that multiply as cross products."""
+    """Return (..., 3, 3) matrices that multiply as cross products."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
 
 
 def sideways(direction: np.ndarray, azimuth: np.ndarray, angle: float) -> np.ndarray:
-    """(M, 3) unit vectors at an angle to unit vectors, turned around them by azimuths."""
+    """Return (M, 3) unit vectors at an angle to unit vectors, turned around them by azimuths."""
     helper = np.eye(3)[np.abs(direction).argmin(axis=1)]
     first = np.cross(direction, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

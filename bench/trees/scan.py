@@ -43,12 +43,12 @@ class Scan:
 
 
 def thickened(skeleton: MotionClip, factor: float) -> MotionClip:
-    """The skeleton with stems so many times as thick."""
+    """Return the skeleton with stems so many times as thick."""
     return skeleton.replace(attributes=skeleton.attributes | {"radius": factor * skeleton.attributes["radius"]})
 
 
 def scanned(clip: MotionClip, cell: float, noise: float, seed: int) -> MotionClip:
-    """A scan of a simulated clip, with its own motion. cell and noise, a standard deviation, are in metres."""
+    """Return a scan of a simulated clip, with its own motion. cell and noise, a standard deviation, are in metres."""
     random, skeleton = np.random.default_rng(seed), Skeleton.of(clip, clip.frame_count)
     scan = _skin(skeleton, cell, random)
     tubes = Tubes(skeleton, SIDES)
@@ -70,18 +70,18 @@ def scanned(clip: MotionClip, cell: float, noise: float, seed: int) -> MotionCli
 
 
 def _distance(points: np.ndarray, skeleton: Skeleton) -> np.ndarray:
-    """The distance of points (n, 3) from the nearest stem's bark, below 0 inside."""
+    """Return the distance of points (n, 3) from the nearest stem's bark, below 0 inside."""
     child = np.flatnonzero(skeleton.parent >= 0)
     start, radius = skeleton.parent[child], skeleton.radius.astype(np.float64)
-    found = np.full(len(points), np.inf)
+    distance = np.full(len(points), np.inf)
     for a, b in zip(start.tolist(), child.tolist()):
         low, chord = skeleton.rest[a], skeleton.rest[b] - skeleton.rest[a]
         # A side stem is as thick at its foot as at its first node.
         thick = radius[a] if skeleton.branch[a] == skeleton.branch[b] else radius[b]
         share = np.clip((points - low) @ chord / (chord @ chord), 0.0, 1.0)
         away = np.linalg.norm(points - low - share[:, None] * chord, axis=1)
-        found = np.minimum(found, away - (thick + share * (radius[b] - thick)))
-    return found
+        distance = np.minimum(distance, away - (thick + share * (radius[b] - thick)))
+    return distance
 
 
 def _skin(skeleton: Skeleton, cell: float, random: np.random.Generator) -> Scan:
@@ -138,7 +138,7 @@ class _Ride:
         self._off = np.zeros(points.shape)
 
     def hold(self, carrier: np.ndarray, points: np.ndarray) -> None:
-        """Takes the points as they are in this pose of the carrier."""
+        """Take the points as they are in this pose of the carrier."""
         foot, frame = self._frames(carrier)
         self._off = np.einsum("pji,pj->pi", frame, points - foot)
 
@@ -175,14 +175,14 @@ class _Membrane:
         self._across = rows[:, self._held]
 
     def of(self, displacement: np.ndarray) -> np.ndarray:
-        found = displacement.copy()
-        found[self._free] = self._solved.solve(-(self._across @ displacement[self._held]))
-        return found
+        moved = displacement.copy()
+        moved[self._free] = self._solved.solve(-(self._across @ displacement[self._held]))
+        return moved
 
 
 def _nearest_on(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The shares (..., 3) of corners in the places on triangles (..., 3, 3) that are nearest to points, about, and how
-    far away these are: shares in the plane, cut off at 0."""
+    """Return the shares (..., 3) of corners in the places on triangles (..., 3, 3) that are nearest to points, about,
+    and how far away these are: shares in the plane, cut off at 0."""
     a, u, v = corners[..., 0, :], corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
     w = points - a
     uu, uv, vv = ((x * y).sum(axis=-1) for x, y in ((u, u), (u, v), (v, v)))

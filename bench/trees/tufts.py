@@ -53,7 +53,7 @@ class Arch:
         return np.stack([-np.sin(self.azimuth), np.zeros(len(self.azimuth)), np.cos(self.azimuth)], axis=1)
 
     def plant(self, count: int) -> Plant:
-        """With a foot and `count` nodes above it to each stem."""
+        """Plant stems, each with a foot and `count` nodes above it."""
         stems, share = len(self.foot), (np.arange(count) + 0.5) / count
         away = np.stack([np.cos(self.azimuth), np.zeros(stems), np.sin(self.azimuth)], axis=1)
         angle = self.start[:, None] + (self.end - self.start)[:, None] * share**1.4
@@ -76,7 +76,7 @@ class Arch:
 
 
 def grass(blades: int, height: float, frames: int, winds: Mapping[str, float], seed: int, fps: float) -> MotionClip:
-    """A tuft in one loop for each of the winds (m/s)."""
+    """Return a tuft in one loop for each of the winds (m/s)."""
     count = 6
     rng = np.random.default_rng(seed)
     far = np.sqrt(rng.uniform(0.01, 1, blades))
@@ -98,7 +98,7 @@ def grass(blades: int, height: float, frames: int, winds: Mapping[str, float], s
 
 
 def _skeleton(plant: Plant, nodes: np.ndarray, radius: np.ndarray, fps: float) -> Skeleton:
-    """The plant with nodes at these places in each frame, and stems of this radius."""
+    """Return the plant with nodes at these places in each frame, and stems of this radius."""
     rest, time = plant.position.astype(np.float32), np.arange(len(nodes)) / fps
     return Skeleton(nodes, rest, plant.parent, plant.branch, plant.branch_parent, radius, time)
 
@@ -151,7 +151,7 @@ class _Ribbons:
 def fern(
     fronds: int, pairs: int, height: float, frames: int, winds: Mapping[str, float], seed: int, fps: float
 ) -> MotionClip:
-    """A fern with so many pairs of pinnae to a frond, in one loop for each of the winds (m/s)."""
+    """Return a fern with so many pairs of pinnae to a frond, in one loop for each of the winds (m/s)."""
     rng = np.random.default_rng(seed)
     inner = np.arange(fronds) / fronds  # the younger fronds stand steeper
     arch = Arch(

@@ -33,7 +33,7 @@ class Wind:
     period: float = 0.0
 
     def at(self, points: np.ndarray, time: float) -> np.ndarray:
-        """(..., 3) velocities in m/s at (..., 3) points in metres, y up."""
+        """Return (..., 3) velocities in m/s at (..., 3) points in metres, y up."""
         gusts = self._gusts(np.asarray(points, np.float32).reshape(-1, 3), time)
         profile = np.clip(np.asarray(points)[..., 1:2] / self.height, 0.0, None) ** PROFILE_EXPONENT
         return profile * self.speed * DIRECTION + gusts.reshape(np.shape(points)).astype(np.float64)

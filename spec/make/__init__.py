@@ -19,25 +19,25 @@ for part in sorted(path.stem for path in Path(__file__).parent.glob("[a-z]*.py")
 
 
 def results(data: bytes, mesh: bytes | None = None) -> dict[str, str]:
-    """The document's result for every item of a file."""
+    """Return the document's result for every item of a file."""
     return {item: conformance.result(conformance.document, data, item, mesh) for item in conformance.items(data)}
 
 
 def line_of(vector: Vector, data: bytes) -> str:
-    """The line in expected.txt. Raises ValueError if the document's result is not the vector's."""
-    found = results(data, vector.mesh)
-    wrong = {item: result for item, result in found.items() if result in conformance.ERRORS}
-    if (vector.error and found.get(vector.item) != vector.error) or (not vector.error and wrong):
-        raise ValueError(f"{vector.path}: got {found}; expected {vector.error or 'no error'} {vector.item}")
+    """Return the line in expected.txt. Raises ValueError if the document's result is not the vector's."""
+    outcome = results(data, vector.mesh)
+    wrong = {item: result for item, result in outcome.items() if result in conformance.ERRORS}
+    if (vector.error and outcome.get(vector.item) != vector.error) or (not vector.error and wrong):
+        raise ValueError(f"{vector.path}: got {outcome}; expected {vector.error or 'no error'} {vector.item}")
     first = next(iter(wrong), "")
     also_strict = first == "strict" and (vector.item == "open" or vector.error == "TRUNCATED")
     if vector.error and first != vector.item and not also_strict:
-        raise ValueError(f"{vector.path}: got {found}; expected nothing wrong before {vector.item}")
-    return conformance.format_line(vector.path, data, found, vector.reason)
+        raise ValueError(f"{vector.path}: got {outcome}; expected nothing wrong before {vector.item}")
+    return conformance.format_line(vector.path, data, outcome, vector.reason)
 
 
 def write(folder: Path = conformance.FOLDER) -> int:
-    """Writes missing vectors; returns their number."""
+    """Write missing vectors; returns their number."""
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"

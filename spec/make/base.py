@@ -82,7 +82,7 @@ def points_of(text: str) -> list[list[float]]:
 
 
 def lone(**fields) -> Plant:
-    """One vertex, one frame."""
+    """Return one vertex, one frame."""
     return Plant([Stem(-1, 1)], points=[[4.0, 8.0, 12.0]], **fields)
 
 
@@ -90,7 +90,7 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 
 
 def forked(**fields) -> Plant:
-    """A trunk and a branch, four frames in two segments, every kind of motion chunk."""
+    """Return a trunk and a branch, four frames in two segments, every kind of motion chunk."""
     scripts = {
         (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
         (STEMS, 1): 1,
@@ -106,12 +106,12 @@ def fork() -> Draft:
 
 
 def still(stems: list[Stem], **fields) -> Plant:
-    """A plant whose rows are all empty."""
+    """Return a plant whose rows are all empty."""
     return Plant(stems, **fields)
 
 
 def moving(stems: list[Stem], seed: int, frames: int = 3, segments: int = 1, **fields) -> Plant:
-    """Random rows at all levels."""
+    """Return a plant with random rows at all levels."""
     scripts = {}
     for level in range(33):
         scripts[STEMS, level] = 100 * seed + level
@@ -150,7 +150,7 @@ UNTURNED = stems_of(
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:
-    """Three layers of random rows and rest poses."""
+    """Return three layers of random rows and rest poses."""
     plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
     plant.scripts |= {
         (STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)
@@ -166,7 +166,7 @@ def header(title: str, **fields) -> None:
 
 
 def joins(*widths: float) -> tuple[Join, ...]:
-    """Of each level and segment; a half more where they are sloped."""
+    """Return joins, one for each level and segment, from widths; the fraction 0.5 means that a join is sloped."""
     return tuple(Join(int(width), width % 1 > 0) for width in widths)
 
 
@@ -184,7 +184,7 @@ def inserted(at: int, *entries: Entry) -> Draft:
 
 
 def cut(short: Callable[[Draft], int], draft: Draft | None = None) -> bytes:
-    """The first chunks of a file, of the fork if none is given, less some bytes."""
+    """Return the first chunks of a file, of the fork if none is given, less some bytes."""
     draft = draft or fork()
     return draft.file()[: short(draft)]
 
@@ -215,13 +215,13 @@ def forked_plan():
 
 
 def placed(stems: list[Stem], points: Sequence, seed: int, frames: int = 3, **fields) -> Plant:
-    """Random rows of stems that rest at any points, in binary64."""
+    """Return random rows of stems that rest at any points, in binary64."""
     rest = exact_rest(stems, np.array(points, float).ravel().tolist(), True)
     return moving(stems, seed, frames, **{"rest": rest, "heads": HEADS} | fields)
 
 
 def not_refused(make: Callable[[], Draft]) -> bytes:
-    """The file with streams that go on behind what is refused."""
+    """Return the file with streams that go on behind what is refused."""
     kept, rules.require = rules.require, lambda *_: None
     try:
         return make().file()
@@ -235,5 +235,6 @@ SHORT, LARGEST = [Stem(-1, 3)], (1 << 30) - 1
 
 
 def copied(rank: int, place: Sequence[int] = (0, 0, 0, 0), largest: int = 0, mirrored: int = 0) -> list:
-    """Script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its turn."""
+    """Return script of a copy of the shape of that rank: differences of its scale and of the smaller numbers of its
+    turn."""
     return [1, rank, mirrored, place[0], largest >> 1, largest & 1, *place[1:]]

@@ -28,7 +28,8 @@ def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
 
 
 def shrunk(last: int) -> Plant:
-    """A row that 15 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in 1/8192."""
+    """Return a row that 15 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in
+    1/8192."""
     known = [[1235] * 44] * 14 + [[last] * 44]
     rows = [[entry / 8192 for entry in entries] for entries in known]
     in_waves = basis_in_waves(44, -200, *row((1, 0, 0)), rank=16, known=rows)

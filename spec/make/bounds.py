@@ -5,7 +5,7 @@ from spec.make.predicted import predicted, swayed
 
 
 def mode_and_more(share: float) -> list[list[float]]:
-    """Two places along x as the first mode of a sheet of two vertices, but for a share of it."""
+    """Return two places along x as the first mode of a sheet of two vertices, but for a share of it."""
     mode = rules.cantilever((4, 4), 0.1, 0.001, 1.0)[0]
     across = np.array([-mode[1], mode[0]])
     return [[x, 0.0, 0.0] for x in mode + share * across]

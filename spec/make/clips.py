@@ -6,7 +6,7 @@ CALM, STORM = Clip(3, 1, "calm"), Clip(4, 2, "storm")
 
 
 def two_clips(**fields) -> Draft:
-    """The fork with two clips, of 3 frames, and of 4 in two segments."""
+    """Return the fork with two clips, of 3 frames, and of 4 in two segments."""
     return forked(**{"clips": (CALM, STORM)} | fields).draft()
 
 
@@ -19,7 +19,7 @@ def periodic(clip: Clip, *seams: float) -> Clip:
 
 
 def named(*names: str) -> Plant:
-    """One vertex with a clip of a frame for each name."""
+    """Return one vertex with a clip of a frame for each name."""
     return lone(clips=tuple(Clip(1, 1, name) for name in names))
 
 
@@ -27,14 +27,14 @@ CALM_ENTRY, STORM_ENTRY = CALM.entry(), STORM.entry()
 
 
 def clips(title: str, *entries: bytes, count: int = 2) -> None:
-    """The two clips with another CLIPS."""
+    """Declare a vector of the two clips with another CLIPS."""
     invalid(
         f"clips-{title}", lambda: two_clips().with_header(clip_count=count).change(CLIPS, content=b"".join(entries))
     )
 
 
 def lone_clips(frames: int, segments: int, *entries: bytes, **header_fields) -> Draft:
-    """One vertex, and any CLIPS."""
+    """Return one vertex, and any CLIPS."""
     draft = lone(frames=frames, segments=segments).add(Entry(CLIPS, b"".join(entries)))
     return draft.with_header(clip_count=len(entries), **header_fields)
 
@@ -221,8 +221,8 @@ invalid(
 )
 for code in (0x00, 0x01, 0x0A, 0x1F, 0x7F):
     clips(f"name-control-{code:02x}: U+{code:04X} in a Name", CALM_ENTRY, clip_entry(4, 2, f"st{chr(code)}rm"))
-for what, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
-    clips(f"seam-{what}: the last of Seam_Errors is {value}", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
+for word, value in (("nan", NAN), ("infinite", INFINITY), ("negative", -FLOAT_TINY)):
+    clips(f"seam-{word}: the last of Seam_Errors is {value}", CALM_ENTRY, clip_entry(4, 2, "storm", (0.0, 0.0, value)))
 clips("seams-missing: a Loop without Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", flags=1))
 clips("seams-cut: ends inside Seam_Errors", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0, 1.0))[:-1])
 clips("seams-less: Seam_Errors of two levels of three", CALM_ENTRY, clip_entry(4, 2, "storm", (1.0, 1.0)))

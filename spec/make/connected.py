@@ -13,7 +13,7 @@ def connected(
     order: list | None = None,
     **fields,
 ) -> Plant:
-    """BY_VERTEX, by faces."""
+    """Return a plant with the stems of BY_VERTEX, whose rest pose is coded by faces."""
     content, branches, script = make_faces(), branches_of(BY_VERTEX), Chance(seed, large=6)
     count = sum(stem.count for stem in BY_VERTEX)
     mesh = mesh_of(content, order or list(range(count)), fields.get("places"))
@@ -28,7 +28,7 @@ def connected(
 
 
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
-    """A rest pose by faces, of any sizes."""
+    """Return a rest pose by faces, of any sizes."""
     count, step = sum(stem.count for stem in stems), 0.3
     places = fields.get("places")
     content = mixed_polygons(faces, count if places is None else places)
@@ -39,7 +39,7 @@ def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **f
 
 
 def hub(first: int, quads: int, edges: int) -> list[list[int]]:
-    """Faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
+    """Return faces whose last vertex completes so many parallelograms at once, and has so many neighbours more."""
     chain = list(range(first, first + 2 * quads + edges))
     middle, across = len(chain) + first + 1, len(chain) + first
     faces = [[middle, chain[2 * i], across, chain[2 * i + 1]] for i in range(quads)]
@@ -69,7 +69,7 @@ def hubs() -> list[list[int]]:
 
 
 def crowd(seed: int) -> list[list[int]]:
-    """Triangles and quadrangles by chance that share many sides, and corners."""
+    """Return triangles and quadrangles by chance that share many sides, and corners."""
     random = np.random.default_rng(seed)
     faces = [random.integers(0, 16, 3 + (i % 5 == 4)).tolist() for i in range(31)]
     return [*faces, [0, 1, 2], [2, 1, 3], [1, 2, 4], [2, 1, 5], [1, 2, 6], [14, 15, 16], [16, 15, 13]]
@@ -82,7 +82,7 @@ LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones,
 
 
 def leaves() -> list[list[int]]:
-    """A triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    """Return a triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
     faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
     return [
         *faces,
@@ -113,14 +113,14 @@ invalid(
     "rest-connected-without-faces BAD_CHUNK_TABLE: Method has Is_Connected, and there are no FACES",
     lambda: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)),
 )
-for what, content in (
+for word, content in (
     ("broken", lambda: polygons(FACES_3) + b"\0"),
     ("derived", lambda: derived("<i4")),
     ("many-corners", lambda: polygons(np.zeros((1, 41), "<i4"))),
     ("many-faces", lambda: polygons(np.zeros((21, 1), "<i4"))),
 ):
     invalid(
-        f"rest-connected-{what}-faces: a rest pose by faces that do not serve it: {what}",
+        f"rest-connected-{word}-faces: a rest pose by faces that do not serve it: {word}",
         lambda content=content: with_rest(FORK, coded_rest(FORK, [], reserved=REST_CONNECTED >> 2)).add(
             Entry(FACES, content())
         ),

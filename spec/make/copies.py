@@ -9,18 +9,19 @@ COPIED = stems_of(  # a shape and its copies, of branches that have detail and t
 
 
 def by_chance(count: int, seed: int, most: int = 4) -> list:
-    """Script of so many vertices of a rest pose, whose first numbers are even."""
+    """Return script of so many vertices of a rest pose, whose first numbers are even."""
     random = np.random.default_rng(seed)
     return [n for x, y, z in random.integers(-most, most + 1, (count, 3)).tolist() for n in (2 * x, y, z)]
 
 
 def along(*places: tuple[int, int, int]) -> list:
-    """The same of these numbers, all of them even."""
+    """Return the same of these numbers, all of them even."""
     return [n for x, y, z in places for n in (x, y // 2, z // 2)]
 
 
 def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, still: bool = False) -> Plant:
-    """A root of four vertices that is no shape, at one place or not, and branches of so many on it, or others."""
+    """Return a root of four vertices that is no shape, at one place or not, and branches of so many on it, or
+    others."""
     branches = [stem if isinstance(stem, Stem) else Stem(0, stem, b % 4) for b, stem in enumerate(stems)]
     stems = [Stem(-1, 4), *branches]
     root = [0] * 12 if still else by_chance(4, 160)
@@ -29,7 +30,8 @@ def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, s
 
 
 def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
-    """The file, whose rest pose is refused, and may go on behind that; all else is as in one that stands still."""
+    """Return the file, whose rest pose is refused, and may go on behind that; all else is as in one that stands
+    still."""
     kept, rules.require = rules.require, (lambda *_: None) if goes_on else rules.require
     try:
         plant = make()
@@ -40,13 +42,13 @@ def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
 
 
 def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0) -> Plant:
-    """Copies of a shape of two vertices that are so far apart, in quarters of a unit."""
+    """Return copies of a shape of two vertices that are so far apart, in quarters of a unit."""
     copies = [value for place in places for value in (*copied(0, place, largest), 0, 0, 0)]
     return with_copies([2] * (1 + len(places)), [1, *along((0, 0, 0), tip)], copies, still=True)
 
 
 def copies_turned() -> Plant:
-    """Numbers are alike at first, so that they are expected again, and later near 0 again."""
+    """Return numbers are alike at first, so that they are expected again, and later near 0 again."""
     random = np.random.default_rng(280)
     script = [[1, *by_chance(4, 162, 40)], [0, 1, *by_chance(4, 163, 40)]]
     for i in range(36):
@@ -58,7 +60,7 @@ def copies_turned() -> Plant:
 
 
 def copies_of_many() -> Plant:
-    """64 shapes of one vertex behind others, of which one has two vertices."""
+    """Return 64 shapes of one vertex behind others, of which one has two vertices."""
     random, counts, script = np.random.default_rng(165), [1, 1, 2, *[1] * 64], []
     for b, count in enumerate(counts):
         script += [[*([0] if b not in (0, 2) else []), 1, *by_chance(count, 166 + b)]]
@@ -69,13 +71,14 @@ def copies_of_many() -> Plant:
 
 
 def copies_of_lengths() -> Plant:
-    """Shapes, copies and branches that are neither: whether one is, is expected of others of its length up to 16."""
+    """Return shapes, copies and branches that are neither: whether one is, is expected of others of its length up to
+    16."""
     counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
     shapes: list[int] = []
-    for b, (count, what) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
-        script += [[0] if what < 2 and count in shapes else []]
-        script += [copied(0), by_chance(1, 180 + b)] if what == 2 else [[what, *by_chance(count, 180 + b)]]
-        shapes += [count] if what == 1 else []
+    for b, (count, kind) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):
+        script += [[0] if kind < 2 and count in shapes else []]
+        script += [copied(0), by_chance(1, 180 + b)] if kind == 2 else [[kind, *by_chance(count, 180 + b)]]
+        shapes += [count] if kind == 1 else []
     return with_copies(counts, *script)
 
 

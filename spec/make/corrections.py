@@ -8,7 +8,7 @@ def corrections(step: float) -> Callable[[], bytes]:
 
 
 def corrected_lone(stream: Callable[[bytes], bytes], **fields) -> Draft:
-    """A vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
+    """Return a vertex with other bytes in place of a stream of CORRECTIONS that corrects nothing."""
     draft = lone(scripts={(CORRECTIONS, 1): [0]}, **fields).draft()
     content = draft.content(CORRECTIONS, 1, 0)
     return draft.change(CORRECTIONS, 1, 0, content=content[:4] + stream(content[4:]))
@@ -51,8 +51,8 @@ valid(
 )
 motion(CORRECTIONS, 2, "empty: no bytes", b"")
 motion(CORRECTIONS, 2, "short: 3 bytes", bytes(3))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(CORRECTIONS, 2, f"step-{what}: Correction_Step is {value}", corrections(value))
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    motion(CORRECTIONS, 2, f"step-{word}: Correction_Step is {value}", corrections(value))
 motion(CORRECTIONS, 2, "zero-behind: a zero byte behind the stream", lambda: fork().content(CORRECTIONS, 2, 0) + b"\0")
 motion(
     CORRECTIONS, 2, "bytes-behind: bytes behind the stream", lambda: fork().content(CORRECTIONS, 2, 1) + b"\1" * 12, 1

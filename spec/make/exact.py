@@ -4,7 +4,7 @@ from spec.make.base import *
 
 
 def lossless(first: bytes = b"") -> Draft:
-    """An additional last level with empty streams."""
+    """Return an additional last level with empty streams."""
     return fork().with_header(level_count=4, full_level_count=4).add(Entry(EXACT, first, 3, 0), Entry(EXACT, b"", 3, 1))
 
 

@@ -9,7 +9,7 @@ from spec.make.static import attributes, element
 
 
 def traced() -> Plant:
-    """The file of "A file in bytes" and "A level traced" in FORMAT.md."""
+    """Return the file of "A file in bytes" and "A level traced" in FORMAT.md."""
     stem = [Stem(-1, 3)]
     return Plant(
         stem,
@@ -44,7 +44,7 @@ def front_alone(draft: Draft) -> bytes:
 
 
 def errors_by_chance(count: int) -> tuple[int, ...]:
-    """Large and small steps up and down, to both ends of the range."""
+    """Return large and small steps up and down, to both ends of the range."""
     random, last, errors = np.random.default_rng(411), [4000] * 3, []
     for _ in range(count):
         step = random.choice([1, 3, 30, 400, 5000], 3) * random.integers(-2, 3, 3)
@@ -54,12 +54,12 @@ def errors_by_chance(count: int) -> tuple[int, ...]:
 
 
 def of_memory(vertices: int) -> Draft:
-    """128 frames, whose first fault behind the front is a checksum."""
+    """Return a draft of 128 frames, whose first fault behind the front is a checksum."""
     return lone().with_header(place_count=vertices, frame_count=128).change(HIERARCHY, checksum=0)
 
 
 def of_range(max_error: int) -> Draft:
-    """Counts after which the range is 2^38 + 56, whose first fault behind the front is a checksum."""
+    """Return a draft whose counts make the range 2^38 + 56, and whose first fault behind the front is a checksum."""
     clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
     return (
         lone()
@@ -102,7 +102,7 @@ def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().d
 
 
 def shown(*levels: int) -> Draft:
-    """The fork, of which these levels are shown."""
+    """Return the fork, of which these levels are shown."""
     draft = fork().with_header(stages=levels, level_count=len(levels), full_level_count=len(levels))
     for segment in range(2 if 0 not in levels else 0):
         draft = draft.without(AFFINES, 0, segment)
@@ -283,13 +283,13 @@ invalid(
 
 
 def damaged_before_cut() -> bytes:
-    """STEMS of level 1 is damaged, and AFFINES behind it is missing."""
+    """Return a file whose STEMS of level 1 is damaged, and whose AFFINES behind it is missing."""
     draft = moving([Stem(-1, 3), Stem(0, 3, 2), Stem(1, 2, 1)], 302).draft()
     return cut(lambda d: end_of(d, AFFINES, 1) - 1, draft.change(STEMS, 1, checksum=0))
 
 
 def stages_without_end() -> bytes:
-    """A front stream that ends where stages are left out: all decisions behind it are 1."""
+    """Return a front stream that ends where stages are left out: all decisions behind it are 1."""
 
     def stages(data: bytes) -> None:
         coder = rules.RangeDecoder(data)

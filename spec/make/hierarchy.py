@@ -6,13 +6,13 @@ BLADES = [Stem(-1, 3), Stem(-1, 4), Stem(-1, 2), Stem(-1, 3)]
 
 
 def interleaved(stems: list[Stem]) -> list[int]:
-    """Numbers of the vertices in a source that holds all first vertices, then all second ones."""
+    """Return numbers of the vertices in a source that holds all first vertices, then all second ones."""
     places = [(i, b) for b, stem in enumerate(stems) for i in range(stem.count)]
     return np.argsort(sorted(range(len(places)), key=places.__getitem__)).tolist()
 
 
 def hierarchy(title: str, stems: list[Stem], **sources) -> None:
-    """Written for the five vertices and two branches of the fork, or as many branches as there are."""
+    """Declare a HIERARCHY for the five vertices and two branches of the fork, or for as many branches as there are."""
 
     def make() -> Draft:
         stream = write(rules.decode_hierarchy, hierarchy_script(stems, **sources), len(stems), 5)
@@ -118,14 +118,14 @@ hierarchy(
 hierarchy(
     "vertex-negative: a vertex with a number below 0", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=[-1, 0, 1, 2, 3]
 )
-for what, vertex_source in (
+for word, vertex_source in (
     ("along-beyond", [0, 3, 6, 1, 2]),
     ("along-negative", [4, 1, -2, 0, 3]),
     ("beside-beyond", [1, 3, 0, 4, 6]),
     ("beside-negative", [3, 1, 4, 0, -2]),
 ):
     hierarchy(
-        f"vertex-{what}: a number out of range, as expected", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=vertex_source
+        f"vertex-{word}: a number out of range, as expected", [Stem(-1, 3), Stem(0, 2, 1)], vertex_source=vertex_source
     )
 invalid(
     "hierarchy-depth-limit LIMIT_EXCEEDED: 4097 branches, each on the one before",

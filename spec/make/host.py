@@ -9,7 +9,7 @@ ORDER = [3, 0, 4, 1, 2]  # Order of the fork's vertices in the source.
 
 
 def hosted(mesh: np.ndarray = MESH, **fields) -> Plant:
-    """The fork, whose rest pose is the host's mesh; its vertices stand in another order in the source."""
+    """Return the fork, whose rest pose is the host's mesh; its vertices stand in another order in the source."""
     return forked(**{"mesh": mesh, "vertex_source": ORDER} | fields)
 
 
@@ -20,7 +20,7 @@ HOSTED_MESH = np.array(grown(HOSTED_STEMS, 6), "<f4")
 
 
 def tall(*counts: int) -> Draft:
-    """Roots of so many vertices."""
+    """Return roots of so many vertices."""
     return without_mesh([Stem(-1, count, lag=1) for count in counts])
 
 
@@ -35,7 +35,7 @@ def deep() -> Draft:
 
 
 def without_mesh(stems: list[Stem]) -> Draft:
-    """A file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
+    """Return a file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
     count = sum(stem.count for stem in stems)
     stream = write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count)
     plan = rules.make_parts(rules.decode_hierarchy(stream, len(stems), count)[0])
@@ -84,9 +84,9 @@ for name, value in (("nan", NAN), ("infinite", -INFINITY)):
         0,
         INFINITE_MESH,
     )
-for at, which in ((17, "first"), (21, "second")):
+for at, word in ((17, "first"), (21, "second")):
     invalid(
-        f"host-mesh-{which}-checksum: a mesh that differs by the {which} checksum alone",
+        f"host-mesh-{word}-checksum: a mesh that differs by the {word} checksum alone",
         lambda at=at: hosted().change(REST, content=flipped(host_rest_chunk(MESH), at)),
         "WRONG_HOST_MESH",
         0,

@@ -8,7 +8,7 @@ from spec.make.predicted import ROOTED, predicted, swayed
 
 
 def joined(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
-    """Random rows, in two segments of six frames."""
+    """Return random rows in two segments of six frames."""
     return moving(stems, seed, **{"frames": 12, "segments": 2, "heads": HEADS, "joins": joins(*widths)} | fields)
 
 
@@ -101,7 +101,7 @@ for title, make in {
 
 
 def apart(stems: list[Stem], seed: int, *widths: float, **fields) -> Plant:
-    """The same, of segments that move in different ways."""
+    """Return the same, of segments that move in different ways."""
     plant = joined(stems, seed, *widths, **fields)
     plant.scripts = {}
     for level, s in product(range(8), range(len(widths))):

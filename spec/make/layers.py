@@ -10,7 +10,8 @@ from spec.make.tubes import RIGID, TUBES
 
 
 def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
-    """The fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`: scripts."""
+    """Return the fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`:
+    scripts."""
     more = {"scripts": {}} | fields
     scripts = forked().scripts | {
         (SHAPES, 3, 0): [
@@ -44,14 +45,14 @@ LEVEL_1_REST = {(REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
 
 
 def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
-    """The same, with a rest pose of level 0 alone."""
+    """Return the same, with a rest pose of level 0 alone."""
     plant = refinements(stems, seed, **fields)
     plant.scripts |= LEVEL_1_REST
     return plant
 
 
 def learned(*levels: int) -> dict:
-    """Heads with learned time bases for some levels, in segments of two frames."""
+    """Return heads with learned time bases for some levels, in segments of two frames."""
     random = np.random.default_rng(5)
     return LAYER_HEADS | {
         level: stems_head(
@@ -62,7 +63,7 @@ def learned(*levels: int) -> dict:
 
 
 def lossless_layers() -> Draft:
-    """An additional last level with empty streams."""
+    """Return an additional last level with empty streams."""
     return (
         layered().with_header(level_count=6, full_level_count=6).add(Entry(EXACT, b"", 5, 0), Entry(EXACT, b"", 5, 1))
     )
@@ -72,7 +73,7 @@ LOOSE_BEAMS = [*BEAMS[:3], Stem(0, 9, 30, LOOSE), Stem(-1, 70, lag=0)]
 
 
 def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes], segment: int = 0) -> None:
-    """Other content for a chunk of level 3; a function gets what it has."""
+    """Declare a vector with other content for a chunk of level 3. A function as content gets the usual content."""
 
     def make() -> Draft:
         draft = layered().draft()
@@ -83,12 +84,12 @@ def refinement(kind: int, title: str, content: bytes | Callable[[bytes], bytes],
 
 
 def scripted_refinement(place: tuple, title: str, *script) -> None:
-    """Another script for a stream of level 3, of which it is the last that is written."""
+    """Declare a vector with another script for the last stream that is written of level 3."""
     invalid(title, lambda: layered(2, scripts={place: list(script)}).draft(), item=3)
 
 
 def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
-    """Level 1 refines a rest pose that is exact, or by a chunk that is changed."""
+    """Declare a vector whose level 1 refines a rest pose that is exact, or does so by a changed chunk."""
     if change is None:
         exact = layered(3, (REFINED_REST, 3, 0), (REFINED_REST, 4, 0), rest=exact_rest(FORK, [0.5] * 15, False))
         return exact.add(Entry(REFINED_REST, refined_rest_chunk(b""), 1))
@@ -97,7 +98,7 @@ def bad_rest_of_1(change: Callable[[bytes], dict] | None) -> Draft:
 
 
 def refined_run(count: int) -> bytes:
-    """The stream of a root of three vertices, the last two of which are a run with so many modes."""
+    """Return the stream of a root of three vertices, the last two of which are a run with so many modes."""
     branches = branches_of([Stem(-1, 3, lag=0)])
     before = rules.Record(rest=[[0.0] * 3] * 3, rows={})
     return write(rules.decode_rest, [0, 0, 0, count], branches, 0.0625, before)
@@ -121,7 +122,7 @@ STIFF = stems_of(  # in one, two or three layers, with others on them
 
 
 def stiff(seed: int, **fields) -> Plant:
-    """STIFF in three layers, of which the first has rotations of any size."""
+    """Return STIFF in three layers, of which the first has rotations of any size."""
     plant = refinements(STIFF, seed, large=5, is_float64=True, **fields)
     plant.scripts |= {(STEMS, level): lambda level=level: Turns(seed + level) for level in range(5)}
     return plant
@@ -311,10 +312,10 @@ scripted_refinement((SHAPES, 3, 0), "refined-shapes-modes: a refined shape has n
 scripted_refinement((SHAPES, 3, 0), "refined-shapes-all-zero: a shape that the layer before lacks is all 0", 3, 0, 0, 0)
 scripted_refinement((SHAPES, 3, 0), "refined-shapes-cancelled: differences make a shape all 0", 2, 0, *[1, 0, 0, 4, 1])
 refinement(REFINED_REST, "short: 3 bytes", bytes(3))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     refinement(
         REFINED_REST,
-        f"step-{what}: Rest_Step of a refinement is {value}",
+        f"step-{word}: Rest_Step of a refinement is {value}",
         lambda content, value=value: refined_rest_chunk(content[4:], value),
     )
 refinement(

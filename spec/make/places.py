@@ -8,7 +8,7 @@ from spec.make.rest import BY_VERTEX, coded_rest, with_rest
 
 
 def in_turn(numbers: list[int]) -> list[int]:
-    """Numbers renamed in the order in which they first occur."""
+    """Return numbers renamed in the order in which they first occur."""
     order = list(dict.fromkeys(numbers))
     return [order.index(number) for number in numbers]
 

@@ -6,7 +6,7 @@ from spec.make.static import numbers, static, with_static
 
 
 def polygon_type(name: str) -> int:
-    """A type of integers as FACES and EDGES number them."""
+    """Return a type of integers as FACES and EDGES number them."""
     return "1248".index(name[2]) | 4 * (name[1] == "i")
 
 
@@ -17,7 +17,7 @@ def polygon_head(type_: str, faces: int, corners: int, count_type: str | None = 
 
 
 def polygon_shape(index_type: int, count_type: int | None, face_count: int, columns: int, corner_count: int):
-    """Head of FACES or EDGES."""
+    """Return head of FACES or EDGES."""
     return rules.Record(
         index_type=index_type,
         count_type=count_type,

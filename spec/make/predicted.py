@@ -12,7 +12,7 @@ RESTING = [0, 1, *[0] * 16]  # a frame of them that is no copy, and in which non
 
 
 def frame_of(stems: list[Stem], of_vertex: Callable[[], list[int]], follow: Callable[[], int]) -> list[int]:
-    """What a frame says of its vertices, but for those that follow the ends of their stem."""
+    """Return what a frame says of its vertices, but for those that follow the ends of their stem."""
     values = []
     for stem in stems:
         ends = 2 if stem.parent < 0 and stem.count > 1 else 1
@@ -62,7 +62,7 @@ PREDICTED_PLACE = PREDICTED, 1, 1
 
 
 def with_source(draft: Draft, seed: int) -> Draft:
-    """A last level that is up to 2^22 numbers away from the one before it."""
+    """Return a last level that is up to 2^22 numbers away from the one before it."""
     file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
     plans = rules.plans_of(file, level - 1)
 
@@ -87,7 +87,8 @@ SOURCE_FRAMES = [  # with copies, of the frame before, of earlier ones and of th
 
 
 def cells(seed: int) -> list[list[float]]:
-    """Places of vertices, each of them of two that are less or more than half a cell apart, or beyond all cells."""
+    """Return places of vertices, each of them of two that are less or more than half a cell apart, or beyond all
+    cells."""
     random, cell = np.random.default_rng(seed), 0.0625 / 256
     first = random.integers(-3000, 3000, (32, 3))
     first[29:] *= 10**6
@@ -104,7 +105,7 @@ LEAVING = [  # both ends of a stem, and those between them: a root that leaves b
 
 
 def turns(seed: int) -> list:
-    """Frames of two vertices that move far, about late and about early ones."""
+    """Return frames of two vertices that move far, about late and about early ones."""
     random = np.random.default_rng(seed)
     return [
         [0, 0, int(random.integers(0, min(t + 1, 6)) * (t % 3 == 2)), *frame_steps(PAIR, seed + t, large=9, still=0.2)]
@@ -116,7 +117,7 @@ RUNS_OF_COPIES = (3, 9, 8, 12, 7, 10, 6, 8, 9, 7, 11, 8, 0, 8, 1, 9)
 
 
 def in_runs() -> Plant:
-    """Each frame that is no copy is followed by so many copies."""
+    """Return each frame that is no copy is followed by so many copies."""
     frames = []
     for seed, copies in enumerate(RUNS_OF_COPIES):
         frames += [[0, 1, *frame_steps(SINGLE, 500 + seed)], *[[1, 1]] * copies]
@@ -288,7 +289,8 @@ GROWING = [  # of both stems: how far the tip is off what is expected of it, whi
 
 
 def growing() -> Plant:
-    """Two stems whose tips go along them, from near their base to their end: the first one gets there earlier."""
+    """Return two stems whose tips go along them, from near their base to their end: the first one gets there
+    earlier."""
     stems, frames = [Stem(-1, 5)] * 2, []
     for frame in GROWING:
         values = [0, 1]

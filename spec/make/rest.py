@@ -99,10 +99,10 @@ prelude(REST, "short: 16 bytes", lambda: corrupted_rest()[:16])
 prelude(REST, "method-0: bit 2 of Method is set", lambda: corrupted_rest(reserved=1) + b"\1")
 for bit in (2, 3, 4, 5):
     prelude(REST, f"method-{bit}: bit {bit + 2} of Method is set", lambda bit=bit: corrupted_rest(reserved=1 << bit))
-for what, value in (("nan", NAN), ("infinite", -INFINITY)):
-    prelude(REST, f"origin-{what}: Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(REST, f"step-{what}: Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
+for word, value in (("nan", NAN), ("infinite", -INFINITY)):
+    prelude(REST, f"origin-{word}: Origin has {value}", lambda value=value: corrupted_rest(origin=(0.0, 0.0, value)))
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    prelude(REST, f"step-{word}: Rest_Step is {value}", lambda value=value: corrupted_rest(step=value))
 for title, make in {
     "step-of-exact: Rest_Step is 0 with Method 1, where it has no meaning": lambda: exact_of_fork(
         [0.0] * 15, False, step=0.0

@@ -15,7 +15,7 @@ def detailed_rest() -> bytes:
 
 
 def bent(stems: list[Stem], script: list | Chance, rest: bytes | None = None) -> bytes:
-    """SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
+    """Return SOURCE_REST about the pose of REST, by default that of `still`, at the same step."""
     branches, reference = branches_of(stems), 0.25 * np.array(grown(stems), float)
     if rest is not None:
         reference = rules.decode_rest(rest[17:], branches, 0.25).rest
@@ -84,8 +84,8 @@ for title, make in {
 source_rest("empty: no bytes", b"")
 source_rest("method: Method 2", b"\2" + bytes(8))
 source_rest("short: 3 bytes of Rest_Step", bytes(4))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    source_rest(f"step-{what}: Rest_Step is {value}", lambda value=value: source_rest_chunk(b"", value))
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    source_rest(f"step-{word}: Rest_Step is {value}", lambda value=value: source_rest_chunk(b"", value))
 source_rest("zero-behind: a zero byte behind the stream", lambda: bent(FORK, Chance(206)) + b"\0")
 source_rest("bytes-behind: bytes behind the stream", lambda: bent(FORK, Chance(206)) + b"\1" * 12)
 source_rest(

@@ -16,7 +16,7 @@ def frame(
     reserved: int = 0,
     blocks: bytes | None = None,
 ) -> bytes:
-    """A zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: the true value; None: left out.
+    """Return a zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: the true value; None: left out.
 
     window: the byte Window_Descriptor, where there is no single segment."""
     size = len(content) if stated == -1 else stated
@@ -37,18 +37,18 @@ def raw_block(content: bytes, last: bool) -> bytes:
 
 
 def run_block(byte: bytes, count: int, last: bool) -> bytes:
-    """A repeated byte."""
+    """Return a repeated byte."""
     return struct.pack("<I", count << 3 | 1 << 1 | last)[:3] + byte
 
 
 def zeros(count: int) -> bytes:
-    """Blocks of zeros, at most 128 KiB each."""
+    """Return blocks of zeros, at most 128 KiB each."""
     sizes = [1 << 17] * (count >> 17) + ([count & (1 << 17) - 1] if count & (1 << 17) - 1 else [])
     return b"".join(run_block(b"\0", size, i == len(sizes) - 1) for i, size in enumerate(sizes))
 
 
 def plain(content: bytes) -> bytes:
-    """The simplest frame."""
+    """Return the simplest frame."""
     return frame(content, checksum=None)
 
 
@@ -57,7 +57,7 @@ def shuffled(array: np.ndarray) -> bytes:
 
 
 def item_type(name: str) -> tuple[int, int]:
-    """Item_Type and Item_Bytes of a type as NumPy writes it."""
+    """Return item_type and Item_Bytes of a type as NumPy writes it."""
     return "buifS".index(name[1]), int(name[2:])
 
 
@@ -75,7 +75,7 @@ def numbers(array: np.ndarray, type_: str | None = None, name: str = "a") -> byt
 
 
 def element(type_: str, content: bytes, name: str = "a") -> bytes:
-    """A single element of any type."""
+    """Return a single element of any type."""
     return array_chunk(type_, (), plain(content), name)
 
 

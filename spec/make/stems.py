@@ -7,7 +7,7 @@ NOT_A_NUMBER = [Stem(-1, 3), Stem(0, 2, 2), Stem(1, 1, 1, SHEET)]
 
 
 def stems(*head, **fields) -> Callable[[], bytes]:
-    """STEMS of level 1 with another head."""
+    """Return STEMS of level 1 with another head."""
     return lambda: stems_head(*head, **fields) + fork().content(STEMS, 1, 0)[6:]
 
 
@@ -132,8 +132,8 @@ for title, make in {
 
 motion(STEMS, 1, "empty: no bytes", b"")
 motion(STEMS, 1, "short: 5 bytes", bytes(5))
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    motion(STEMS, 1, f"step-{what}: Step is {value}", stems(value))
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    motion(STEMS, 1, f"step-{word}: Step is {value}", stems(value))
 for title, make in {
     "rotation-3: Rotation 3": stems(0.5, 3),
     "rotation-8: bit 3 of Rotation": stems(0.5, 8),

@@ -12,7 +12,7 @@ def swapped(i: int, j: int) -> Draft:
 
 
 def moved(kind: int, **place: int) -> Draft:
-    """The last chunk of a kind, with another level or segment in the table."""
+    """Return the last chunk of a kind, with another level or segment in the table."""
     draft = fork()
     i = max(i for i, entry in enumerate(draft.entries) if entry.kind == kind)
     return replace(draft, entries=(*draft.entries[:i], replace(draft.entries[i], **place), *draft.entries[i + 1 :]))

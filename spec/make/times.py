@@ -32,8 +32,8 @@ prelude(TIME, "whole-short: half of Rate", lambda: whole_rates(2)[:2])
 prelude(TIME, "whole-long: two Rates of one clip", lambda: whole_rates(2, 2))
 prelude(TIME, "short: First and half of Step", lambda: steady_time()[:13])
 prelude(TIME, "long: a byte behind Step", lambda: steady_time() + b"\0")
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
-    prelude(TIME, f"step-{what}: Step is {value}", steady(0.0, value))
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+    prelude(TIME, f"step-{word}: Step is {value}", steady(0.0, value))
 prelude(TIME, "first-nan: First is NaN", steady(NAN, 1.0))
 prelude(TIME, "first-infinite: First is infinite", steady(-INFINITY, 1.0))
 prelude(TIME, "stands-still: Step vanishes beside First", steady(1e30, 1.0))
@@ -66,9 +66,9 @@ invalid(
     "time-of-two-clips: First and Step of two clips where one is",
     lambda: lone().change(TIME, content=steady_times(STEADY, STEADY)),
 )
-for what, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
+for word, value in (("zero", 0.0), ("negative", -1.0), ("nan", NAN), ("infinite", INFINITY)):
     clip_times(
-        f"second-step-{what}: Step of the second clip is {value}",
+        f"second-step-{word}: Step of the second clip is {value}",
         lambda value=value: steady_times(STEADY, (0.0, value)),
     )
 for title, make in {
@@ -89,8 +89,8 @@ valid(
     "there is",
     lambda: lone(time=b"\2"),
 )
-for what, value in (("zero", 0.0), ("negative", -1.0)):
+for word, value in (("zero", 0.0), ("negative", -1.0)):
     invalid(
-        f"time-of-one-step-{what}: Step of a single frame, which needs none, is {value}",
+        f"time-of-one-step-{word}: Step of a single frame, which needs none, is {value}",
         lambda value=value: lone().change(TIME, content=steady_time(0.0, value)),
     )

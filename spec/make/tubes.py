@@ -10,8 +10,8 @@ TUBES = stems_of(
 
 
 def of_sizes(*powers: int) -> list[list[float]]:
-    """A stem, and for each power of two three vertices by chance that are as far away from its first one; every second
-    three are flat."""
+    """Return a stem, and for each power of two three vertices by chance that are as far away from its first one; every
+    second three are flat."""
     random = np.random.default_rng(531)
     triples = [
         math.ldexp(1.0, power - 10) * random.integers(-1024, 1025, (3, 3)) * [1, 1, i % 2]
@@ -21,7 +21,7 @@ def of_sizes(*powers: int) -> list[list[float]]:
 
 
 def of_any_size(*powers: int) -> Plant:
-    """Rigid branches of these sizes, all turned."""
+    """Return rigid branches of these sizes, all turned."""
     stems = [Stem(-1, 2), *(Stem(0, 3, 0, rigid=1) for _ in powers)]
     size = [1 << 28 if power > 0 else 1 for power in powers]
     turned = [row((n * (1 + i % 3), n * (2 - i % 4), n), (i % 2, 3 * n, -n)) for i, n in enumerate(size)]

@@ -74,7 +74,7 @@ def everything() -> Draft:
 
 
 def encoded(name: str) -> bytes:
-    """A small plant encoded by athcodec."""
+    """Return a small plant encoded by athcodec."""
     import athcodec
     from athcodec.motion.clip import MotionClip
 

@@ -43,7 +43,7 @@ class Cases:
 
 
 def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
-    """Runs as many cases as time allows, in a fixed random order."""
+    """Run as many cases as time allows, in a fixed random order."""
     order = list(range(len(cases.arguments)))
     random.Random(0).shuffle(order)
     counts = dict.fromkeys(("crashes", "hangs", "over_limit", "wrong"), 0)
@@ -58,7 +58,7 @@ def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
 
 
 def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, hang: float) -> tuple[int, str, str]:
-    """Runs cases from number `start`: (the next number, kind of fault or "", message)."""
+    """Run cases from number `start`: (the next number, kind of fault or "", message)."""
     context = multiprocessing.get_context("spawn")
     at, messages = context.Value("q", start), context.SimpleQueue()
     process = context.Process(target=_work, args=(cases, order, start, deadline, at, messages), daemon=True)
@@ -82,7 +82,7 @@ def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, 
 
 
 def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messages) -> None:
-    """In the separate process: runs cases until one fails, all are done or time is up."""
+    """Run cases in the separate process until one fails, all are done or time is up."""
     for place in range(start, len(order)):
         if place > start and time.monotonic() > deadline:
             messages.put((place, "", ""))
@@ -105,7 +105,8 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
 
 
 def _peak() -> int:
-    """Bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is not."""
+    """Return the peak in bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is
+    not."""
     if _STATUS.exists():
         return int(re.search(r"VmHWM:\s+(\d+)", _STATUS.read_text())[1]) * 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT

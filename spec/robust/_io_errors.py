@@ -32,13 +32,13 @@ DEAD = 70
 
 
 def build(folder: Path) -> Path:
-    """The library. Raises RuntimeError where there is no C compiler."""
+    """Return the library. Raises RuntimeError where there is no C compiler."""
     return compiled(folder, [HERE / "faulty.c"], "-shared", "-fPIC")
 
 
 def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, until: float = float("inf")) -> Row:
-    """A run of `verb` for every call that can fail; for so many of them, chosen at random, where `sample` says so.
-    lasts: all further calls fail too."""
+    """Return a run of `verb` for every call that can fail; for so many of them, chosen at random, where `sample` says
+    so. lasts: all further calls fail too."""
     row = Row(f"{verb}: call n fails{', and all after it' if lasts else ''}", 0)
     library = build(folder)
     asked = {"verb": verb, "folder": str(folder), "sample": sample, "lasts": lasts, "seconds": until - time.monotonic()}
@@ -61,8 +61,8 @@ def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, unt
 
 
 def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("inf")) -> Row:
-    """A batch of one clip whose n-th call fails, in the run and in each of its workers; the next run, without faults,
-    has to finish it and to leave nothing else."""
+    """Return a batch of one clip whose n-th call fails, in the run and in each of its workers; the next run, without
+    faults, has to finish it and to leave nothing else."""
     row = Row("batch: call n fails", 0, note="in the run and in its worker")
     library, place = build(folder), Place.make(folder)
     words = ["batch", str(place.source), "--out", str(place.folder), "--workers", "1", "--effort", "fast"]
@@ -86,7 +86,7 @@ def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("i
 
 
 def _runs(verb: str, place: Place, sample: int, lasts: bool, deadline: float) -> Iterator[dict]:
-    """In the process with the library: a child for each call."""
+    """Run a child for each call, in the process with the library."""
     calls = _run(verb, place, 0, lasts)["calls"]
     numbers = list(range(1, calls + 1))
     if sample:
@@ -106,11 +106,11 @@ def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
         _in_child(start, place, verb, target, n, lasts)
     os.close(start)
     with os.fdopen(ends, "rb") as pipe:
-        said = pipe.read()
+        answer = pipe.read()
     _, status = os.waitpid(child, 0)
-    if not said:
+    if not answer:
         return {"kind": "crash", "note": f"ended by {status}"}
-    result = json.loads(said)
+    result = json.loads(answer)
     kept = target.read_bytes() == OLDER[target.suffix]
     refused = result["code"] == 1 and ONE_LINE.fullmatch(result["err"]) and str(place.source.parent) in result["err"]
     fine = (refused or result["code"] == 0 and not kept) and (kept or is_whole(target))
@@ -136,8 +136,8 @@ def _in_child(start: int, place: Place, verb: str, target: Path, n: int, lasts: 
             finally:
                 calls, fired = library.faulty_calls(), library.faulty_fired()
                 library.faulty_arm(b"", ctypes.c_long(0), 0, 0)
-        said = {"code": code, "calls": calls, "fired": bool(fired), "err": err.getvalue()}
-        os.write(start, json.dumps(said).encode())
+        answer = {"code": code, "calls": calls, "fired": bool(fired), "err": err.getvalue()}
+        os.write(start, json.dumps(answer).encode())
     finally:
         os._exit(0)
 
@@ -151,15 +151,15 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def rows(budget: float) -> list[Row]:
-    """All calls of all verbs, within about `budget` seconds."""
-    start, found = time.monotonic(), []
+    """Return all calls of all verbs, within about `budget` seconds."""
+    start, outcomes = time.monotonic(), []
     for number, (verb, lasts) in enumerate((verb, lasts) for verb in VERBS for lasts in (False, True)):
         with tempfile.TemporaryDirectory() as folder:
             until = start + 0.7 * budget * (number + 1) / (2 * len(VERBS))
-            found.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
+            outcomes.append(each_call(verb, Path(folder).resolve(), lasts=lasts, until=until))
     with tempfile.TemporaryDirectory() as folder:
-        found.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
-    return found
+        outcomes.append(each_call_of_batch(Path(folder).resolve(), list(range(1, 100, 3)), start + budget))
+    return outcomes
 
 
 def main() -> None:

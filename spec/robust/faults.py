@@ -54,17 +54,17 @@ class Place:
         return cls(source, encoded, out)
 
     def words(self, verb: str, target: Path) -> list[str]:
-        """The command line of a verb that writes `target`."""
-        given = str(self.source if verb == "encode" else self.encoded)
+        """Return the command line of a verb that writes `target`."""
+        source = str(self.source if verb == "encode" else self.encoded)
         more = {"encode": ["--effort", "fast"], "decode --gzip": ["--gzip"], "truncate": ["--level", "1"]}
-        return [verb.split()[0], given, str(target), *more.get(verb, [])]
+        return [verb.split()[0], source, str(target), *more.get(verb, [])]
 
     def left_over(self, target: Path) -> list[str]:
         return [path.name for path in self.folder.iterdir() if path != target]
 
 
 def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subprocess.Popen:
-    """Starts the command, in a process that runs `prepare` first."""
+    """Start the command, in a process that runs `prepare` first."""
     return subprocess.Popen(
         [sys.executable, "-m", "athcodec", *words],
         stdout=subprocess.PIPE,
@@ -75,7 +75,7 @@ def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subpro
 
 
 def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
-    """(exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
+    """Return (exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
     process = spawn(words, prepare)
     try:
         _, err = process.communicate(timeout=TIMEOUT)
@@ -86,7 +86,7 @@ def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tup
 
 
 def is_whole(path: Path) -> bool:
-    """Whether an .ath or HDF5 file can be read to its last byte."""
+    """Return whether an .ath or HDF5 file can be read to its last byte."""
     try:
         if path.suffix == ".ath":
             with athcodec.open(path, strict=True) as decoder:
@@ -103,7 +103,7 @@ def is_whole(path: Path) -> bool:
 
 
 def kill_while_writing(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Kills a verb with SIGKILL, half of the time as soon as its part file exists, else at any moment."""
+    """Kill a verb with SIGKILL, half of the time as soon as its part file exists, else at any moment."""
     rng, row = random.Random(seed), Row("killed while writing", 0)
     parts = cleaned = 0
     while row.tried < rounds and time.monotonic() < until:
@@ -126,7 +126,7 @@ def kill_while_writing(place: Place, rounds: int, seed: int, until: float = floa
 
 
 def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None, rng: random.Random) -> bool:
-    """Whether the target is, after the kill, absent, unchanged or complete."""
+    """Return whether the target is, after the kill, absent, unchanged or complete."""
     process = spawn(place.words(verb, target))
     if rng.random() < 0.5:
         while process.poll() is None and not place.left_over(target):
@@ -154,7 +154,7 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: float = float("inf")) -> Row:
-    """Verbs under a limit on file sizes (RLIMIT_FSIZE): the write that exceeds it fails with EFBIG."""
+    """Return verbs under a limit on file sizes (RLIMIT_FSIZE): the write that exceeds it fails with EFBIG."""
     row = Row("no room to write", 0, note="RLIMIT_FSIZE, the error is EFBIG")
     for size in sizes:
         for verb in verbs:
@@ -165,7 +165,7 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 
 
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
-    """Checks for one line, exit code 1 and an unchanged older file; or a complete file, if it fitted."""
+    """Check for one line, exit code 1 and an unchanged older file; or a complete file, if it fitted."""
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
     target.write_bytes(OLDER[target.suffix])
     code, err = finished(place.words(verb, target), prepare)
@@ -183,12 +183,12 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
 
 def obey_permissions() -> None:
-    """Makes file modes effective for the next program, even if the superuser runs it."""
+    """Make file modes effective for the next program, even if the superuser runs it."""
     ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
 
 
 def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
-    """Into a read-only folder, and over a read-only file."""
+    """Write into a read-only folder, and over a read-only file."""
     row = Row("read-only target", 0)
     for verb in verbs:
         target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
@@ -206,7 +206,7 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
 
 
 def run(budget: float) -> list[Row]:
-    """All faults, 200 kills among them, within about `budget` seconds."""
+    """Return all faults, 200 kills among them, within about `budget` seconds."""
     from spec.robust._io_errors import rows as io_errors  # which uses this module
 
     start = time.monotonic()

@@ -28,8 +28,8 @@ def run(budget: float) -> list[Row]:
         outcome = cli.fuzz(target, seconds)
         if fuzzer or target.startswith(cli.SOURCES):
             _add_hours(target, seconds / 3600)
-        found = {COUNTS[outcome.kind]: 1} if outcome.kind else {}
-        rows.append(Row(target, outcome.tried, **found, note=_note(outcome, fuzzer)))
+        counted = {COUNTS[outcome.kind]: 1} if outcome.kind else {}
+        rows.append(Row(target, outcome.tried, **counted, note=_note(outcome, fuzzer)))
     return [*rows, _coverage_row()]
 
 

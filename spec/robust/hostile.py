@@ -40,7 +40,7 @@ LIMITS = Limits(memory_bytes=64 << 20, decoded_chunk_bytes=16 << 20)
 
 
 def valid_files() -> dict[str, bytes]:
-    """But those that play only with a mesh of the host."""
+    """Return the valid vectors, except those that play only with a mesh of the host."""
     paths = [path for path in sorted(VECTORS.glob("*.ath")) if not path.with_suffix(".mesh").exists()]
     vectors = {path.stem: path.read_bytes() for path in paths}
     return seeds.valid_files() | {name: data for name, data in vectors.items() if len(data) <= seeds.LARGEST}
@@ -60,13 +60,13 @@ def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **op
 
 
 def within_limits(data: bytes) -> int:
-    """Reads the file in every way; returns the memory that this may take."""
+    """Read the file in every way; returns the memory that this may take."""
     use(data, limits=LIMITS)
     return 2 * LIMITS.memory_bytes + _whole_clip(data)
 
 
 def _whole_clip(data: bytes) -> int:
-    """Bytes of all positions, which `use` reads as float64."""
+    """Return bytes of all positions, which `use` reads as float64."""
     try:
         header = AthFile(BytesIO(data), limits=LIMITS).tables.header
     except FormatError:
@@ -125,7 +125,7 @@ def flipped_bit(data: bytes, bit: int) -> int:
 
 
 def checked_bits(data: bytes) -> list[int]:
-    """All bits but those of unknown chunks, which no decoder reads."""
+    """Return all bits but those of unknown chunks, which no decoder reads."""
     file = AthFile(BytesIO(data))
     known = [range(chunk.offset, chunk.offset + chunk.length) for chunk in file.chunks]
     front = range(file.chunks[0].offset)
@@ -138,7 +138,7 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 
 def repaired(data: bytes) -> bytes:
-    """The file with correct checksums, as far as the front can be read."""
+    """Return the file with correct checksums, as far as the front can be read."""
     *_, length, count = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
     if not ct._HEADER.size + 4 * count <= length <= len(data):
         return data
@@ -182,15 +182,16 @@ MOST_GROWTH = 3.2
 
 
 def seconds_and_bytes(data: bytes) -> tuple[float, int]:
-    """Seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts determine."""
+    """Return seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts
+    determine."""
     start = time.perf_counter()
     decoder = athcodec.open(BytesIO(data))
-    given = sum(block.nbytes for _, block in decoder.blocks())
-    taken = time.perf_counter() - start
+    decoded = sum(block.nbytes for _, block in decoder.blocks())
+    seconds = time.perf_counter() - start
     work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.file.level_count - 1)
-    own = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
-    own += CHUNK_BYTES * decoder.file.tables.header.chunk_count
-    return taken, len(data) + given + decoder.file.rest.nbytes + own
+    memory = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
+    memory += CHUNK_BYTES * decoder.file.tables.header.chunk_count
+    return seconds, len(data) + decoded + decoder.file.rest.nbytes + memory
 
 
 @cache
@@ -204,8 +205,8 @@ def slow_file(_: bytes, name: str) -> int:
     least, fault = [float("inf")] * 2, ""
     for _ in range(8):
         for i, data in enumerate(files):
-            taken, size = seconds_and_bytes(data)
-            least[i] = min(least[i], taken)
+            seconds, size = seconds_and_bytes(data)
+            least[i] = min(least[i], seconds)
         fault = _too_slow(*least, size)
         if not fault:
             return 4 << 30
@@ -221,7 +222,7 @@ def _too_slow(once: float, twice: float, size: int) -> str:
 
 
 def announces_too_much(_: bytes, name: str) -> int:
-    """Small files that announce much: refused, or played within the limits."""
+    """Play small files that announce much: each is refused, or played within the limits."""
     return within_limits(hostile_files.LYING[name]())
 
 
@@ -229,7 +230,7 @@ def announces_too_much(_: bytes, name: str) -> int:
 
 
 def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
-    """(weight of the time, cases)"""
+    """Return (weight of the time, cases)"""
     small = {name: data for name, data in files.items() if len(data) <= SMALL}
     of_files = [
         (0.5, "a byte or more too many", files, lambda _: [b"\0", b"more", bytes(4096)], too_long),
@@ -259,12 +260,12 @@ def run(budget: float) -> list[Row]:
 
 
 def figures() -> dict[str, str]:
-    """The cost of slow files, measured again in this process."""
+    """Return the cost of slow files, measured again in this process."""
     lines = {}
     for name, make in hostile_files.SLOW.items():
-        taken, size = seconds_and_bytes(make(2))
+        seconds, size = seconds_and_bytes(make(2))
         lines[name] = (
-            f"{taken:.2f} s, {1e9 * taken / size:.1f} ns per byte of file, positions and memory, "
-            f"{taken / size / _sample_per_byte():.1f} times the sample's"
+            f"{seconds:.2f} s, {1e9 * seconds / size:.1f} ns per byte of file, positions and memory, "
+            f"{seconds / size / _sample_per_byte():.1f} times the sample's"
         )
     return lines

@@ -43,7 +43,7 @@ GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
 
 
 def job(name: str, *words: object) -> tuple[int, dict]:
-    """(exit code, result) of one job of this file in a process of its own."""
+    """Return (exit code, result) of one job of this file in a process of its own."""
     root = str(HERE.parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
@@ -57,15 +57,15 @@ def job(name: str, *words: object) -> tuple[int, dict]:
 
 
 def compilers() -> list[str]:
-    """Compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
-    found = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
-    if not found:
+    """Return compilers that may support ThreadSanitizer; clang first, whose programs run faster with it."""
+    commands = [name for name in (os.environ.get("CC"), "clang", "gcc", "cc") if name and shutil.which(name.split()[0])]
+    if not commands:
         raise RuntimeError("C compiler: found none of clang, gcc and cc; expected one, or its name in CC")
-    return found
+    return commands
 
 
 def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
-    """A program or library in C, by the first compiler that succeeds."""
+    """Return a program or library in C, by the first compiler that succeeds."""
     target = folder / sources[0].stem
     problems = ""
     for compiler in compilers():
@@ -81,7 +81,7 @@ def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
 
 
 def thread_program(folder: Path) -> Path:
-    """threads.c with the decoder's sources, under ThreadSanitizer."""
+    """Build threads.c with the decoder's sources, under ThreadSanitizer."""
     cmake = (CORE / "CMakeLists.txt").read_text()
     names = re.search(r"set\(ATH_DECODER_SOURCES\s+([^)]*)\)", cmake)[1].split()
     flags = re.findall(r"^\s*(-f[\w=-]+)", cmake, re.MULTILINE)
@@ -91,7 +91,7 @@ def thread_program(folder: Path) -> Path:
 
 
 def race(program: Path, *words: object) -> tuple[int, str, dict]:
-    """(exit code, stderr, result) of one run of threads.c."""
+    """Return (exit code, stderr, result) of one run of threads.c."""
     environment = os.environ | {"TSAN_OPTIONS": f"exitcode={RACE_FOUND} halt_on_error=1"}
     try:
         done = ended([program, *map(str, words)], env=environment, timeout=TIMEOUT)
@@ -110,19 +110,19 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
 
 
 def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
-    """Threads on shared and on separate decoders of each file, compared with a single thread."""
+    """Return threads on shared and on separate decoders of each file, compared with a single thread."""
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
     expected = [[decoder.positions(level=level) for level in range(decoder.file.level_count)] for decoder in shared]
 
     def watch(seed: int) -> int:
         rng, wrong = random.Random(seed), 0
-        own = [athcodec.open(path) for path in files]
+        decoders = [athcodec.open(path) for path in files]
         for _ in range(looks):
-            which = rng.randrange(len(files))
-            decoder = rng.choice((shared, own))[which]
-            wrong += not _same(decoder, expected[which], rng)
-        for decoder in own:
+            number = rng.randrange(len(files))
+            decoder = rng.choice((shared, decoders))[number]
+            wrong += not _same(decoder, expected[number], rng)
+        for decoder in decoders:
             decoder.close()
         return wrong
 
@@ -135,7 +135,7 @@ def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
 
 
 def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Random) -> bool:
-    """Whether a random frame, or some frames, of a random level are as expected."""
+    """Return whether a random frame, or some frames, of a random level are as expected."""
     level, frame = rng.randrange(decoder.file.level_count), rng.randrange(decoder.frame_count)
     if rng.random() < 0.2:
         frames = slice(frame, frame + 10)
@@ -147,7 +147,7 @@ def _same(decoder: athcodec.Decoder, expected: list[np.ndarray], rng: random.Ran
 
 
 def resident_bytes() -> int:
-    """Resident memory of this process; its peak if the system does not report it."""
+    """Return the resident memory of this process; its peak if the system does not report it."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
@@ -155,7 +155,7 @@ def resident_bytes() -> int:
 
 
 def seek_at_random(path: str, seeks: int) -> dict:
-    """Growth of memory and of the number of Python's objects over so many seeks and changes of level."""
+    """Return growth of memory and of the number of Python's objects over so many seeks and changes of level."""
     rng = random.Random(4)
     with athcodec.open(path) as decoder:
         expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
@@ -188,7 +188,7 @@ ALLOWED_GROWTH = 4 << 20
 
 
 def open_many(path: str, count: int) -> dict:
-    """Opens many decoders at once and reads from each, before and after others are closed in random order."""
+    """Open many decoders at once and read from each, before and after others are closed in random order."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = count + 100
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -238,11 +238,11 @@ class FailingAllocator:
             raise RuntimeError("NumPy: got another kind of memory handler, expected version 1")
 
     def fail(self, n: int) -> None:
-        """The n-th allocation from now on fails."""
+        """Let the n-th allocation from now on fail."""
         self._library.scarce_arm(n)
 
     def stop(self) -> bool:
-        """Stops failing; whether the allocation has failed."""
+        """Stop failing; whether the allocation has failed."""
         return bool(self._library.scarce_arm(0))
 
 
@@ -250,7 +250,7 @@ Call = Callable[[], object]
 
 
 def _calls(path: str, out: str) -> dict[str, Call]:
-    """The tested calls, which keep nothing in memory between each other."""
+    """Return the tested calls, which keep nothing in memory between each other."""
 
     def opened(use: Callable[[athcodec.Decoder], object]) -> Call:
         def call() -> object:
@@ -273,7 +273,14 @@ def _calls(path: str, out: str) -> dict[str, Call]:
         "positions": opened(lambda decoder: decoder.positions()),
         "frames": opened(lambda decoder: [decoder.positions(i, level) for i in (0, -1) for level in (0, 1)]),
         "affines": opened(lambda decoder: decoder.affines(3, 1)),
-        "static": opened(lambda it: (it.file.attributes, it.metadata, it.file.edges, it.file.rest)),
+        "static": opened(
+            lambda opened_decoder: (
+                opened_decoder.file.attributes,
+                opened_decoder.metadata,
+                opened_decoder.file.edges,
+                opened_decoder.file.rest,
+            )
+        ),
         "check": opened(lambda decoder: decoder.file.check()),
         "truncate": lambda: athcodec.truncate(path, out, 0),
         "encode": lambda: athcodec.encode(clip, out, effort="fast", segment_frames=16),
@@ -281,8 +288,8 @@ def _calls(path: str, out: str) -> dict[str, Call]:
 
 
 def run_out_of_memory(path: str, seconds: float) -> dict:
-    """Each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or raise
-    MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
+    """Return each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or
+    raise MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
     wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
         folder = Path(name)
@@ -292,7 +299,7 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
         calls = _calls(path, str(out)) | {
             "an open decoder": lambda: [lasting.positions(i, level) for i in (0, -1) for level in (1, 0)]
         }
-        for which, call in calls.items():
+        for call_name, call in calls.items():
             call()  # fills caches
             files, n, fired, error = _open_files(), 1, True, None
             while fired and time.monotonic() < until:
@@ -300,19 +307,19 @@ def run_out_of_memory(path: str, seconds: float) -> dict:
                 memory.fail(n)
                 error = _error_of(call)
                 fired = memory.stop()
-                tried[which] = n - (not fired)
+                tried[call_name] = n - (not fired)
                 raised += error is not None
                 if not isinstance(error, (MemoryError, AthError, type(None))):
-                    wrong.append(f"{which}, array {n}: {type(error).__name__}: {error}"[:300])
+                    wrong.append(f"{call_name}, array {n}: {type(error).__name__}: {error}"[:300])
                 if error is not None and any(out.parent.iterdir()):
-                    wrong.append(f"{which}, array {n}: left a file")
+                    wrong.append(f"{call_name}, array {n}: left a file")
                 n += 1
             del error
             gc.collect()
             if _open_files() != files:
-                wrong.append(f"{which}: {_open_files() - files} files stay open")
+                wrong.append(f"{call_name}: {_open_files() - files} files stay open")
             if not np.array_equal(lasting.positions(), expected):
-                wrong.append(f"{which}: the open decoder returns other positions")
+                wrong.append(f"{call_name}: the open decoder returns other positions")
     return {"tried": tried, "raised": raised, "wrong": wrong}
 
 
@@ -325,7 +332,7 @@ def _error_of(call: Call) -> BaseException | None:
 
 
 def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
-    """Every allocation of an array in every call fails once."""
+    """Return every allocation of an array in every call fails once."""
     code, result = job("allocations", path, seconds)
     row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
@@ -335,7 +342,7 @@ def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
 
 
 def in_little_space(path: str, megabytes: float) -> dict:
-    """Decodes with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
+    """Decode with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
     with athcodec.open(path) as decoder:
         expected = decoder.positions(0)
         room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
@@ -361,7 +368,7 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Limits.memory_bytes from 1 to enough: LimitExceeded before anything large is allocated, or the right frames."""
+    """Try Limits.memory_bytes from 1 to enough: each gives LimitExceeded before it allocates much, or right frames."""
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()
@@ -387,7 +394,7 @@ JOBS: dict[str, Callable[..., dict]] = {
 
 
 def run(budget: float) -> list[Row]:
-    """All runs, within about `budget` seconds."""
+    """Return all runs, within about `budget` seconds."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = [folder / "short.ath", folder / "long.ath"]

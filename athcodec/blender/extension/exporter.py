@@ -87,7 +87,8 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
 
 
 def left_out_of(context, summary) -> str:
-    """What is selected besides the active object, and what of that is not in the file, in words; "" for nothing."""
+    """Return what is selected besides the active object, and what of that is not in the file, in words; "" for
+    nothing."""
     from athcodec.sources import listed
 
     others = [obj.name for obj in context.selected_objects if obj != context.active_object]
@@ -169,7 +170,7 @@ class Recording:
         self._spool.write(positions.tobytes())
 
     def clip(self, scene):
-        """The MotionClip of the frames."""
+        """Return the MotionClip of the frames."""
         from athcodec.motion.clip import MotionClip
 
         self._spool.flush()
@@ -226,32 +227,33 @@ def _unit(scene, world: bool) -> dict:
 
 
 def _static(mesh, obj) -> dict:
-    """Arguments of MotionClip that do not move, the domains of the attributes, and the names of those left out."""
-    found, arrays, domains = {}, {}, {}
+    """Return arguments of MotionClip that do not move, the domains of the attributes, and the names of those left
+    out."""
+    fields, arrays, domains = {}, {}, {}
     counts = np.empty(len(mesh.polygons), np.int32)
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.polygons.foreach_get("loop_total", counts)
     mesh.loops.foreach_get("vertex_index", corners)
     if len(counts) and counts.min() == counts.max():
-        found["faces"] = corners.reshape(len(counts), -1)
+        fields["faces"] = corners.reshape(len(counts), -1)
     elif len(counts):
         arrays |= {"face_vertex_counts": counts, "face_vertex_indices": corners}
         domains |= {"face_vertex_counts": "face", "face_vertex_indices": "corner"}
     elif len(mesh.edges):
         edges = np.empty(2 * len(mesh.edges), np.int32)
         mesh.edges.foreach_get("vertices", edges)
-        found["edges"] = edges.reshape(-1, 2)
+        fields["edges"] = edges.reshape(-1, 2)
     if mesh.uv_layers.active is not None and len(corners):
         uv = np.empty(2 * len(corners), np.float32)
         mesh.uv_layers.active.data.foreach_get("uv", uv)
         arrays["uv"], domains["uv"] = uv.reshape(-1, 2), "corner"
     left_out = _add_attributes(mesh, arrays, domains)
-    _take_branches(obj, arrays, found)
-    return {**found, "attributes": arrays, "domains": domains, "left_out": left_out}
+    _take_branches(obj, arrays, fields)
+    return {**fields, "attributes": arrays, "domains": domains, "left_out": left_out}
 
 
 def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
-    """Adds the attributes that an .ath file holds, and returns the names of the others."""
+    """Add the attributes that an .ath file holds, and returns the names of the others."""
     from athcodec.motion.clip import RESERVED_NAMES
 
     active = mesh.uv_layers.active
@@ -276,19 +278,19 @@ def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
     return left_out
 
 
-def _take_branches(obj, arrays: dict, found: dict) -> None:
+def _take_branches(obj, arrays: dict, fields: dict) -> None:
     vertex_branch, stem_index = arrays.pop("vertex_branch", None), arrays.pop("stem_index", None)
     parents = obj.data.get(PARENTS)
     if vertex_branch is not None and parents is not None:
-        found |= {"vertex_branch": vertex_branch, "branch_parent": np.array(parents, np.int32)}
+        fields |= {"vertex_branch": vertex_branch, "branch_parent": np.array(parents, np.int32)}
         if stem_index is not None:
-            found["stem_index"] = stem_index
+            fields["stem_index"] = stem_index
     elif vertex_branch is not None:
         arrays["branch_id"] = vertex_branch
 
 
 def _skin(obj, vertex_count: int):
-    """The armature that moves the object, for finding its branches."""
+    """Return the armature that moves the object, for finding its branches."""
     from athcodec.motion.clip import Skin
 
     armatures = (modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")

@@ -52,7 +52,7 @@ class glTF2ExportUserExtension:
         self._first = {}  # By id: primitives whose vertices are numbered as the motion numbers them.
 
     def pre_export_hook(self, export_settings):
-        """Evaluates the frames of all objects that may move."""
+        """Evaluate the frames of all objects that may move."""
         scene = bpy.context.scene
         if not scene.ath_gltf.use:
             return
@@ -81,23 +81,23 @@ class glTF2ExportUserExtension:
                 yield obj
 
     def gather_attributes_change(self, attributes, export_settings):
-        """Adds the numbers of Blender's vertices to those of a mesh."""
+        """Add the numbers of Blender's vertices to those of a mesh."""
         if not self._recordings:
             return
         position = next(each for each in attributes if each["gltf_attribute_name"] == "POSITION")
         [creator] = [cell.cell_contents for cell in position["set"].__closure__ or ()]
 
         def set_vertices(attribute, edges_points=False):
-            found = creator.attributes_edges_points if edges_points else creator.attributes
+            attributes = creator.attributes_edges_points if edges_points else creator.attributes
             # The numbers are exact in float32: meshes of more vertices have no export.
             data = np.asarray(creator.blender_idxs, np.float32)[:, None]
-            found[VERTEX] = {"data": data, "data_type": "SCALAR", "component_type": FLOAT}
+            attributes[VERTEX] = {"data": data, "data_type": "SCALAR", "component_type": FLOAT}
 
         kind = {"blender_data_type": "FLOAT", "blender_domain": "POINT", "len": 1, "type": np.float32}
         attributes.append({"gltf_attribute_name": VERTEX, "skip_getting_to_dots": True, "set": set_vertices} | kind)
 
     def gather_node_hook(self, node, blender_object, export_settings):
-        """Gives the mesh of an object its motion."""
+        """Give the mesh of an object its motion."""
         primitives = node.mesh.primitives if node.mesh is not None else []
         self._primitives += primitives
         recording = self._recordings.get(blender_object.name) if blender_object else None
@@ -108,18 +108,18 @@ class glTF2ExportUserExtension:
         motion = self._motion(recording, blender_object, primitives, export_settings)
         for primitive in primitives:
             reference = self._extensions.ChildOfRootExtension(["motions"], EXTENSION, motion, required=False)
-            said = {"motion": reference} | self._first.get(id(primitive), {})
-            extension = self._extensions.Extension(EXTENSION, said, required=False)
+            content = {"motion": reference} | self._first.get(id(primitive), {})
+            extension = self._extensions.Extension(EXTENSION, content, required=False)
             primitive.extensions = (primitive.extensions or {}) | {EXTENSION: extension}
 
     def gather_gltf_hook(self, active_scene, scenes, animations, export_settings):
-        """Leaves meshes without a motion as they would be."""
+        """Leave meshes without a motion as they would be."""
         for primitive in self._primitives:
             if EXTENSION not in (primitive.extensions or {}):
                 primitive.attributes.pop(VERTEX, None)
 
     def _motion(self, recording, obj, primitives, export_settings) -> dict:
-        """The entry of the motion; primitives number its vertices from now on."""
+        """Return the entry of the motion; primitives number its vertices from now on."""
         if not export_settings["gltf_apply"] and len(obj.data.vertices) != recording.vertex_count:
             raise ValueError(
                 f"{obj.name}: got {recording.vertex_count} vertices that move and {len(obj.data.vertices)} that are "
@@ -132,13 +132,15 @@ class glTF2ExportUserExtension:
         rest = np.empty((len(used), 3), np.float32)
         rest[places.ravel()] = np.concatenate([self._values(each.attributes["POSITION"]) for each in primitives])
         stops = np.cumsum([len(each) for each in numbers])[:-1]
-        for primitive, own in zip(primitives, np.split(places.ravel(), stops)):
+        for primitive, numbers_of_primitive in zip(primitives, np.split(places.ravel(), stops)):
             view = primitive.attributes[VERTEX].buffer_view
-            if np.array_equal(own, own[0] + np.arange(len(own))):
+            if np.array_equal(numbers_of_primitive, numbers_of_primitive[0] + np.arange(len(numbers_of_primitive))):
                 del primitive.attributes[VERTEX]
-                self._first[id(primitive)] = {"firstVertex": int(own[0])} if own[0] else {}
+                self._first[id(primitive)] = (
+                    {"firstVertex": int(numbers_of_primitive[0])} if numbers_of_primitive[0] else {}
+                )
             else:
-                view = self._binary(own.astype(np.float32).tobytes(), view.bufferViewTarget)
+                view = self._binary(numbers_of_primitive.astype(np.float32).tobytes(), view.bufferViewTarget)
                 primitive.attributes[VERTEX].buffer_view = view
         ath = self._encoded(recording, used, rest, export_settings)
         scene, name = bpy.context.scene, bpy.context.scene.name

@@ -114,7 +114,7 @@ def add_object(
     clip: str = "",
     host_mesh: str = "",
 ):
-    """A new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
+    """Return a new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
     from athcodec.opening import set_host_mesh_of
 
     path = os.path.normpath(bpy.path.abspath(path))
@@ -138,7 +138,7 @@ def add_object(
 
 
 def _timing(decoder, scene) -> tuple[float, float]:
-    """The scene's frame at which the file begins, and the file's frames per second."""
+    """Return the scene's frame at which the file begins, and the file's frames per second."""
     metadata = decoder.metadata
     rate = float(metadata.get("fps") or decoder.fps or scene.render.fps / scene.render.fps_base)
     first = metadata.get("start_frame", scene.frame_start)
@@ -170,14 +170,14 @@ def _mesh(name: str, decoder):
     if decoder.file.host_checksum is not None:
         layer = mesh.attributes.new(player.HOST_MESH, "FLOAT_VECTOR", "POINT")
         layer.data.foreach_set("vector", np.ascontiguousarray(decoder.file.rest, np.float32).reshape(-1))
-    found = polygons(decoder.file.faces, decoder.file.attributes)
-    if found is not None:
-        _add_faces(mesh, *found)
+    faces = polygons(decoder.file.faces, decoder.file.attributes)
+    if faces is not None:
+        _add_faces(mesh, *faces)
     if decoder.file.edges is not None and len(decoder.file.edges):
         mesh.edges.add(len(decoder.file.edges))
         mesh.edges.foreach_set("vertices", np.ascontiguousarray(decoder.file.edges, np.int32).reshape(-1))
-    mesh.update(calc_edges=found is not None)
-    corners = len(found[1]) if found is not None else 0
+    mesh.update(calc_edges=faces is not None)
+    corners = len(faces[1]) if faces is not None else 0
     if len(mesh.loops) == corners:
         _add_attributes(mesh, decoder)
     return mesh

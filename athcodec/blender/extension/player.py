@@ -19,12 +19,12 @@ _busy = False
 
 
 def decoder_of(path: str, clip: str = ""):
-    """The decoder of a clip of a file ("": of its first), opened again where the file has changed. Raises OSError,
-    athcodec's errors."""
+    """Return the decoder of a clip of a file ("": of its first), opened again where the file has changed. Raises
+    OSError, athcodec's errors."""
     import athcodec
 
-    found = os.stat(path)
-    stamp = found.st_size, found.st_mtime_ns
+    status = os.stat(path)
+    stamp = status.st_size, status.st_mtime_ns
     known = _decoders.get(path)
     if known is None or known[0] != stamp:
         if known is not None:
@@ -37,7 +37,7 @@ def decoder_of(path: str, clip: str = ""):
 
 
 def decoder_for(obj):
-    """The decoder of what an object plays. Raises OSError, athcodec's errors."""
+    """Return the decoder of what an object plays. Raises OSError, athcodec's errors."""
     decoder, rest = decoder_of(path_of(obj), obj.ath.clip), obj.data.attributes.get(HOST_MESH)
     if decoder.file.needs_host_mesh and rest is not None:
         positions = np.empty(3 * len(rest.data), np.float32)
@@ -68,12 +68,12 @@ def problem_of(obj) -> str:
 
 
 def level_of(obj, decoder) -> int:
-    """The level that an object shows: what it asks for, as far as the file has it."""
+    """Return the level that an object shows: what it asks for, as far as the file has it."""
     return decoder.file.deepest if obj.ath.level == DEEPEST else min(obj.ath.level, decoder.file.deepest)
 
 
 def place_in(decoder, settings, scene) -> float:
-    """The frame of the file, a fraction between two of them, that the scene's frame shows."""
+    """Return the frame of the file, a fraction between two of them, that the scene's frame shows."""
     rate = scene.render.fps / scene.render.fps_base
     seconds = (scene.frame_current_final - settings.frame_offset) / rate * settings.speed
     time = decoder.time - decoder.time[0]
@@ -87,7 +87,8 @@ def place_in(decoder, settings, scene) -> float:
 
 
 def positions_at(decoder, place: float, level: int) -> np.ndarray:
-    """(N, 3) float32; between two frames on the line from one to the other, behind the last of a loop to the first."""
+    """Return (N, 3) float32; between two frames on the line from one to the other, behind the last of a loop to the
+    first."""
     frame = int(place)
     positions = decoder.positions(frame % decoder.frame_count, level, np.float32)
     if place > frame:
@@ -158,7 +159,7 @@ def _on_save(target=None, *_) -> None:
 
 @persistent
 def _after_save(*_) -> None:
-    """Puts paths back where only a copy has been saved elsewhere."""
+    """Put paths back where only a copy has been saved elsewhere."""
     global _busy
     _busy = True
     try:

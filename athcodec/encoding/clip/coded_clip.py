@@ -83,20 +83,20 @@ class CodedClip:
     ) -> CodedClip:
         """Return the record of a clip; hierarchy, pose: as `hierarchy_and_pose` returns them."""
         clip, order, places = placed.clip, hierarchy.vertex_source, placed.places
-        given = host_rest(clip) if options.host_rest else clip.source_rest
-        rest, reference = given.astype(np.float64), None
+        stored = host_rest(clip) if options.host_rest else clip.source_rest
+        rest, reference = stored.astype(np.float64), None
         if not np.array_equal(pose, rest[order]):
             if clip.rest_given:
                 reference = pose
             else:
                 rest = np.empty_like(pose)
-                rest[order] = pose.astype(given.dtype)
+                rest[order] = pose.astype(stored.dtype)
         return cls(
             placed,
             clip,
             hierarchy,
             rest,
-            given.dtype,
+            stored.dtype,
             clip.rest_given or options.host_rest,
             branches,
             reference,

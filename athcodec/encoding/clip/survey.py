@@ -99,7 +99,7 @@ class Ath:
         return inner
 
     def whole_branches(self) -> np.ndarray:
-        """Which branches are nodes whose subtree moves as one (see `whole`).
+        """Return which branches are nodes whose subtree moves as one (see `whole`).
 
         Returns
         -------
@@ -111,7 +111,7 @@ class Ath:
         return result
 
     def table1(self) -> dict[str, float | int]:
-        """Table 1 of the paper: depth (levels of nodes), nodes, leaves, and the thresholds.
+        """Return table 1 of the paper: depth (levels of nodes), nodes, leaves, and the thresholds.
 
         Returns
         -------
@@ -130,7 +130,7 @@ class Ath:
         }
 
     def cut(self, level: int) -> list[CutPiece]:
-        """The partition of the vertices into what moves as one at a level.
+        """Return the partition of the vertices into what moves as one at a level.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Ath:
         return [CutPiece(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def affine(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
-        """The maps A_t of a node's subtree (eq. 2).
+        """Return the maps A_t of a node's subtree (eq. 2).
 
         Parameters
         ----------
@@ -175,7 +175,7 @@ class Ath:
         return np.concatenate([pieces.fit(frames).matrices()[:, last] for frames in self._frames(positions)])
 
     def affines(self, positions: MotionClip | np.ndarray) -> np.ndarray:
-        """The maps of all nodes.
+        """Return the maps of all nodes.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class Ath:
         return np.concatenate([pieces.fit(frames).matrices() for frames in self._frames(positions)])
 
     def residual(self, positions: MotionClip | np.ndarray, node: int) -> np.ndarray:
-        """The residual R_t of a node's subtree in the space of the base pose (eq. 3); A_t R_t = V_t (eq. 4).
+        """Return the residual R_t of a node's subtree in the space of the base pose (eq. 3); A_t R_t = V_t (eq. 4).
 
         Parameters
         ----------
@@ -220,7 +220,7 @@ class Ath:
         return np.concatenate(residuals)
 
     def approximation(self, positions: np.ndarray, level: int) -> np.ndarray:
-        """The motion at a level: every piece of `cut(level)` moves by its own least-squares affine map.
+        """Return the motion at a level: every piece of `cut(level)` moves by its own least-squares affine map.
 
         The maps of different pieces are independent, as in the paper, so pieces may come apart where they meet: see
         `attachment_gaps`.
@@ -252,7 +252,7 @@ class Ath:
         return result
 
     def attachment_gaps(self, positions: MotionClip | np.ndarray, level: int) -> Gaps:
-        """How far the pieces of `approximation` come apart where a branch is attached to its parent's stem.
+        """Return how far the pieces of `approximation` come apart where a branch is attached to its parent's stem.
 
         For every branch whose piece is another than its parent's: the distance between the places where the two
         pieces' maps put the attach vertex, which is the visible gap.
@@ -387,7 +387,7 @@ class Survey:
         return length(self.high - self.low)
 
     def ath(self, thresholds: Thresholds) -> Ath:
-        """The ATH for some thresholds (section 3), without reading the clip again.
+        """Return the ATH for some thresholds (section 3), without reading the clip again.
 
         Parameters
         ----------
@@ -409,7 +409,7 @@ class Survey:
         return _prune(self.hierarchy, thresholds, self.rest, accepted, self.max_depth)
 
     def _keeps_epsilon(self, thresholds: Thresholds) -> np.ndarray | bool:
-        """TAM's first condition: at most eta frames have a GAD above epsilon."""
+        """Return whether TAM's first condition holds: at most eta frames have a GAD above epsilon."""
         eta, surveyed = thresholds.eta, len(self.largest_gads) - 1
         if eta >= self.frame_count:
             return True
@@ -418,7 +418,7 @@ class Survey:
         return self.largest_gads[eta] <= thresholds.distances[0]
 
     def _keeps_xi(self, thresholds: Thresholds) -> np.ndarray:
-        """TAM's second condition: in every frame at most lam vertices are beyond xi."""
+        """Return whether TAM's second condition holds: in every frame at most lam vertices are beyond xi."""
         lam, (_, xi) = thresholds.lam, thresholds.distances
         if lam == 0:
             return self.largest_distance <= xi
@@ -441,7 +441,7 @@ def survey(
     pool: ThreadPool = SERIAL,
     rest: np.ndarray | None = None,
 ) -> Survey:
-    """The statistics of a clip's frames from which `Survey.ath` makes the ATH for thresholds chosen afterwards.
+    """Return the statistics of a clip's frames from which `Survey.ath` makes the ATH for thresholds chosen afterwards.
 
     Parameters
     ----------
@@ -530,7 +530,7 @@ def build_ath(
     *,
     max_error: LengthLike | None = None,
 ) -> Ath:
-    """The ATH of a clip (Song, Yang and Peng 2011, section 3), in one pass over its frames.
+    """Return the ATH of a clip (Song, Yang and Peng 2011, section 3), in one pass over its frames.
 
     Where TAM accepts a subtree, its node is a leaf; otherwise the sub-branches are tested, down to a single branch.
     For several thresholds see `survey`.

@@ -125,8 +125,8 @@ def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> 
     the first that vanishes."""
     piece = np.repeat(np.arange(len(modes.counts)), modes.counts)
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
-    gone = np.cumsum(~(integers.any(axis=1) & wanted[piece]))
-    kept = gone == np.append(0, gone)[modes.first[piece]]
+    dropped = np.cumsum(~(integers.any(axis=1) & wanted[piece]))
+    kept = dropped == np.append(0, dropped)[modes.first[piece]]
     sizes = np.minimum(plan.pieces["rank"][piece[kept]], SHAPE_MODES)
     integers = integers[kept] * np.tile(np.arange(SHAPE_MODES) < sizes[:, None], 3)
     return _with_duals(np.bincount(piece[kept], minlength=len(modes.counts)).astype(np.int32), integers)

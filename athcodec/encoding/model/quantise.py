@@ -146,7 +146,7 @@ def rest_lags(stems: np.ndarray, attach: np.ndarray | None, step: float) -> np.n
     none = min(stems.shape[1], MOST_LAG)  # No step, or hardly any, is that many vertices ago.
     chains = stems if attach is None else np.concatenate([attach[:, None], stems], axis=1)
     is_mesh = chains.shape[1] > MESH
-    steps = np.diff(chains[:, : 4 * MESH if is_mesh else MESH], axis=1)  # A sample does for long stems.
+    steps = np.diff(chains[:, : 4 * MESH if is_mesh else MESH], axis=1)  # The first vertices of a long stem are enough.
     tried = np.array([none, *range(1, min(steps.shape[1], LONGEST_ROW if is_mesh else LONGEST_LAG))])
 
     def costs(lag: int) -> np.ndarray:

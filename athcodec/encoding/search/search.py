@@ -108,7 +108,11 @@ BY_NAME = {choose.__name__: choose for choose in CHOICES}
 
 @dataclass(eq=False)
 class Search:
-    """Finds the settings of a file; ratios: of the steps of its layers to that of the last, descending to 1."""
+    """Finds the settings of a file, in the order in which its choices depend on each other.
+
+    The order is its only job: how a choice is made stands in choices/, how its bytes are counted in trials.py. `ratios`
+    are those of the steps of the file's layers to that of the last, descending to 1.
+    """
 
     trials: Trials
     effort: str
@@ -176,11 +180,11 @@ class Search:
         """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
         can."""
         trials = (self.of_sample or self).trials
-        start, own = trials.start, trials.start.in_learned_bases()
+        start, in_bases = trials.start, trials.start.in_learned_bases()
         if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
             return False
-        others = start, replace(own, common_basis=True)
-        return all(trials.costs([own])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
+        others = start, replace(in_bases, common_basis=True)
+        return all(trials.costs([in_bases])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
 
     def keep_work_of_maps(self) -> None:
         """Leave the work of choosing maps of coarse levels, which comes last and is always done."""

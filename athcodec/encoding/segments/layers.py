@@ -2,7 +2,7 @@
 
 The first layer has the levels of the branch hierarchy; each further one is one level of the file that refines all of
 it, motion, rest pose and learned modes. A refinement is coded about the positions of the layer before (FORMAT.md,
-"Layers").
+"Layers"). This is one module because every layer is planned, coded and finished on what the layer before it leaves.
 """
 
 from __future__ import annotations
@@ -583,8 +583,8 @@ class CodedMotion:
         if end is not None and self._may_join and positions.shape[2] > END_FRAMES == end.positions.shape[2]:
             self._join_level(level, end, positions, layer)
         with self._corrected_as_shown(level, positions):
-            own = self._source.last_shown(positions) if self._loops else None
-            shown = own if end is None else end.shown[0]
+            loop_pose = self._source.last_shown(positions) if self._loops else None
+            shown = loop_pose if end is None else end.shown[0]
             self.flaws.append(self._source.flaws(positions, shown, self.errors[level][0]))
 
     @cached_property

@@ -1,5 +1,8 @@
 """One clip as the encoder codes it: hierarchy and rest pose under some settings, and the streams of one segment.
 
+This is one module because a segment is coded in a closed loop: its streams, the poses that they are coded about and the
+corrections of what is decoded again need each other. What several layers or segments share is in the modules beside it.
+
 Both the search for settings (search/) and the encoder itself call what is here. Everything is closed loop: pieces are
 predicted from what the decoder will have, corrections are found on what it will output.
 """
@@ -59,7 +62,11 @@ def thread_count(jobs: int | None, source: Source) -> int:
 
 @dataclass
 class Source:
-    """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion."""
+    """A clip in file order, relative to an origin, cut into segments, and the reference pose of its motion.
+
+    It answers what can be asked of a clip before any setting is known: positions, limits of error, and which frames
+    of a segment are coded. Its methods are many and short, and all follow from these fields.
+    """
 
     clip: CodedClip
     seen: Survey
@@ -565,7 +572,8 @@ def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.nd
 
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: bool = False) -> SegmentMotion:
-    """A segment at a step FINER times smaller, in nothing learned, to learn bases and modes from."""
+    """Analyse a segment with a step FINER times smaller and without learned modes, so that what is learned from it
+    describes the motion and not its rounding."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic

@@ -248,27 +248,27 @@ def pack_derived_edges(index_type: int) -> bytes:
 
 def pack_array(name: str, array: np.ndarray) -> bytes:
     """Return ATTRIBUTE of an array of numbers, booleans or texts. Raises ClipError for what no reader would accept."""
-    what, limits = f"array {brief(name)}", Limits()
+    subject, limits = f"array {brief(name)}", Limits()
     if array.nbytes > limits.decoded_chunk_bytes:  # Refused before it is compressed.
-        raise ClipError(f"{what}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
-    with _refusals(what):
+        raise ClipError(f"{subject}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")
+    with _refusals(subject):
         text = name.encode()
         head = ARRAY_HEAD.pack(ARRAY_KINDS.index(array.dtype.kind), array.ndim, len(text), array.dtype.itemsize)
         shape = struct.pack(f"<{array.ndim}I", *array.shape)
         packed = head + shape + text + (_compress(array) if array.size else b"")
-        parse_array(packed, what, limits)
+        parse_array(packed, subject, limits)
     return packed
 
 
 @contextmanager
-def _refusals(what: str) -> Iterator[None]:
+def _refusals(subject: str) -> Iterator[None]:
     """Turn what a reader would refuse into ClipError: it is the source's fault."""
     try:
         yield
     except FormatError as error:
         raise ClipError(str(error)) from None
     except (TypeError, ValueError, RecursionError, struct.error) as error:
-        raise ClipError(f"{what}: {error}; expected plain data that a file can hold") from None
+        raise ClipError(f"{subject}: {error}; expected plain data that a file can hold") from None
 
 
 def pack_metadata(metadata: dict) -> bytes:

@@ -70,8 +70,8 @@ def brief(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def looked_up(table: Mapping, key: Any, what: str) -> Any:
+def looked_up(table: Mapping, key: Any, subject: str) -> Any:
     """Return the entry `key` of a table of what glTF allows. Raises ClipError."""
     if not isinstance(key, (int, str)) or key not in table:
-        raise ClipError(f"{what}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
+        raise ClipError(f"{subject}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
     return table[key]

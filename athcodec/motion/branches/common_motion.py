@@ -89,14 +89,14 @@ def _steady(frames: np.ndarray, most: float) -> np.ndarray | None:
     return best.astype(np.float64) if is_wide else None
 
 
-def carried(found: Found, frames: np.ndarray) -> Found | None:
+def carried(branches: Found, frames: np.ndarray) -> Found | None:
     """Return branches with one that all roots hang on, of vertices of theirs that stand still in frames without common
     motion; None where too few do, or along a line."""
-    label, parent = found.vertex_branch.astype(np.int64), found.branch_parent.astype(np.int64)
+    label, parent = branches.vertex_branch.astype(np.int64), branches.branch_parent.astype(np.int64)
     roots = parent < 0
     if np.count_nonzero(roots) < 2:
         return None
-    place = source_stem_index(label) if found.stem_index is None else found.stem_index.astype(np.int64)
+    place = source_stem_index(label) if branches.stem_index is None else branches.stem_index.astype(np.int64)
     rest, diagonal = frames[0], float(np.linalg.norm(np.ptp(frames[0], axis=0)))
     off = np.sqrt(np.square(frames - rest).sum(axis=2).max(axis=0))
     is_first = (place == 0) & (np.bincount(label) > 1)[label]
@@ -111,8 +111,10 @@ def carried(found: Found, frames: np.ndarray) -> Found | None:
     place[feet] = np.arange(len(feet))
     label[feet] = len(parent)
     above = np.append(np.where(roots, len(parent), parent), -1)
-    index = None if found.stem_index is None else place
-    return dataclasses.replace(checked_branches(label, above, place, found.method), stem_index=index, taken=found.taken)
+    index = None if branches.stem_index is None else place
+    return dataclasses.replace(
+        checked_branches(label, above, place, branches.method), stem_index=index, array_name=branches.array_name
+    )
 
 
 def _far_apart(points: np.ndarray, count: int) -> np.ndarray:

@@ -64,11 +64,11 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
     that stands still has none. What turns or travels as a whole is tried on a branch that carries all of it, too."""
     seen = Seen(clip, by_price=True)
-    for found in _candidates(seen, by_points):
-        on_feet = carried(found, seen.frames) if seen.is_carried else None
+    for branches in _candidates(seen, by_points):
+        on_feet = carried(branches, seen.frames) if seen.is_carried else None
         if on_feet is not None:
             yield on_feet
-        yield found
+        yield branches
 
 
 def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
@@ -111,12 +111,12 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
 def _distinct(proposals: Iterable[Found]) -> Iterator[Found]:
     """Yield branches that differ from all before them: a mesh may leave nothing to arrange in another way."""
     before: list[tuple[np.ndarray, ...]] = []
-    for found in proposals:
-        index = source_stem_index(found.vertex_branch) if found.stem_index is None else found.stem_index
-        arrays = found.vertex_branch, found.branch_parent, index
+    for branches in proposals:
+        index = source_stem_index(branches.vertex_branch) if branches.stem_index is None else branches.stem_index
+        arrays = branches.vertex_branch, branches.branch_parent, index
         if not any(all(map(np.array_equal, arrays, others)) for others in before):
             before.append(arrays)
-            yield found
+            yield branches
 
 
 def _others(seen: Seen, first: Found) -> Iterator[Found]:
@@ -145,8 +145,8 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
 
 def _by_contact(seen: Seen, first: Found) -> Found:
     """Return the same branches where they grow, as far as contacts show it."""
-    found = _FINDERS[first.method](seen.by_contact(), None)
-    return first if found is None else found
+    branches = _FINDERS[first.method](seen.by_contact(), None)
+    return first if branches is None else branches
 
 
 def _in_order(seen: Seen) -> Iterator[Found]:
@@ -191,9 +191,9 @@ def _are_plants(found: Found) -> bool:
     return _are_even(found.vertex_branch) and bool(roots > PLANTS * len(found.branch_parent))
 
 
-def _leaves_many_alone(found: Found) -> bool:
+def _leaves_many_alone(branches: Found) -> bool:
     """Return whether many branches are a single vertex."""
-    return bool(np.count_nonzero(np.bincount(found.vertex_branch) == 1) > LONE_POINTS * len(found.vertex_branch))
+    return bool(np.count_nonzero(np.bincount(branches.vertex_branch) == 1) > LONE_POINTS * len(branches.vertex_branch))
 
 
 def pieces(clip: MotionClip) -> Found:
@@ -233,7 +233,7 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
     clip = seen.clip
     source = _plain_names(clip)
     named = {name: clip.attributes[original] for name, original in source.items()}
-    taken, labels = _named_labels(clip, named)
+    chosen, labels = _named_labels(clip, named)
     if labels is None:
         return None
     names, vertex_branch = np.unique(labels, return_inverse=True)
@@ -241,7 +241,7 @@ def _by_attributes(seen: Seen, root: int | None) -> Found | None:
     if parents is not None and parents.ndim == 1 and parents.dtype.kind in "iu" and len(parents) > names.max():
         above = parents[names].astype(np.int64)
         parent = np.where(np.isin(above, names), np.searchsorted(names, above).clip(0, len(names) - 1), -1)
-    return dataclasses.replace(arranged(seen, vertex_branch, root, "attributes", parent), taken=source[taken])
+    return dataclasses.replace(arranged(seen, vertex_branch, root, "attributes", parent), array_name=source[chosen])
 
 
 def _plain_names(clip: MotionClip) -> dict[str, str]:
@@ -342,11 +342,11 @@ def _by_objects(seen: Seen, root: int | None) -> Found | None:
         return None
     if affine_share(seen.frames, label) < AFFINE:
         return None
-    counts, said = clip.attributes["part_vertex_counts"], clip.metadata.get("part_names")
-    words = said if isinstance(said, list) and len(said) == len(counts) else [""] * len(counts)
+    counts, names = clip.attributes["part_vertex_counts"], clip.metadata.get("part_names")
+    words = names if isinstance(names, list) and len(names) == len(counts) else [""] * len(counts)
     part = np.searchsorted(np.cumsum(counts), np.unique(label, return_index=True)[1], side="right")
-    found = arranged(seen, label, root, "objects", names=[re.split("[/_|]", str(words[number])) for number in part])
-    return dataclasses.replace(found, stem_index=None)
+    branches = arranged(seen, label, root, "objects", names=[re.split("[/_|]", str(words[number])) for number in part])
+    return dataclasses.replace(branches, stem_index=None)
 
 
 def _by_components(seen: Seen, root: int | None) -> Found | None:

@@ -69,8 +69,8 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     shapes = {number: frame[source] for number, frame in zip(shown.tolist(), _poses(clip, shown))}
     for branch in small.tolist():  # Parents come first.
         shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
-        own = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
-        rest[own] = shape[own] + (rest[attach] - shape[attach] if attach >= 0 else 0.0)
+        vertices = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
+        rest[vertices] = shape[vertices] + (rest[attach] - shape[attach] if attach >= 0 else 0.0)
     grown = np.empty_like(pose)
     grown[source] = rest
     return grown

@@ -93,8 +93,8 @@ class _Steady:
         self._length = np.concatenate([self._length, length[is_steady]])[once]
 
     def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how much the distance of each pair changes, over the motion of the two against each other, and its
-        mean."""
+        """Return the change of the distance of each pair, as a share of the motion of one point relative to the other,
+        and the mean distance."""
         change, length = np.empty(len(pairs)), np.empty(len(pairs))
         for start in range(0, len(pairs), PAIRS_AT_ONCE):
             some = slice(start, start + PAIRS_AT_ONCE)
@@ -152,13 +152,13 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
         if not len(end) or not len(lone):
             break
         step = frames[0, end] - frames[0, inner]
-        apart, which = cKDTree(frames[0, lone]).query(frames[0, end] + step)
+        apart, nearest = cKDTree(frames[0, lone]).query(frames[0, end] + step)
         fits = np.flatnonzero(apart <= OFF_LINE * np.linalg.norm(step, axis=1))
         fits = fits[np.argsort(apart[fits], kind="stable")]
-        used = fits[np.unique(which[fits], return_index=True)[1]]
+        used = fits[np.unique(nearest[fits], return_index=True)[1]]
         if not len(used):
             break
-        links = np.concatenate([links, np.stack([end[used], lone[which[used]]], axis=1)])
+        links = np.concatenate([links, np.stack([end[used], lone[nearest[used]]], axis=1)])
     return links
 
 

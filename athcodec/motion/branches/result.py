@@ -24,7 +24,7 @@ class Found:
         The place of each vertex on its stem, as in MotionClip.
     method : str
         How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
-    taken : str, optional
+    array_name : str, optional
         The name of the array that was taken for the numbers of branches.
 
     Examples
@@ -38,7 +38,7 @@ class Found:
     branch_parent: np.ndarray
     stem_index: np.ndarray | None
     method: str
-    taken: str = ""
+    array_name: str = ""
 
     def __repr__(self) -> str:
         return f"<Found: {self}>"
@@ -47,7 +47,7 @@ class Found:
         orders = branch_orders(self.branch_parent)
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
-        method = f"{self.method} ({self.taken})" if self.taken else self.method
+        method = f"{self.method} ({self.array_name})" if self.array_name else self.method
         return (
             f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {method}: {roots:,} without a parent, "
             f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"

@@ -134,12 +134,12 @@ def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) 
     first = len(moving.branch_parent)
     label, place = np.empty((2, clip.vertex_count), np.int64)
     label[~still], label[still] = moving.vertex_branch, standing.vertex_branch + first
-    for some, found in ((~still, moving), (still, standing)):
-        index = found.stem_index
-        place[some] = source_stem_index(found.vertex_branch) if index is None else index
+    for some, branches in ((~still, moving), (still, standing)):
+        index = branches.stem_index
+        place[some] = source_stem_index(branches.vertex_branch) if index is None else index
     above = standing.branch_parent.astype(np.int64)
     parent = np.concatenate([moving.branch_parent, np.where(above < 0, -1, above + first)])
-    found = checked_branches(label, parent, place, moving.method)
+    branches = checked_branches(label, parent, place, moving.method)
     if moving.stem_index is None and standing.stem_index is None:
-        found = replace(found, stem_index=None)
-    return replace(found, taken=moving.taken)
+        branches = replace(branches, stem_index=None)
+    return replace(branches, array_name=moving.array_name)

@@ -9,7 +9,7 @@ import { VertexData } from "@babylonjs/core/Meshes/mesh.vertexData.js";
 import { registerGLTFExtension, unregisterGLTFExtension } from "@babylonjs/loaders/glTF/2.0/glTFLoaderExtensionRegistry.js";
 
 import { AthFile, ready } from "../ath_decoder.mjs";
-import { EXTENSION, VERTEX, keysOf, motionsOf, primitivesOf, restOf, saidOf, startOf, verticesOf, withoutFallback } from "./parts.js";
+import { EXTENSION, VERTEX, keysOf, motionsOf, primitivesOf, restOf, referenceOf, startOf, verticesOf, withoutFallback } from "./parts.js";
 
 const RATE = 60; // frames per second of the animations' keys, between which seconds run on
 
@@ -82,17 +82,17 @@ export class ATHBabylonMotion {
 }
 
 function write({ mesh, vertices }, positions) {
-  const own = new Float32Array(3 * vertices.length), low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  const moved = new Float32Array(3 * vertices.length), low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < vertices.length; i++)
     for (let k = 0; k < 3; k++) {
-      const value = own[3 * i + k] = positions[3 * vertices[i] + k];
+      const value = moved[3 * i + k] = positions[3 * vertices[i] + k];
       if (value < low[k]) low[k] = value;
       if (value > high[k]) high[k] = value;
     }
-  mesh.updateVerticesData(VertexBuffer.PositionKind, own);
+  mesh.updateVerticesData(VertexBuffer.PositionKind, moved);
   if (mesh.isVerticesDataPresent(VertexBuffer.NormalKind)) {
-    const normals = new Float32Array(own.length);
-    VertexData.ComputeNormals(own, mesh.getIndices(), normals, { useRightHandedSystem: true });
+    const normals = new Float32Array(moved.length);
+    VertexData.ComputeNormals(moved, mesh.getIndices(), normals, { useRightHandedSystem: true });
     mesh.updateVerticesData(VertexBuffer.NormalKind, normals);
   }
   mesh.buildBoundingInfo(new Vector3(...low), new Vector3(...high), mesh.getWorldMatrix());
@@ -133,12 +133,12 @@ class ATHMotionExtension {
 
   // The loader asks its extensions once more, of which this one has done its part.
   async #rest(context, scene) {
-    const own = this.loadSceneAsync;
+    const load = this.loadSceneAsync;
     this.loadSceneAsync = () => null;
     try {
       return await this.loader.loadSceneAsync(context, scene);
     } finally {
-      this.loadSceneAsync = own;
+      this.loadSceneAsync = load;
     }
   }
 
@@ -156,10 +156,10 @@ class ATHMotionExtension {
     return { player, vertices: new Map(parts.map(({ key, vertices }) => [key, vertices])) };
   }
 
-  async #part({ mesh, primitive, attributes, said }) {
+  async #part({ mesh, primitive, attributes, reference }) {
     const [positions, numbers] = await Promise.all([attributes.POSITION, attributes[VERTEX]].map((index) => this.#numbers(index)));
     return { key: `${mesh} ${primitive}`, positions,
-      vertices: verticesOf(positions.length / 3, said, numbers && ((i) => numbers[i])) };
+      vertices: verticesOf(positions.length / 3, reference, numbers && ((i) => numbers[i])) };
   }
 
   // As numbers that lie one after the other; null where there is no such attribute.
@@ -171,7 +171,7 @@ class ATHMotionExtension {
   }
 
   _loadMeshPrimitiveAsync(context, name, node, mesh, primitive, assign) {
-    const plant = this.#plants[saidOf(primitive)?.motion], key = `${mesh.index} ${primitive.index}`;
+    const plant = this.#plants[referenceOf(primitive)?.motion], key = `${mesh.index} ${primitive.index}`;
     if (!plant) return null;
     return this.loader._loadMeshPrimitiveAsync(context, name, node, mesh, primitive, assign).then((made) => {
       const source = made.sourceMesh ?? made; // instances follow it

@@ -12,25 +12,25 @@ export function motionsOf(json) {
 }
 
 /** Returns the extension of a primitive; null where it has none. */
-export function saidOf(primitive) {
+export function referenceOf(primitive) {
   return primitive.extensions?.[EXTENSION] ?? null;
 }
 
-/** The primitives of a motion: [{mesh, primitive, attributes, said}], the first two being places in the file. */
+/** The primitives of a motion: [{mesh, primitive, attributes, reference}], the first two being places in the file. */
 export function primitivesOf(json, motion) {
   return (json.meshes ?? []).flatMap(({ primitives }, mesh) => primitives
-    .map((each, primitive) => ({ mesh, primitive, attributes: each.attributes, said: saidOf(each) }))
-    .filter(({ said }) => said?.motion === motion));
+    .map((each, primitive) => ({ mesh, primitive, attributes: each.attributes, reference: referenceOf(each) }))
+    .filter(({ reference }) => reference?.motion === motion));
 }
 
 /** The motion's vertex of each of a primitive's `count`; numberOf(i): that of the attribute, where there is one. */
-export function verticesOf(count, said, numberOf = null) {
-  const first = said.firstVertex ?? 0;
+export function verticesOf(count, reference, numberOf = null) {
+  const first = reference.firstVertex ?? 0;
   if (!isCount(first)) throw new RangeError(`firstVertex: got ${first}, expected a whole number`);
-  const found = Array.from({ length: count }, (_, i) => (numberOf ? numberOf(i) : first + i));
-  const wrong = found.find((vertex) => !isCount(vertex) || vertex > 0xffffffff);
+  const numbers = Array.from({ length: count }, (_, i) => (numberOf ? numberOf(i) : first + i));
+  const wrong = numbers.find((vertex) => !isCount(vertex) || vertex > 0xffffffff);
   if (wrong !== undefined) throw new RangeError(`vertices: got ${wrong}, expected whole numbers of vertices`);
-  return Uint32Array.from(found);
+  return Uint32Array.from(numbers);
 }
 
 /** The rest pose of a motion, of all its primitives: [{vertices, positions}]. */
@@ -51,8 +51,8 @@ export function restOf(parts) {
 
 /** Seconds at which a clip begins, on the clock of its animation. */
 export function startOf(motion, name) {
-  const said = (motion.clips ?? []).find((clip) => clip.name === name)?.start;
-  return Number.isFinite(said) ? said : 0;
+  const stated = (motion.clips ?? []).find((clip) => clip.name === name)?.start;
+  return Number.isFinite(stated) ? stated : 0;
 }
 
 /** Two keys, [seconds of the animation, seconds of the clip], between which both run alike; one of a clip without duration. */
@@ -63,7 +63,7 @@ export function keysOf(start, { duration: round }) {
 
 /** Changes the file's structure so that nodes show the meshes of these motions without skin and morph targets. */
 export function withoutFallback(json, played) {
-  const isMoved = (mesh) => json.meshes[mesh]?.primitives.some((primitive) => played.has(saidOf(primitive)?.motion));
+  const isMoved = (mesh) => json.meshes[mesh]?.primitives.some((primitive) => played.has(referenceOf(primitive)?.motion));
   const moved = new Set((json.nodes ?? []).flatMap(({ mesh }, node) => (mesh !== undefined && isMoved(mesh) ? [node] : [])));
   for (const node of moved) {
     delete json.nodes[node].skin;

@@ -3,7 +3,7 @@
 
 import { AnimationClip, BufferAttribute, NumberKeyframeTrack, Object3D, Vector2 } from "three";
 
-import { EXTENSION, VERTEX, keysOf, motionsOf, primitivesOf, restOf, saidOf, startOf, verticesOf, withoutFallback } from "./parts.js";
+import { EXTENSION, VERTEX, keysOf, motionsOf, primitivesOf, restOf, referenceOf, startOf, verticesOf, withoutFallback } from "./parts.js";
 
 const size = new Vector2();
 
@@ -83,22 +83,22 @@ class ATHMotionPlugin {
     return { ath, clock, vertices: new Map(parts.map(({ key, vertices }) => [key, vertices])) };
   }
 
-  async #part({ mesh, primitive, attributes, said }) {
+  async #part({ mesh, primitive, attributes, reference }) {
     const [position, numbers] = await Promise.all([attributes.POSITION, attributes[VERTEX]]
       .map((accessor) => (accessor === undefined ? null : this.parser.getDependency("accessor", accessor))));
-    return { key: `${mesh} ${primitive}`, vertices: verticesOf(position.count, said, numbers && ((i) => numbers.getX(i))),
+    return { key: `${mesh} ${primitive}`, vertices: verticesOf(position.count, reference, numbers && ((i) => numbers.getX(i))),
       positions: plain(position).array };
   }
 
   // Says of each mesh, and of what is cloned of it, which primitive it is.
   loadMesh(index) {
     const { primitives } = this.parser.json.meshes[index];
-    if (!primitives.some((primitive) => this.#plants[saidOf(primitive)?.motion])) return null;
+    if (!primitives.some((primitive) => this.#plants[referenceOf(primitive)?.motion])) return null;
     return this.parser.loadMesh(index).then((loaded) => {
       const meshes = loaded.isGroup ? loaded.children : [loaded];
       meshes.forEach((mesh, i) => {
-        const said = saidOf(primitives[i]);
-        if (this.#plants[said?.motion]) mesh.userData[EXTENSION] = { ...said, key: `${index} ${i}` };
+        const reference = referenceOf(primitives[i]);
+        if (this.#plants[reference?.motion]) mesh.userData[EXTENSION] = { ...reference, key: `${index} ${i}` };
       });
       return loaded;
     });

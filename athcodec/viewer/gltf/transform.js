@@ -4,7 +4,7 @@
 
 import { Extension, ExtensionProperty, PropertyType, RefList } from "@gltf-transform/core";
 
-import { EXTENSION, VERTEX, motionsOf, restOf, saidOf, verticesOf } from "./parts.js";
+import { EXTENSION, VERTEX, motionsOf, restOf, referenceOf, verticesOf } from "./parts.js";
 
 const GLB_BUFFER = "@glb.bin";
 
@@ -120,10 +120,10 @@ export class ATHMotionExtension extends Extension {
     for (const motion of motions) list.addMotion(motion);
     this.document.getRoot().setExtension(EXTENSION, list);
     (json.meshes ?? []).forEach(({ primitives }, mesh) => primitives.forEach((def, primitive) => {
-      const said = saidOf(def);
-      if (!said) return;
-      if (!motions[said.motion]) throw new RangeError(`${EXTENSION}: got motion ${said.motion}, expected one below ${motions.length}`);
-      const motion = this.createPrimitiveMotion().setMotion(motions[said.motion]).setFirstVertex(said.firstVertex ?? 0);
+      const reference = referenceOf(def);
+      if (!reference) return;
+      if (!motions[reference.motion]) throw new RangeError(`${EXTENSION}: got motion ${reference.motion}, expected one below ${motions.length}`);
+      const motion = this.createPrimitiveMotion().setMotion(motions[reference.motion]).setFirstVertex(reference.firstVertex ?? 0);
       context.meshes[mesh].listPrimitives()[primitive].setExtension(EXTENSION, motion);
     }));
     for (const motion of motions) motion.set("rest", digest(this.#rest(motion)));
@@ -140,14 +140,14 @@ export class ATHMotionExtension extends Extension {
   #primitives(motion) {
     return this.document.getRoot().listMeshes().flatMap((mesh) => mesh.listPrimitives()
       .filter((primitive) => primitive.getExtension(EXTENSION)?.getMotion() === motion)
-      .map((primitive) => ({ mesh, primitive, said: primitive.getExtension(EXTENSION) })));
+      .map((primitive) => ({ mesh, primitive, reference: primitive.getExtension(EXTENSION) })));
   }
 
   #rest(motion) {
-    return restOf(this.#primitives(motion).map(({ primitive, said }) => {
+    return restOf(this.#primitives(motion).map(({ primitive, reference }) => {
       const position = primitive.getAttribute("POSITION"), numbers = primitive.getAttribute(VERTEX), positions = position.getArray();
       if (!(positions instanceof Float32Array)) throw new RangeError("POSITION: got other numbers than float32");
-      return { positions, vertices: verticesOf(position.getCount(), { firstVertex: said.getFirstVertex() },
+      return { positions, vertices: verticesOf(position.getCount(), { firstVertex: reference.getFirstVertex() },
         numbers && ((i) => numbers.getScalar(i))) };
     }));
   }
@@ -190,11 +190,11 @@ export class ATHMotionExtension extends Extension {
     })) };
     for (const mesh of this.document.getRoot().listMeshes())
       mesh.listPrimitives().forEach((primitive, i) => {
-        const said = primitive.getExtension(EXTENSION), first = said?.getFirstVertex();
-        if (!said) return;
+        const reference = primitive.getExtension(EXTENSION), first = reference?.getFirstVertex();
+        if (!reference) return;
         const def = json.meshes[context.meshIndexMap.get(mesh)].primitives[i];
         def.extensions = { ...def.extensions,
-          [EXTENSION]: { motion: motions.indexOf(said.getMotion()), ...(first > 0 && { firstVertex: first }) } };
+          [EXTENSION]: { motion: motions.indexOf(reference.getMotion()), ...(first > 0 && { firstVertex: first }) } };
       });
     return this;
   }

@@ -19,12 +19,12 @@ export class Easel {
 
   get renderer() {
     if (this.#renderer) return this.#renderer;
-    const own = this.#canvas, options = { alpha: !own, antialias: true, powerPreference: "high-performance" };
-    const renderer = new WebGLRenderer(own ? { canvas: own, context: own.getContext("webgl2", options) ?? undefined } : options);
+    const pageCanvas = this.#canvas, options = { alpha: !pageCanvas, antialias: true, powerPreference: "high-performance" };
+    const renderer = new WebGLRenderer(pageCanvas ? { canvas: pageCanvas, context: pageCanvas.getContext("webgl2", options) ?? undefined } : options);
     Object.assign(renderer.shadowMap, { enabled: true, type: PCFShadowMap });
-    renderer.domElement.addEventListener(own ? "webglcontextrestored" : "webglcontextlost", () => {
+    renderer.domElement.addEventListener(pageCanvas ? "webglcontextrestored" : "webglcontextlost", () => {
       if (renderer !== this.#renderer) return;
-      if (!own) this.#drop();
+      if (!pageCanvas) this.#drop();
       for (const stage of this.stages) stage.restore();
     });
     return this.#renderer = renderer;
@@ -32,13 +32,13 @@ export class Easel {
 
   /** Draws by paint(renderer) onto a canvas. tone: properties of the renderer. */
   draw(canvas, opaque, tone, paint) {
-    const { renderer } = this, { width, height } = canvas, { x, y } = renderer.getSize(size), own = canvas === this.#canvas;
+    const { renderer } = this, { width, height } = canvas, { x, y } = renderer.getSize(size), isOurs = canvas === this.#canvas;
     if (width === 0 || height === 0) return;
-    if (own ? x !== width || y !== height : x < width || y < height)
-      renderer.setSize(own ? width : Math.max(x, width), own ? height : Math.max(y, height), false);
+    if (isOurs ? x !== width || y !== height : x < width || y < height)
+      renderer.setSize(isOurs ? width : Math.max(x, width), isOurs ? height : Math.max(y, height), false);
     renderer.setViewport(0, 0, width, height);
     paint(Object.assign(renderer, tone));
-    if (own) return;
+    if (isOurs) return;
     const pen = canvas.getContext("2d", { alpha: !opaque }), { domElement } = renderer;
     pen.clearRect(0, 0, width, height);
     pen.drawImage(domElement, 0, domElement.height - height, width, height, 0, 0, width, height);

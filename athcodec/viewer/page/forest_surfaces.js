@@ -16,9 +16,9 @@ function halfWidth(leaf, v) {
 
 /** For meshes of a file. sun: where its light comes from, a Vector3 of the world. */
 export function forestMaterial(metadata, sun) {
-  const found = surfacesOf(metadata), material = new MeshStandardNodeMaterial({ color: found ? 0xffffff : 0x7f9a55, roughness: 0.8, side: DoubleSide });
-  if (!found) return material;
-  const [stem, leaf] = found, at = attribute("uv", "vec2"), u = at.x, v = at.y, isLeaf = u.greaterThanEqual(1);
+  const surfaces = surfacesOf(metadata), material = new MeshStandardNodeMaterial({ color: surfaces ? 0xffffff : 0x7f9a55, roughness: 0.8, side: DoubleSide });
+  if (!surfaces) return material;
+  const [stem, leaf] = surfaces, at = attribute("uv", "vec2"), u = at.x, v = at.y, isLeaf = u.greaterThanEqual(1);
   const shade = floor(u.sub(1).mul(0.5)).div(7), across = fract(u.sub(1).mul(0.5)).mul(4).sub(1);
   const green = Fn(() => {
     const tone = mix(vec3(0.062, 0.155, 0.018), vec3(0.145, 0.255, 0.03), shade).toVar();

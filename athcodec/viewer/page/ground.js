@@ -130,8 +130,8 @@ export function meadow() {
 }
 
 export function tintMeadow(ground, dark) {
-  const [own, other] = dark ? COLOURS.dusk : COLOURS.day, { material } = ground.getObjectByName("disc");
-  material.color.set(own);
+  const [first, other] = dark ? COLOURS.dusk : COLOURS.day, { material } = ground.getObjectByName("disc");
+  material.color.set(first);
   material.userData.other.value.set(other);
-  ground.getObjectByName("grass").material.color.set(own).lerp(new Color(other), 0.45);
+  ground.getObjectByName("grass").material.color.set(first).lerp(new Color(other), 0.45);
 }

@@ -317,12 +317,12 @@ export class Plant {
     const [line, under] = this.show === "both" && this.colour === "plant" ? [OVER, PALE] : [null, null];
     for (const { kind, geometry, object } of this.#drawn) {
       if (!object.visible || object.geometry !== geometry) continue; // a GLB in its own materials
-      const fixed = kind === "lines" ? line : under, own = stored && kind === "plant";
+      const fixed = kind === "lines" ? line : under, isStored = stored && kind === "plant";
       const vertexColour = leafy && kind !== "lines" ? this.#leafColours() : colourOf;
       for (const [name, source] of coloured(geometry)) {
         const colour = geometry.getAttribute(name), out = colour.array;
         for (let i = 0, at = 0; i < source.length; i++, at += 3) {
-          const value = fixed ?? (own ? stored.array.subarray(i * stored.itemSize) : vertexColour(source[i]));
+          const value = fixed ?? (isStored ? stored.array.subarray(i * stored.itemSize) : vertexColour(source[i]));
           out[at] = value[0];
           out[at + 1] = value[1];
           out[at + 2] = value[2];
@@ -336,8 +336,8 @@ export class Plant {
   #leafColours() {
     const { ring, depth } = this.ath.branches, branch = this.ath.vertexBranch;
     return (vertex) => {
-      const own = branch[vertex], shade = 0.75 + 0.6 * ((own * 0.61803398875) % 1);
-      return ring[own] ? barkColour(Math.min(1, depth[own] / SLIMMEST)) : LEAF.map((value) => value * shade);
+      const number = branch[vertex], shade = 0.75 + 0.6 * ((number * 0.61803398875) % 1);
+      return ring[number] ? barkColour(Math.min(1, depth[number] / SLIMMEST)) : LEAF.map((value) => value * shade);
     };
   }
 

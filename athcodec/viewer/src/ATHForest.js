@@ -212,8 +212,8 @@ export class ATHForest extends Group {
         continue;
       }
       const distance = Math.max(eye.distanceTo(place) - 0.5 * still * size, 1e-6);
-      const own = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
-      if (own.length > 0) this.#putInstance(i, own, this.levelOfDetail ? tolerance : 0, seconds);
+      const binsOfClip = this.#bins.get(this.#turns[i + 3]) ?? this.#shown, tolerance = this.pixels * pixel * distance / size;
+      if (binsOfClip.length > 0) this.#putInstance(i, binsOfClip, this.levelOfDetail ? tolerance : 0, seconds);
     }
     this.counts = new Array(this.#ath.motion.levelCount).fill(0);
     this.vertices = 0;
@@ -221,10 +221,10 @@ export class ATHForest extends Group {
   }
 
   // An instance, whose numbers begin at `i`, by the bins of its clip.
-  #putInstance(i, own, tolerance, seconds) {
-    const wanted = own[this.#choose(own, tolerance)], { clip } = wanted.drawn.userData, state = this.#stateOf(i / 4, clip, wanted.level);
-    const bin = state.level === wanted.level ? wanted : this.#likeIt(own, state.level, tolerance);
-    const from = state.from < 0 ? null : own.find(({ level }) => level === state.from);
+  #putInstance(i, binsOfClip, tolerance, seconds) {
+    const wanted = binsOfClip[this.#choose(binsOfClip, tolerance)], { clip } = wanted.drawn.userData, state = this.#stateOf(i / 4, clip, wanted.level);
+    const bin = state.level === wanted.level ? wanted : this.#likeIt(binsOfClip, state.level, tolerance);
+    const from = state.from < 0 ? null : binsOfClip.find(({ level }) => level === state.from);
     if (!from) {
       this.#put(i, bin, seconds);
       return;
@@ -234,8 +234,8 @@ export class ATHForest extends Group {
   }
 
   // The coarsest geometry of a level that is good enough; its finest where none is.
-  #likeIt(own, level, tolerance) {
-    const bins = own.filter((bin) => bin.level === level);
+  #likeIt(binsOfClip, level, tolerance) {
+    const bins = binsOfClip.filter((bin) => bin.level === level);
     return bins[this.#choose(bins, tolerance)];
   }
 

@@ -116,14 +116,14 @@ class Channel {
 
   // For every node: where its matrix is in a texture, and the middle and half the size of the box of what it moves.
   #boxes({ branch, first, count, index }) {
-    const { rest, vertexSource } = this, point = new Vector3(), box = new Box3(), half = new Vector3(), found = [];
+    const { rest, vertexSource } = this, point = new Vector3(), box = new Box3(), half = new Vector3(), boxes = [];
     for (let part = 0; part < branch.length; part++) {
       if (branch[part] < 0) continue;
       box.makeEmpty();
       for (let i = first[part]; i < first[part] + count[part]; i++) box.expandByPoint(point.fromArray(rest, 3 * vertexSource[i]));
-      found.push([12 * index[part], ...box.getCenter(point), ...box.getSize(half).multiplyScalar(0.5)]);
+      boxes.push([12 * index[part], ...box.getCenter(point), ...box.getSize(half).multiplyScalar(0.5)]);
     }
-    return found;
+    return boxes;
   }
 
   #changed(message) {

@@ -169,16 +169,16 @@ export class ATHMotion extends EventDispatcher {
 
   /** The parts of the clip that can be shown at `level`, in seconds from its first frame: [{start, end}]. */
   ready(level) {
-    const { times, segments } = this.#channel, { firstFrame, frameCount, firstSegment } = this.clip, found = [];
+    const { times, segments } = this.#channel, { firstFrame, frameCount, firstSegment } = this.clip, spans = [];
     const last = firstFrame + frameCount - 1;
     const at = (segment) => times[Math.min(segments[segment], last)] - times[firstFrame];
     this.readyLevels.forEach((ready, i) => {
       if (ready < level) return;
       const start = at(firstSegment + i), end = at(firstSegment + i + 1);
-      if (found.at(-1)?.end === start) found.at(-1).end = end;
-      else found.push({ start, end });
+      if (spans.at(-1)?.end === start) spans.at(-1).end = end;
+      else spans.push({ start, end });
     });
-    return found;
+    return spans;
   }
 
   /** The deepest level that each segment of the clip can be shown at; -1: none. */

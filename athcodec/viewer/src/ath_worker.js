@@ -1,5 +1,5 @@
-// The worker of ATHLoader: one or more files, each a Session. Messages carry the number of their file; the first
-// of a file is "open", and each other type is a method of Session.
+// The worker of ATHLoader: one or more files, each a Session. Messages carry the number of their file. The first message of a file
+// is "open"; its Session takes all others.
 
 import { ready } from "../ath_decoder.mjs";
 import { describe, Session } from "./session.js";
@@ -19,7 +19,7 @@ function open({ file, url, options, bytes, clip, hostMesh, bandwidth }) {
 function take(data) {
   const session = sessions.get(data.file);
   if (data.type === "open") open(data);
-  else session?.[data.type](data);
+  else session?.take(data);
   if (data.type === "close") sessions.delete(data.file);
 }
 

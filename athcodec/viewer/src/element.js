@@ -73,7 +73,7 @@ export class ATHViewerElement extends (globalThis.HTMLElement ?? Object) {
   }
 
   #stand = document.createElement("div"); // Frame of the canvas.
-  #said = null;  // what is wrong, or a button
+  #notice = null;  // What is wrong, or a button.
   #still = matchMedia("(prefers-reduced-motion: reduce)").matches; // until somebody wants motion
   #canvas = null;
   #stage = null; // null where it is lazy and out of view
@@ -226,11 +226,11 @@ export class ATHViewerElement extends (globalThis.HTMLElement ?? Object) {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 
-  // In front of the picture, in place of what was said before.
+  // In front of the picture, in place of the notice before.
   #say(element = null, words = {}) {
-    this.#said?.remove();
-    this.#said = element && Object.assign(document.createElement(element), words);
-    if (element) this.shadowRoot.append(this.#said);
+    this.#notice?.remove();
+    this.#notice = element && Object.assign(document.createElement(element), words);
+    if (element) this.shadowRoot.append(this.#notice);
   }
 
   #fail(error) {

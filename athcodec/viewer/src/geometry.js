@@ -119,14 +119,14 @@ function setNormals(geometry, perVertex) {
 export function addAttributes(geometry, ath, attributes) {
   const domains = ath.statics.metadata.domains ?? {};
   for (const [name, attribute, sizes] of [["uv", "uv", [2]], ["normals", "normal", [3]], ["colors", "color", [3, 4]]]) {
-    const found = attributes[name], size = found?.shape.at(-1);
-    if (!found || found.shape.length !== 2 || !sizes.includes(size)) continue;
+    const stored = attributes[name], size = stored?.shape.at(-1);
+    if (!stored || stored.shape.length !== 2 || !sizes.includes(size)) continue;
     const { source, corners } = geometry.userData, perCorner = domains[name] === "corner";
-    const rows = found.shape[0], wanted = perCorner ? source.length : ath.rest.length / 3;
+    const rows = stored.shape[0], wanted = perCorner ? source.length : ath.rest.length / 3;
     if (rows !== wanted || (perCorner && !corners)) continue;
-    const scale = found.array instanceof Uint8Array ? 1 / 255 : 1;
+    const scale = stored.array instanceof Uint8Array ? 1 / 255 : 1;
     const order = perCorner ? Uint32Array.from({ length: rows }, (_, i) => i) : source;
-    const values = gather(new Float32Array(size * source.length), found.array, order, size).map((value) => value * scale);
+    const values = gather(new Float32Array(size * source.length), stored.array, order, size).map((value) => value * scale);
     setValues(geometry, attribute, values, size);
     if (name === "normals") geometry.userData.faces = null; // The normals of `setRest` are computed.
   }
@@ -163,8 +163,8 @@ function ears(points) {
   normal.normalize();
   x.set(Math.abs(normal.x) > 0.9 ? 0 : 1, Math.abs(normal.x) > 0.9 ? 1 : 0, 0).cross(normal).normalize();
   y.crossVectors(normal, x);
-  const found = ShapeUtils.triangulateShape(points.map((point) => new Vector2(point.dot(x), point.dot(y))), []);
-  return found.length > 0 ? found : null;
+  const triangles = ShapeUtils.triangulateShape(points.map((point) => new Vector2(point.dot(x), point.dot(y))), []);
+  return triangles.length > 0 ? triangles : null;
 }
 
 /** The geometry with fewer vertices: those in one cell of `size`, of one part, become the first of them. */

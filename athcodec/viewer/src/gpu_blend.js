@@ -33,10 +33,10 @@ export class Mixture {
     this.#shown = new Map(next.map(([clip, weight]) => [clip, weight / total]));
   }
 
-  /** Returns the weight of each clip for a plant that plays `own`. */
-  of(own) {
+  /** Returns the weight of each clip for a plant that plays `clipOfPlant`. */
+  of(clipOfPlant) {
     const weights = new Map();
-    for (const [clip, weight] of this.#shown) weights.set(clip ?? own, (weights.get(clip ?? own) ?? 0) + weight);
+    for (const [clip, weight] of this.#shown) weights.set(clip ?? clipOfPlant, (weights.get(clip ?? clipOfPlant) ?? 0) + weight);
     return weights;
   }
 }

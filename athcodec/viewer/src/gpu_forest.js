@@ -151,7 +151,7 @@ export class ATHForest extends Group {
   }
 
   #clip(name) {
-    return this.#ath.motion.clips.find(({ index, name: own }) => name === index || name === own);
+    return this.#ath.motion.clips.find(({ index, name: clipName }) => name === index || name === clipName);
   }
 
   // Has a clip's bytes fetched, as far as levels are shown.
@@ -173,12 +173,12 @@ export class ATHForest extends Group {
 
   /** Shows clips at once, in place of each instance's own. See webgpu.d.ts. */
   blend(weights) {
-    const found = Object.entries(weights ?? {}).map(([name, weight]) => [this.#clip(name), weight]);
-    const wrong = found.findIndex(([clip, weight]) => !clip || !(weight >= 0 && weight < Infinity));
-    if (wrong >= 0 || (weights && !found.some(([, weight]) => weight > 0)))
+    const shares = Object.entries(weights ?? {}).map(([name, weight]) => [this.#clip(name), weight]);
+    const wrong = shares.findIndex(([clip, weight]) => !clip || !(weight >= 0 && weight < Infinity));
+    if (wrong >= 0 || (weights && !shares.some(([, weight]) => weight > 0)))
       throw new RangeError(`blend: got ${JSON.stringify(weights)}, expected weights of clips, ${this.#ath.motion.clips.map(({ name }) => name).join(", ")}`);
-    for (const [clip, weight] of found) if (weight > 0) this.#fetch(clip);
-    this.#mixture.set(weights && new Map(found));
+    for (const [clip, weight] of shares) if (weight > 0) this.#fetch(clip);
+    this.#mixture.set(weights && new Map(shares));
     return this;
   }
 
@@ -205,8 +205,8 @@ export class ATHForest extends Group {
   #loadNext(hidden) {
     const next = this.levels.length, { motion } = this.#ath;
     if (this.#loading) return;
-    for (const own of this.levels) for (const [clip, { readyLevel }] of this.#motions)
-      if (!own.clips.has(clip) && readyLevel >= own.level) return this.#begin(() => this.#loadClip(own, clip));
+    for (const levelState of this.levels) for (const [clip, { readyLevel }] of this.#motions)
+      if (!levelState.clips.has(clip) && readyLevel >= levelState.level) return this.#begin(() => this.#loadClip(levelState, clip));
     if (next >= motion.levelCount || (next > 0 && this.#error(next - 1) <= hidden)) return;
     for (const view of this.#motions.values()) if (view.target < next) view.setLevel(next);
     if ([...this.#motions.values()].every(({ readyLevel }) => readyLevel >= next)) this.#begin(() => this.#load(next));
@@ -229,58 +229,58 @@ export class ATHForest extends Group {
     const shown = this.#plants.length, shared = this.#storage(new Float32Array(FLOATS * words[2] * shown), 1);
     const passes = new Passes(this.#device, this.#kernels, words, { slots: SLOTS * shown, shown, vertices: this.#bufferOf(shared) });
     const measured = this.#setOf(this.#measure, { 1: this.view, 5: this.reach, 6: this.#bufferOf(shared) });
-    const own = { level, passes, shared, measured, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
+    const levelState = { level, passes, shared, measured, clips: new Set(), places: new Map(), uploaded: 0, bytesOfMotion: 0, bytesOfParameters: 0, strength: NaN,
       slots: this.#plants.map(() => new Array(SLOTS).fill(-1)), before: this.#plants.map(() => null) };
     if (this.#ath.hasFaces) passes.setCorners(cornersOf(this.#ath.geometry, channel));
     for (const clip of this.#motions.keys()) {
-      if (!await this.#upload(own, clip, is)) {
+      if (!await this.#upload(levelState, clip, is)) {
         passes.dispose();
         return;
       }
     }
-    this.levels.push(own);
-    this.#addShapes(own, known);
+    this.levels.push(levelState);
+    this.#addShapes(levelState, known);
     this.#loading = false;
     this.dispatchEvent({ type: "level", level });
   }
 
-  async #loadClip(own, clip) {
+  async #loadClip(levelState, clip) {
     const version = this.#version;
-    if (await this.#upload(own, clip, () => version === this.#version)) this.#loading = false;
+    if (await this.#upload(levelState, clip, () => version === this.#version)) this.#loading = false;
   }
 
   // The segments of a clip at a level; false: nobody wants them any more. places: of frames of the file, {segment, frame}.
-  async #upload(own, clip, is) {
-    const { channel } = this.#ath, { passes, level, places } = own;
+  async #upload(levelState, clip, is) {
+    const { channel } = this.#ath, { passes, level, places } = levelState;
     for (let s = clip.firstSegment; s < clip.firstSegment + clip.segmentCount; s++) {
       const { words, coded } = await channel.gpu(level, s);
       if (!is()) return false;
       const segment = passes.segment(words);
-      this.#account(own, "bytesOfMotion");
+      this.#account(levelState, "bytesOfMotion");
       coded.forEach((frame, i) => places.set(channel.segments[s] + i, { segment, frame }));
     }
-    own.clips.add(clip);
+    levelState.clips.add(clip);
     return true;
   }
 
   // Bytes that have been uploaded since the last time.
-  #account(own, kind) {
-    this[kind] += own.passes.uploaded - own.uploaded;
-    own[kind] += own.passes.uploaded - own.uploaded;
-    own.uploaded = own.passes.uploaded;
+  #account(levelState, kind) {
+    this[kind] += levelState.passes.uploaded - levelState.uploaded;
+    levelState[kind] += levelState.passes.uploaded - levelState.uploaded;
+    levelState.uploaded = levelState.passes.uploaded;
   }
 
   // Geometries of a level: the finest for where its error is a pixel, coarser ones up to where the level before takes over.
-  #addShapes(own, known) {
-    const { channel, motion, rest, sphere } = this.#ath, { level } = own, least = this.#error(level);
+  #addShapes(levelState, known) {
+    const { channel, motion, rest, sphere } = this.#ath, { level } = levelState, least = this.#error(level);
     const most = level > 0 ? this.#error(level - 1) : sphere.radius / 4, node = channel.nodeNumbers(known);
     known.vertices.forEach((texel, vertex) => { if (texel < 0) node[vertex] = -1; }); // exact runs: one space
     let before = level === motion.levelCount - 1 ? this.#geometry : clustered(this.#geometry, rest, CELL * least, node);
-    this.#addShape(own, before, least);
+    this.#addShape(levelState, before, least);
     for (let tolerance = Math.max(COARSER * least, sphere.radius / 2000); tolerance < most; tolerance *= COARSER) {
       const less = clustered(this.#geometry, rest, CELL * tolerance, node);
       if (less.userData.source.length > FEWER * before.userData.source.length) continue;
-      this.#addShape(own, less, tolerance);
+      this.#addShape(levelState, less, tolerance);
       before = less;
     }
     const list = Float32Array.from({ length: 2 * this.#shapes.length }), lists = new Uint32Array(list.buffer);
@@ -291,7 +291,7 @@ export class ATHForest extends Group {
     this.#device.queue.writeBuffer(this.tolerances, 0, list);
   }
 
-  #addShape(own, simple, tolerance) {
+  #addShape(levelState, simple, tolerance) {
     const list = this.#shapes.length;
     if (list === MOST_SHAPES) return;
     const geometry = this.#shape(simple, tolerance).clone(), { source } = simple.userData, lines = !geometry.hasAttribute("normal");
@@ -302,11 +302,11 @@ export class ATHForest extends Group {
       (_, i) => this.#ath.rest[3 * vertexOf[Math.floor(i / 3)] + i % 3]), 3)); // the rest pose: not what rays find
     geometry.setIndirect(this.#draws, 20 * list);
     this.#zeros[5 * list] = geometry.index.count;
-    const material = this.#material(lines, own.level), drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
-    this.#bind(material, geometry, own, list);
+    const material = this.#material(lines, levelState.level), drawn = lines ? new LineSegments(geometry, material) : new Mesh(geometry, material);
+    this.#bind(material, geometry, levelState, list);
     drawn.frustumCulled = false; // instances are, one by one
     drawn.castShadow = drawn.receiveShadow = !lines;
-    this.#shapes.push({ level: own.level, tolerance, list, drawn, size: geometry.index.count });
+    this.#shapes.push({ level: levelState.level, tolerance, list, drawn, size: geometry.index.count });
     this.add(drawn);
   }
 
@@ -355,9 +355,9 @@ export class ATHForest extends Group {
     this.#loadNext(hidden);
     this.#place(seconds);
     const shown = this.levels.filter(({ level }) => level === 0 || this.#error(level - 1) > hidden);
-    for (const own of this.levels)
-      if (shown.includes(own)) this.#show(own);
-      else own.before.fill(null); // What a level showed earlier is not the image before the one that shows it again.
+    for (const levelState of this.levels)
+      if (shown.includes(levelState)) this.#show(levelState);
+      else levelState.before.fill(null); // What a level showed earlier is not the image before the one that shows it again.
     this.#select(shown);
   }
 
@@ -385,36 +385,36 @@ export class ATHForest extends Group {
   #place(seconds) {
     const now = performance.now(), share = this.ease > 0 ? 1 - Math.exp((this.#eased - now) / (1000 * this.ease)) : 1;
     this.#eased = now;
-    this.#mixture.advance(share, (clip) => this.levels.every((own) => own.clips.has(clip)));
+    this.#mixture.advance(share, (clip) => this.levels.every((levelState) => levelState.clips.has(clip)));
     const { times } = this.#ath.channel;
-    this.#times = this.#plants.map(({ clip: own, phase }) => [...this.#mixture.of(own)].flatMap(([clip, part]) =>
+    this.#times = this.#plants.map(({ clip: clipOfPlant, phase }) => [...this.#mixture.of(clipOfPlant)].flatMap(([clip, part]) =>
       framesAt(times, clip, seconds + phase * roundOf(clip)).map(({ frame, weight }) => ({ frame, weight: part * weight }))));
   }
 
   // A level at that time: what is not there yet is placed, and all plants shown.
-  #show(own) {
-    const places = [], shows = [], strength = this.#strength, changed = own.strength !== strength;
-    own.strength = strength;
+  #show(levelState) {
+    const places = [], shows = [], strength = this.#strength, changed = levelState.strength !== strength;
+    levelState.strength = strength;
     this.#times.forEach((frames, plant) => {
-      const before = own.before[plant];
-      if (changed) own.slots[plant].fill(-1);
-      const shown = frames.length > 2 ? this.#blended(own, plant, frames, places) : this.#between(own, plant, frames, places);
+      const before = levelState.before[plant];
+      if (changed) levelState.slots[plant].fill(-1);
+      const shown = frames.length > 2 ? this.#blended(levelState, plant, frames, places) : this.#between(levelState, plant, frames, places);
       shows.push({ ...shown, previous: before?.slots ?? shown.slots, previousWeight: before?.weight ?? shown.weight });
-      own.before[plant] = shown;
+      levelState.before[plant] = shown;
     });
-    own.passes.run(places, shows);
-    this.#account(own, "bytesOfParameters");
+    levelState.passes.run(places, shows);
+    this.#account(levelState, "bytesOfParameters");
   }
 
   // At most two frames, of which each is placed once for all times around it.
-  #between(own, plant, frames, places) {
-    const kept = own.slots[plant], first = SLOTS * plant, names = frames.map(({ frame }) => frame);
+  #between(levelState, plant, frames, places) {
+    const kept = levelState.slots[plant], first = SLOTS * plant, names = frames.map(({ frame }) => frame);
     const slots = names.map((frame) => {
       let slot = kept.indexOf(frame);
       if (slot < 0) {
-        slot = kept.findIndex((old, k) => !names.includes(old) && !own.before[plant]?.slots.includes(first + k));
+        slot = kept.findIndex((old, k) => !names.includes(old) && !levelState.before[plant]?.slots.includes(first + k));
         kept[slot] = frame;
-        places.push({ sources: [own.places.get(frame)], slot: first + slot, strength: own.strength });
+        places.push({ sources: [levelState.places.get(frame)], slot: first + slot, strength: levelState.strength });
       }
       return first + slot;
     });
@@ -422,12 +422,12 @@ export class ATHForest extends Group {
   }
 
   // Several, which are blended before branches are placed: at this time alone.
-  #blended(own, plant, frames, places) {
-    const kept = own.slots[plant], first = SLOTS * plant;
-    const slot = kept.findIndex((_, k) => !own.before[plant]?.slots.includes(first + k));
+  #blended(levelState, plant, frames, places) {
+    const kept = levelState.slots[plant], first = SLOTS * plant;
+    const slot = kept.findIndex((_, k) => !levelState.before[plant]?.slots.includes(first + k));
     kept[slot] = -1;
-    const sources = frames.filter(({ weight }) => weight > 0).map(({ frame, weight }) => ({ ...own.places.get(frame), weight }));
-    places.push({ sources, slot: first + slot, strength: own.strength });
+    const sources = frames.filter(({ weight }) => weight > 0).map(({ frame, weight }) => ({ ...levelState.places.get(frame), weight }));
+    places.push({ sources, slot: first + slot, strength: levelState.strength });
     return { slots: [first + slot, first + slot], weight: 0 };
   }
 

@@ -3,16 +3,16 @@
 // The vertices of each object or copy that some frame hides: [{first, stop, runs}]; none where the arrays are not here.
 function hiddenParts({ presence, part_names: names }, { part_vertex_counts: counts, part_copies: copies }) {
   if (!presence || !Array.isArray(names) || counts?.array.length !== names.length) return [];
-  const found = [];
+  const parts = [];
   for (let part = 0, first = 0; part < names.length; first += Number(counts.array[part++])) {
-    const count = Number(counts.array[part]), many = Number(copies?.array[part] ?? 1), own = presence[names[part]];
-    if (own) found.push({ first, stop: first + count, runs: own });
-    for (let copy = 0, size = count / many; !own && copy < many; copy++) {
+    const count = Number(counts.array[part]), many = Number(copies?.array[part] ?? 1), shown = presence[names[part]];
+    if (shown) parts.push({ first, stop: first + count, runs: shown });
+    for (let copy = 0, size = count / many; !shown && copy < many; copy++) {
       const runs = presence[`${names[part]}:${copy}`];
-      if (runs) found.push({ first: first + copy * size, stop: first + (copy + 1) * size, runs });
+      if (runs) parts.push({ first: first + copy * size, stop: first + (copy + 1) * size, runs });
     }
   }
-  return found;
+  return parts;
 }
 
 /** Leaves out of a geometry what is hidden in each frame. */

@@ -1,5 +1,5 @@
-// A session is one file in a worker: a message of the page calls the method of that name, and `post` answers. It knows the views;
-// bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
+// A session is one file in a worker. It takes the messages of the page, whose types a table lists, and answers by `post`. It knows
+// the views; bytes are fetched by Download, decoded by Jobs, mixed by Mixing and packed for the GPU by Texels.
 
 import { Download } from "./download.js";
 import { clipAt } from "./frames.js";
@@ -12,6 +12,19 @@ import { BLENDED, Texels } from "./texels.js";
 const STATE_MS = 50; // Least time between two messages about the state.
 
 export class Session {
+  // What the page may ask for, by the type of its message.
+  static #tasks = new Map([
+    ["picture", (session, message) => session.#picture(message)],
+    ["parts", (session, message) => session.#parts(message)],
+    ["bake", (session, message) => session.#bake(message)],
+    ["gpu", (session, message) => session.#gpu(message)],
+    ["wind", (session, message) => session.#wind(message)],
+    ["drop", (session, message) => session.#drop(message)],
+    ["all", (session) => session.#download.look(true)],
+    ["abort", (session) => session.#download.abort()],
+    ["close", (session) => session.close()],
+  ]);
+
   #post; #clip; #download;
   #file; #texels; #jobs;  // These are there once the file's front is.
   #views = new Map();     // {id: {level, frames, wanted, mixing}}: #view explains them.
@@ -44,6 +57,13 @@ export class Session {
       this.#post({ type: "failed", ...describe(error) });
       this.close();
     }
+  }
+
+  /** Does what a message of the page asks for. */
+  take(message) {
+    const task = Session.#tasks.get(message.type);
+    if (!task) throw new TypeError(`message: got the type ${message.type}, expected one of ${[...Session.#tasks.keys()].join(", ")}`);
+    task(this, message);
   }
 
   #open(file) {
@@ -116,7 +136,7 @@ export class Session {
     this.#jobs.run();
   }
 
-  drop({ view }) {
+  #drop({ view }) {
     this.#views.delete(view);
   }
 
@@ -124,15 +144,15 @@ export class Session {
     return this.#views.get(id)?.mixing ?? new Mixing(this.#file, this.#jobs);
   }
 
-  /** Tells of the parts of a level, where the page does not know them. */
-  parts({ level }) {
+  // Tells of the parts of a level that the page does not know.
+  #parts({ level }) {
     if (this.#known.has(level)) return;
     this.#known.add(level);
     this.#post({ type: "parts", level, parts: this.#texels.parts(level), texels: this.#texels.count(level) });
   }
 
-  /** Answers ATHMotion's #ask, whatever goes wrong: a picture that cannot be made as asked for is made without what fades. */
-  picture(message) {
+  // Answers ATHMotion's #ask, whatever goes wrong: a picture that cannot be made as asked for is made without what fades.
+  #picture(message) {
     const { view, id, clip, seconds, level, exactly = false } = message, start = performance.now();
     const answer = { type: "picture", view, id, shown: -1, exactly };
     try {
@@ -142,14 +162,14 @@ export class Session {
       try {
         if (!exactly) {
           answer.message = `picture of clip ${clip} at ${seconds} s, level ${level}: ${answer.message}`;
-          this.drop(message);
+          this.#drop(message);
           Object.assign(answer, this.#answer({ ...message, old: null, heat: false, buffer: null }));
         }
       } catch {
         // The answer holds an error already.
       }
     }
-    if (answer.shown >= 0) this.parts({ level: answer.cut ?? answer.shown });
+    if (answer.shown >= 0) this.#parts({ level: answer.cut ?? answer.shown });
     answer.ms = performance.now() - start;
     this.#post(answer, [answer.data, answer.heat]);
   }
@@ -211,8 +231,8 @@ export class Session {
       Math.hypot(a[3 * i] - b[3 * i], a[3 * i + 1] - b[3 * i + 1], a[3 * i + 2] - b[3 * i + 2]));
   }
 
-  /** Tells of all frames of a clip at a level, every `step`-th of them: see Texels. */
-  async bake({ id, clip, level, step }) {
+  // Tells of all frames of a clip at a level, or every `step`-th of them: see Texels.
+  async #bake({ id, clip, level, step }) {
     try {
       const shownAt = (frame) => this.#jobs.exactly(frame, level);
       const baked = await this.#texels.bake(this.#file.clips[clip], level, step, shownAt, this.#closing.signal);
@@ -222,8 +242,9 @@ export class Session {
     }
   }
 
-  /** Tells the GPU form of a level or, with `segment`, of a segment at it and which of its coded frames shows each of its frames. */
-  gpu({ id, level, segment = null }) {
+  // Tells the GPU form of a level. With `segment`, tells that of a segment at the level, and for each of the segment's frames the
+  // coded frame that shows it.
+  #gpu({ id, level, segment = null }) {
     const file = this.#file, answer = { type: "gpu", id, words: null, coded: null };
     try {
       answer.words = segment === null ? file.gpuLevel(level) : file.gpuSegment(segment, level);
@@ -237,17 +258,9 @@ export class Session {
     this.#post(answer, [answer.words, answer.coded]);
   }
 
-  /** Answers with the weight of each clip for a wind. */
-  wind({ id, strength, heading }) {
+  // Answers with the weight of each clip for a wind.
+  #wind({ id, strength, heading }) {
     this.#post({ type: "wind", id, weights: this.#file.windWeights(this.#winds, strength, heading) });
-  }
-
-  all() {
-    this.#download.look(true);
-  }
-
-  abort() {
-    this.#download.abort();
   }
 
   close() {

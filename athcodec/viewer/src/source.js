@@ -177,10 +177,10 @@ export class HttpSource {
       return 0;
     }
     this.ranged = true;
-    const found = /bytes (\d+)-\d+\/(\d+|\*)/.exec(answer.headers.get("Content-Range") ?? "");
-    if (!found) return offset; // another site that keeps the header to itself
-    if (found[2] !== "*") this.total = Number(found[2]);
-    return Number(found[1]);
+    const match = /bytes (\d+)-\d+\/(\d+|\*)/.exec(answer.headers.get("Content-Range") ?? "");
+    if (!match) return offset; // another site that keeps the header to itself
+    if (match[2] !== "*") this.total = Number(match[2]);
+    return Number(match[1]);
   }
 
   #sameFile(answer) {

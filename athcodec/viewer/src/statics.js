@@ -22,12 +22,12 @@ function derivedEdges(file) {
  * stored edges, or those that follow from the branches. */
 export function readPrelude(file) {
   const edges = file.polygons("edges");
-  const found = {
+  const attributes = {
     metadata: file.metadata(),
     faces: file.polygons("faces"),
     edges: edges?.derived ? derivedEdges(file) : edges?.array ?? null,
   };
-  return { ...found, skeleton: found.edges ?? derivedEdges(file) };
+  return { ...attributes, skeleton: attributes.edges ?? derivedEdges(file) };
 }
 
 /** Named arrays of numbers, as far as they are here: {name: {array, shape}}. */

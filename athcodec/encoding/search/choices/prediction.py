@@ -117,15 +117,15 @@ def best_prediction(
     def best(share: float, most: float) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
         ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
-        found = coded(Way(ratios[0], error_share=share))
-        if found.bytes > HOPELESS * most:
-            return found
-        tried = [found, *(coded(Way(ratio, error_share=share)) for ratio in ratios[1:])]
+        prediction = coded(Way(ratios[0], error_share=share))
+        if prediction.bytes > HOPELESS * most:
+            return prediction
+        tried = [prediction, *(coded(Way(ratio, error_share=share)) for ratio in ratios[1:])]
         return min(tried, key=lambda one: one.bytes)
 
     if usual:
-        found = coded(Way(USUAL_REST_RATIO))
-        return found if found.bytes < most_bytes else None
+        prediction = coded(Way(USUAL_REST_RATIO))
+        return prediction if prediction.bytes < most_bytes else None
     some, are_long = by_ratio(USUAL_REST_RATIO), max(one.positions.shape[2] for one in samples) >= 2 * TRIAL_FRAMES
     try:
         for frames, too_many in [(FEW_FRAMES, FAR_TOO_MANY)] * are_long + [(TRIAL_FRAMES, TOO_MANY)]:
@@ -134,19 +134,19 @@ def best_prediction(
                 return None
     except BoundError:
         return None
-    found = best(1.0, most_bytes)
-    if found.bytes > HOPELESS * most_bytes:
+    prediction = best(1.0, most_bytes)
+    if prediction.bytes > HOPELESS * most_bytes:
         return None
-    if found.twitches and smoothness != "bytes":
+    if prediction.twitches and smoothness != "bytes":
         relative = source.smallest_bound(bound) / source.seen.diagonal
-        most = min(most_bytes, SMOOTHNESS[smoothness] * found.bytes)
+        most = min(most_bytes, SMOOTHNESS[smoothness] * prediction.bytes)
         for share in _still_shares(relative, smoothness):
             still = best(share, most)
             if still.bytes < most:
-                found = still
+                prediction = still
                 if not (still.twitches and smoothness == "motion"):
                     break
-    return found if found.bytes < most_bytes else None
+    return prediction if prediction.bytes < most_bytes else None
 
 
 def _still_shares(relative: float, smoothness: str) -> list[float]:
