@@ -68,6 +68,7 @@ GONE = {  # Features that the format had, and that the figures spoke against.
 USES: Mapping[Feature, str] = {  # Uses that bytes do not judge.
     Feature.RIGID: "the shape of leaves",
     Feature.TURN: "the shape of leaves",
+    Feature.FREE_RIGID: "leaves that fall",
     Feature.LEVEL_0_REST: "the first picture",
     Feature.REFINED_REST: "the first picture",
     Feature.HOST: "the mesh of the host",
@@ -100,8 +101,8 @@ stays for its bytes if both are {LEAST:g} % or more in one of them, or else for 
 """
 
 NOT_JUDGED = """
-Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, rigid parts
-and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0 alone, by which the
+Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, leaves that
+fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0 alone, by which the
 first picture comes early. Not to be left out by an encoder alone: modes of a free beam for maps, gaps in
 bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """

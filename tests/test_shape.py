@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from files import coded
 from moving_meshes import leafed_tree
-from plants import diagonal, plant
+from plants import clip_of, diagonal, plant, turns
 
 import athcodec
 from athcodec.cli import main
@@ -129,3 +129,27 @@ def test_the_command_line_takes_a_rest_error(tree, scratch):
 def test_a_rest_error_that_is_none_is_refused(tree, scratch, wrong):
     with pytest.raises(BoundError):
         athcodec.encode(tree, scratch / "tree.ath", rest_error=wrong)
+
+
+def test_leaves_that_fall_from_the_stem_that_a_source_names_cost_little_more_than_on_their_own():
+    rng = np.random.default_rng(4)
+    stem, time = np.linspace([0.0, 0, 0], [0, 1, 0], 21), np.arange(48) / 24
+    waves = np.sin(rng.uniform(3, 6, (24, 1)) * time + rng.uniform(0, 6, (24, 1)))
+    swing = 0.4 * waves[..., None] * rng.uniform(0.5, 1, (24, 1, 3))
+    card = np.array([[u, v, 0.3 * u * v] for u in (0, 0.5, 1) for v in (-0.4, 0.4)]) * 0.05
+    parts, faces = [stem + 0.1 * np.sin(2 * np.pi * time)[:, None, None] * stem[:, 1:2] ** 2 * [1.0, 0, 0]], []
+    for leaf, angles in enumerate(swing):
+        since = np.maximum(time - 0.2 - 0.05 * leaf, 0)[:, None] * (leaf % 2)
+        foot = parts[0][:, 8 + leaf // 2] + since * [0.3, 0, 0.2] - since**2 * [0, 0.4, 0]
+        faces.append(np.array([[0, 1, 3, 2], [2, 3, 5, 4]]) + sum(part.shape[1] for part in parts))
+        parts.append(foot[:, None] + card @ turns(angles + 3 * since * [0, 0.6, 0.8]).swapaxes(1, 2))
+    positions, branch = np.concatenate(parts, axis=1), np.repeat(np.arange(25), [21] + 24 * [6])
+    on_stem, on_their_own = (
+        len(
+            athcodec.encode(
+                clip_of(positions, positions[0], branch, parent, faces=np.concatenate(faces)), max_error=1e-4
+            )
+        )
+        for parent in ([-1] + 24 * [0], 25 * [-1])
+    )
+    assert on_stem < on_their_own
