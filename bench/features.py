@@ -102,9 +102,9 @@ stays for its bytes if both are {LEAST:g} % or more in one of them, or else for 
 
 NOT_JUDGED = """
 Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, leaves that
-fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0 alone, by which the
-first picture comes early. Not to be left out by an encoder alone: modes of a free beam for maps, gaps in
-bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
+fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0
+alone, by which the first picture comes early. Not to be left out by an encoder alone: modes of a free beam for maps,
+gaps in bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """
 
 
