@@ -139,6 +139,8 @@ def test_corrections_of_one_long_branch_are_estimated_on_vertices_all_along_it(p
     count = 1525
     branches = np.zeros(1, BRANCH)
     branches["parent"], branches["attach"], branches["count"] = -1, -1, count
-    vertices = Plan(branches, count).sample(part).vertices
+    plan = Plan(branches, count)
+    pieces, vertices = plan.pieces.copy(), plan.sample(part).vertices
     thirds, _ = np.histogram(vertices, 3, (0, count))
     assert len(vertices) < count and (thirds > 0).all()
+    assert np.array_equal(plan.pieces, pieces)

@@ -211,7 +211,7 @@ class Plan:
         pieces = pieces[:: max(1, int(pieces["count"].sum()) * part // (2 * self.vertex_count))]
         if len(pieces) < LEAST_PIECES:  # Few long pieces that begin elsewhere would leave one of them, calm or wild.
             stride = max(1, min(part, len(self.pieces) // LEAST_PIECES))
-            pieces = self.pieces[stride // 2 :: stride]
+            pieces = self.pieces[stride // 2 :: stride].copy()
         first, count = np.cumsum(pieces["count"]) - pieces["count"], pieces["count"]
         vertices = np.arange(count.sum()) + np.repeat(pieces["first"] - first, count)
         pieces["first"] = first

@@ -41,7 +41,8 @@ STEADY_NEXT = 0.2  # Change of the distance of two vertices, over their motion, 
 FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are of two parts.
 STILL = 1e-6  # Of the diagonal: change of a distance that is none.
 PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the source says nothing.
-COPIES, ALIKE_PARTS = 8, 0.8  # Parts, and share of them that are of one size, which is no accident.
+COPIES = 8  # Parts from which on it is no accident that most are of one size.
+ALIKE_PARTS = 0.8  # Share of the parts that are then of one size.
 PLANTS = 0.5  # Part of the branches that are roots by their price above which they are plants side by side.
 FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
