@@ -84,7 +84,7 @@ def test_info_says_as_json_what_programs_need(facts, encoded):
     assert facts["fps"] == pytest.approx(30) and facts["nodes"] == 99
     assert facts["bytes"] == encoded.stat().st_size and facts["complete"] is True
     assert facts["max_error_bound"] == 0.001
-    names = [*(f"depth {depth}" for depth in range(3)), "layer 2 of 3", "layer 3 of 3"]
+    names = [*(f"depth {depth}" for depth in range(2)), *(f"layer {layer} of 3" for layer in (1, 2, 3))]
     assert [level["name"] for level in facts["levels"]] == names
     for level in facts["levels"]:
         assert {"level", "nodes", "bytes", "max_error", "rms_error"} <= level.keys()
@@ -149,7 +149,7 @@ def test_decode_names_the_files_that_are_there_then(encoded, tmp_path, capsys, n
 def test_decode_takes_the_coarsest_level_within_a_length(encoded, facts, tmp_path, capsys):
     error = facts["levels"][2]["max_error"]
     assert run("decode", encoded, tmp_path / "a.h5", "--max-error", f"{100.1 * error}cm") == 0
-    assert "level 2 (depth 2)" in capsys.readouterr().out
+    assert f"level 2 ({facts['levels'][2]['name']})" in capsys.readouterr().out
     with athcodec.open(encoded) as decoder, read_hdf5(tmp_path / "a.h5") as part:
         assert np.array_equal(part.block(0, 120), decoder.positions(level=2))
     assert run("decode", encoded, tmp_path / "b.h5", "--max-error", "1e-12") == 1
