@@ -17,6 +17,7 @@ from programs import printed
 import athcodec
 from athcodec import batch, cli, exporters, sources
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
+from athcodec.files import kinds
 from athcodec.sources.registry import registered
 
 PLUGIN = Path(__file__).parent / "points_plugin"
@@ -30,6 +31,8 @@ def site(tmp_path, monkeypatch):
     folder, modules = tmp_path / "site", set(sys.modules)
     folder.mkdir()
     monkeypatch.syspath_prepend(folder)
+    for name in ("_KINDS", "_PATTERNS"):  # What packages add to the kinds of files ends with the test.
+        monkeypatch.setattr(kinds, name, dict(getattr(kinds, name)))
 
     def install(package: Path = PLUGIN, name: str = "athcodec-points", **files: str) -> None:
         project = tomllib.loads((package / "pyproject.toml").read_text())["project"]
