@@ -103,7 +103,7 @@ class Integers(ctypes.Structure):
 class Rounding(ctypes.Structure):
     """ath_rounding."""
 
-    _fields_ = fields(c_double, "dead_zone", c_double * 3, "ends")
+    _fields_ = fields(c_double, "dead_zone", c_double * 3, "ends", c_int32, "roots_turn reserved")
 
 
 class CoreMetEnds(ctypes.Structure):

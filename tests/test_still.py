@@ -92,8 +92,9 @@ def test_a_plant_whose_trunk_stands_still_stays_whole():
     assert still_parts(MotionClip(positions, tree.time, edges=None), 0.0) is None
 
 
+@pytest.mark.parametrize("ladder", ["none", "decades"])
 @pytest.mark.parametrize(("turn", "stop"), [(0.25, 1.0), (1.0, 1.0), (0.5, 0.5)])
-def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(turn, stop):
+def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(turn, stop, ladder):
     """`turn`: whole turns; `stop`: the part of the clip after which the table stands still."""
     tree = blown_tree(3, 40, 48)
     positions = tree.block(0, tree.frame_count).astype(np.float64)
@@ -102,7 +103,8 @@ def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_sta
     bound = 1e-4 * float(np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0)))
     on = {"vertex_branch": tree.vertex_branch, "branch_parent": tree.branch_parent}
     standing, turning = (
-        size_of(MotionClip(one.astype(np.float32), tree.time, **on), bound) for one in (positions, turned)
+        size_of(MotionClip(one.astype(np.float32), tree.time, **on), bound, ladder=ladder)
+        for one in (positions, turned)
     )
     assert turning <= 1.05 * standing + 100
 

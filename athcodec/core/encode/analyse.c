@@ -216,6 +216,18 @@ static void code_even_track(const ath_stream *stream, int32_t T, double step, co
     code_track(stream, T, steps, rounding, track, predicted, quantised, shown);
 }
 
+/* Codes a track as it is predicted. */
+static void keep_track(const ath_stream *stream, int32_t T, const double steps[3], const int32_t *predicted,
+                       double *track, int32_t *quantised)
+{
+    int32_t count = 0;
+    for (int32_t axis = 0; axis < 3 && predicted; axis++)
+        count = ath_max(count, row_extent(predicted + axis * T, stream->temporal_rank));
+    for (int32_t i = 0; i < 3 * T; i++) quantised[i] = predicted ? predicted[i] : 0;
+    for (int32_t axis = 0; axis < 3; axis++)
+        ath_inverse_temporal(stream, T, count, steps[axis], quantised + axis * T, track + axis * T);
+}
+
 static void rest_centre(const ath_plan *plan, const ath_piece *piece, double centre[3])
 {
     centre[0] = centre[1] = centre[2] = 0.0;
@@ -444,13 +456,18 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         code_shift(motion, piece, before, rows, scratch, rounding);
     }
     if (ath_has_rotation(plan, piece, base)) {
-        to_local(T, piece, &scratch->at, source, local);
         ath_turning turning = ath_turning_of(plan, piece, base);
-        int carries = turned_vertices(plan, piece) > piece->count;
-        fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, floats, scratch->track);
-        ath_into_axes(T, &turning, scratch->track);
+        int keeps = rounding->roots_turn && piece->parent >= 0 && !(piece->flags & ATH_RIGID);
         if (before) ath_predict_rotation(plan, motion, piece, before, scratch, rows);
-        code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
+        if (keeps)
+            keep_track(base, T, turning.steps, rows->predicted_rotation, scratch->track, rows->rotation);
+        else {
+            int carries = turned_vertices(plan, piece) > piece->count;
+            to_local(T, piece, &scratch->at, source, local);
+            fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, floats, scratch->track);
+            ath_into_axes(T, &turning, scratch->track);
+            code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
+        }
         ath_out_of_axes(T, &turning, scratch->track);
         ath_turn(T, scratch->track, scratch->at.rotation);
     }

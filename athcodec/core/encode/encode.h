@@ -104,9 +104,11 @@ ATH_ENCODER_API void ath_gather(int32_t vertex_count, int32_t frames, const int3
 enum { ATH_END_PARTS = 3 };
 
 /* How numbers become integers. Below `dead_zone` steps they are 0. `ends` weighs the errors of a row's value, slope and
- * bend at either end, in squared steps; 0: they do not count. */
+ * bend at either end, in squared steps; 0: they do not count. roots_turn: whether only the first pieces of roots, and
+ * rigid ones, are turned; the others keep the rotation that they are predicted to have. */
 typedef struct ath_rounding {
     double dead_zone, ends[ATH_END_PARTS];
+    int32_t roots_turn, reserved;
 } ath_rounding;
 
 /* Quantise the coefficients and tracks of pieces in closed loop, and the maps of nodes. source: vertex-major doubles

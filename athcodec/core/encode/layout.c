@@ -51,7 +51,7 @@ static const layout LAYOUTS[] = {
     STRUCT(ath_integers)
         EIGHT(ath_integers, coefficients, tracks, node_tracks, node_steps, predicted, predicted_tracks, shape_counts, shape_first)
         TWO(ath_integers, shapes, duals) ONE(ath_integers, first_rows)
-    STRUCT(ath_rounding) TWO(ath_rounding, dead_zone, ends)
+    STRUCT(ath_rounding) FOUR(ath_rounding, dead_zone, ends, roots_turn, reserved)
     STRUCT(ath_met_ends) FOUR(ath_met_ends, decided, count, closed, reserved)
     STRUCT(ath_header) ONE(ath_header, place_count)
         EIGHT(ath_header, file_length, front_length, max_error, chunk_count, vertex_count, branch_count, frame_count, segment_count)

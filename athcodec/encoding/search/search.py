@@ -307,9 +307,10 @@ class Search:
             if trials.is_layered and self.makes_all_again and settings.learned_pieces is not None:
                 yield replace(settings, learned_pieces=None)
             return
-        main, least = settings.rotation_step_factors[trials.prelude(settings).plan.main_level], math.inf
-        for factor in dict.fromkeys((main, 0)):
-            candidate = settings.with_rotations(factor)
+        factors, least = settings.rotation_step_factors, math.inf
+        main = factors[trials.prelude(settings).plan.main_level]
+        turned = settings.with_rotations(main) if main else settings.with_turning_roots(max(factors))
+        for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
                 if trials.cost(replace(candidate, learned_pieces=None)) > LEARNED_MODES_MAX_GAIN * least:
                     continue

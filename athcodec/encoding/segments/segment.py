@@ -578,7 +578,7 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: 
     segment = SegmentMotion(
         plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
     )
-    segment.analyse(positions, Rounding(qz.DEAD_ZONE), bent=bent)
+    segment.analyse(positions, Rounding(qz.DEAD_ZONE, roots_turn=settings.roots_turn), bent=bent)
     return segment
 
 

@@ -16,11 +16,12 @@ BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SH
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
 OF_PRELUDE = "rest_step rest_slack connected_rest lags shape_of forms still layer free_rigid".split()
 OF_MOTION = (
-    "step level_steps turn_step rotation_step_factors periodic learned_bases common_basis learned_pieces learned_coded"
+    "step level_steps turn_step rotation_step_factors roots_turn periodic learned_bases common_basis learned_pieces "
+    "learned_coded"
 ).split()
 # Fields that a large plant takes from its sample as they are.
 OF_SAMPLE = (
-    "step level_steps rest_step rotation_step_factors free_rigid still learned_bases common_basis periodic "
+    "step level_steps rest_step rotation_step_factors roots_turn free_rigid still learned_bases common_basis periodic "
     "learned_coded"
 ).split()
 OF_BRANCHES = "forms lags details rigid".split()  # Arrays with an entry for each branch.
@@ -43,6 +44,7 @@ class Settings:
     rotation_step_factors: tuple[int, ...]  # The rotation factor of each level.
     learned_bases: tuple[bool, ...]  # Whether each level has a learned time basis.
     node_steps: np.ndarray  # (levels,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
+    roots_turn: bool = False  # Whether roots alone turn, and other branches are only predicted to.
     layer: int = 0  # Number of the layer of precision that the settings are for.
     still: bool = False  # Whether bending of branches turns nothing that they carry.
     free_rigid: bool = False  # Whether rigid branches are loose.
@@ -86,7 +88,9 @@ class Settings:
     @property
     def rounding(self) -> Rounding:
         """How numbers become integers."""
-        return Rounding(qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))))
+        return Rounding(
+            qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))), roots_turn=self.roots_turn
+        )
 
     def step_of(self, level: int) -> float:
         """Return the step of the stems of a level."""
@@ -103,6 +107,10 @@ class Settings:
     def with_rotations(self, factor: int) -> Settings:
         """Return the settings with one rotation factor for all levels."""
         return replace(self, rotation_step_factors=(factor,) * self.levels)
+
+    def with_turning_roots(self, factor: int) -> Settings:
+        """Return the settings with a rotation factor of roots alone, in streams that hold all branches."""
+        return replace(self.with_rotations(factor), roots_turn=True)
 
     def in_learned_bases(self) -> Settings:
         """Return the settings with a learned time basis of its own for each level."""
