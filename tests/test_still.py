@@ -120,6 +120,27 @@ def planted(count: int = 9, each: int = 6, frames: int = 10) -> np.ndarray:
     return np.stack([x, np.broadcast_to(height, x.shape), z], axis=-1).reshape(frames + 1, -1, 3)
 
 
+@pytest.mark.parametrize("apart", [1.0, 0.05])
+def test_feet_of_plants_that_stand_close_are_no_ground(apart):
+    """Without faces the points next to a foot are feet of other plants."""
+    positions = planted(100, 8)
+    feet = np.repeat(positions[0].reshape(100, 8, 3)[:, 0], 8, axis=0)
+    positions = positions - (1 - apart) * feet
+    assert still_parts(MotionClip(positions.astype(np.float32), np.arange(len(positions)) / 30), 0.0) is None
+
+
+def test_what_stands_still_does_not_make_the_rest_pose_of_what_moves_finer():
+    """A rest pose that only the source names, such as that of a rig, is for binding."""
+    tree, ground, _ = scene(side=9, branches=120)
+    both, time, count = beside(tree, ground), tree.time, tree.vertex_count
+    rest = both[0].copy()
+    rest[:count, 0] += 0.2 * (rest[:count, 1] - rest[:count, 1].min())
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(both.reshape(-1, 3), axis=0)))
+    alone = size_of(MotionClip(both[:, :count], time, rest=rest[:count]), bound)
+    alone += size_of(MotionClip(both[:, count:], time), bound)
+    assert size_of(MotionClip(both, time, rest=rest), bound) <= 1.05 * alone
+
+
 def test_common_motion_is_taken_off_as_if_plants_stood():
     standing = planted()
     time = np.linspace(0, 1, len(standing))[:, None]

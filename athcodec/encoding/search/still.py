@@ -15,7 +15,7 @@ from athcodec.encoding.model.motion import LearnedModes, Plan
 from athcodec.encoding.options.shape import detail_of, finer_than
 from athcodec.encoding.search.sample import PlantSample
 from athcodec.encoding.search.start import still_choice
-from athcodec.encoding.segments.segment import Source, branch_records, poses_size
+from athcodec.encoding.segments.segment import Source, branch_records, poses_size, prelude_size
 from athcodec.encoding.segments.settings import OF_BRANCHES, Choice, Settings
 from athcodec.motion.branches.still import LEAST_STILL
 from athcodec.motion.thresholds import Thresholds
@@ -66,13 +66,19 @@ class SplitSource:
         return replace(self, ath=self.source.seen.ath(thresholds))._choice(chosen, bound)
 
     def _choice(self, chosen: Choice, bound: float) -> Choice:
-        stillness = self._still_settings(bound)
-        is_predicted = chosen.predicted
-        settings = self._settings(chosen.settings, stillness, is_predicted)
+        stillness, source = self._still_settings(bound), self.about(chosen.reference)
+        may_be_coarser = not chosen.predicted
+        settings = self._settings(chosen.settings, stillness, may_be_coarser)
         connected = [replace(settings, connected_rest=flag) for flag in (False, True)]
         if chosen.settings.connected_rest != stillness.connected_rest:
-            settings = min(connected, key=lambda one: poses_size(self.about(chosen.reference), self.ath, one))
-        first = self._settings(chosen.first_layer, stillness, is_predicted)
+            settings = min(connected, key=lambda one: poses_size(source, self.ath, one))
+        if may_be_coarser and source.has_source_rest:  # Details hold for that pose, too, which may be far coarser.
+            alike = self._settings(chosen.settings, stillness, may_be_coarser=False)
+            alike = replace(alike, connected_rest=settings.connected_rest)
+            tried = settings, alike
+            settings = min(tried, key=lambda one: prelude_size(source, self.ath, one))
+            may_be_coarser = settings is not alike
+        first = self._settings(chosen.first_layer, stillness, may_be_coarser)
         first = replace(first, connected_rest=settings.connected_rest)
         return replace(
             chosen,
@@ -91,11 +97,12 @@ class SplitSource:
         ath = source.seen.ath(self.ath.thresholds)
         return still_choice(source, ath, (1 - STILL_SHARE) * bound, 1).settings
 
-    def _settings(self, moving: Settings, still: Settings, is_predicted: bool) -> Settings:
+    def _settings(self, moving: Settings, still: Settings, may_be_coarser: bool) -> Settings:
+        """Return the settings of both. may_be_coarser: whether the rest pose of what stands still may be coarser."""
         details, step, slack = self._joined(moving.details, still.details), moving.rest_step, moving.rest_slack
         own_step = qz.single(step)
         is_coarser = still.rest_slack > 0 and slack == 0 and still.rest_step > step
-        if is_coarser and not is_predicted and not self.source.exact_rest and (still.details == 0).any():
+        if is_coarser and may_be_coarser and not self.source.exact_rest and (still.details == 0).any():
             step, slack = still.rest_step, still.rest_slack
             of_step = int(detail_of(np.array([own_step]))[0])
             finer = finer_than(moving.details, own_step)

@@ -492,6 +492,15 @@ def poses_size(source: Source, ath: Ath, settings: Settings) -> float:
         return math.inf
 
 
+def prelude_size(source: Source, ath: Ath, settings: Settings) -> float:
+    """Return the bytes of hierarchy, reference pose and the source's rest pose; infinite if they cannot keep the
+    bound."""
+    try:
+        return CodedPrelude(source, ath, settings, bases=False).prelude_bytes
+    except BoundError:
+        return math.inf
+
+
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
     """Return SOURCE_REST about the reference pose as decoded, (N, 3) float64 less the origin; empty if not needed."""
     if not source.has_source_rest:

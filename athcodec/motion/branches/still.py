@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import components, links_of, near_neighbours
 from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
@@ -14,6 +15,7 @@ from athcodec.motion.polygons import Polygons
 
 NEIGHBOURS = 8  # Nearest points of each vertex without links, among which it stands.
 LEAST_STILL = 64  # Vertices below which what stands still stays with what moves.
+FEET_SHARE = 0.25  # Moving points that are next to points that stand still, over these, from which on they are feet.
 INSIDE_SHARE = 0.2  # Smallest share of a connected part that stands still apart from the rest of it.
 
 
@@ -29,21 +31,37 @@ def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
     Returns
     -------
     (N,) bool array or None
-        Whole connected parts, or the inside of what stands still in a part of which much stands and much moves; None if
-        that is too little, or nothing moves.
+        Whole connected parts, or the inside of what stands still in a part of which much stands and much moves, but no
+        points without links that are the feet of plants. None if that is too little, or nothing moves.
     """
     if stands_still(clip):
         return None
     still = _still_vertices(clip, most)
     if np.count_nonzero(still) < LEAST_STILL or still.all():
         return None
-    links = _links(clip)
+    links, is_linked = _links(clip)
     label = components(links, clip.vertex_count)
     size, standing = np.bincount(label), np.bincount(label, still)
     inside = _inside(still, links)
     apart = (standing == size) | (np.bincount(label, inside) >= INSIDE_SHARE * size)
     chosen: np.ndarray = np.where((standing == size)[label], True, inside) & apart[label]
+    points = np.flatnonzero(chosen & ~is_linked)
+    chosen[points[_are_feet(np.asarray(clip.rest), points, ~still, label[points])]] = False
     return chosen if LEAST_STILL <= np.count_nonzero(chosen) < clip.vertex_count else None
+
+
+def _are_feet(rest: np.ndarray, points: np.ndarray, moves: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Return which points that stand still are feet of plants, (K,) bool. In the group of a foot many points have a
+    moving one right above them that is nearest to no other, or beside them in the order of the source; few points of
+    the ground are next to any plant. moves: (N,) bool; label: (K,) group of each point."""
+    if not len(points):
+        return np.zeros(0, bool)
+    count = np.bincount(label)
+    nearest = scipy_module("spatial").cKDTree(rest[moves]).query(rest[points])[1]
+    above = np.bincount(np.unique(np.stack([label, nearest]), axis=1)[0], minlength=len(count))
+    around = np.pad(moves, 1)
+    beside = np.bincount(label, around[points] | around[points + 2])
+    return (np.maximum(above, beside) >= FEET_SHARE * count)[label]
 
 
 def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
@@ -63,16 +81,16 @@ def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
     return still
 
 
-def _links(clip: MotionClip) -> np.ndarray:
+def _links(clip: MotionClip) -> tuple[np.ndarray, np.ndarray]:
     """Return pairs of vertices that belong together, (L, 2): over edges and faces, or by nearness where a vertex has
-    neither."""
+    neither; and which vertices have edges or faces, (N,) bool."""
     links = links_of(clip)
     bare = np.ones(clip.vertex_count, bool)
     bare[links] = False
     points = np.flatnonzero(bare)
-    if len(points) < 2:
-        return links
-    return np.concatenate([links, points[near_neighbours(np.asarray(clip.rest)[points], NEIGHBOURS)]])
+    if len(points) > 1:
+        links = np.concatenate([links, points[near_neighbours(np.asarray(clip.rest)[points], NEIGHBOURS)]])
+    return links, ~bare
 
 
 def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
