@@ -173,9 +173,13 @@ def row_by_row(model: type, context: type):
     return lambda: SimpleNamespace(**{name: Rows(context, rows[name]) for name in rows})
 
 
+@lru_cache(1)
+def compiled(text: str) -> types.CodeType:
+    return compile(ast.fix_missing_locations(Divisions().visit(code_of(text))), str(FORMAT), "exec")
+
+
 def run(text: str = TEXT) -> types.ModuleType:
     """Return a module in which all blocks have been executed; line numbers are those of the text."""
-    tree = ast.fix_missing_locations(Divisions().visit(code_of(text)))
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -186,7 +190,7 @@ def run(text: str = TEXT) -> types.ModuleType:
             raise names["Invalid"]("BAD_CHUNK") from None
 
     names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8})
-    exec(compile(tree, str(FORMAT), "exec"), names)
+    exec(compiled(text), names)
     for name in ("NumberModel", "ExactModel"):
         names[name] = row_by_row(names[name], names["Context"])
     names.update({name: lru_cache(size)(names[name]) for name, size in KEPT_OF_NUMBERS.items()})
