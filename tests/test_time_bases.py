@@ -92,7 +92,7 @@ def test_time_bases_do_not_describe_the_rounding_of_the_rest_pose(tmp_path, monk
     assert learned_before_rounding < 0.95 * size()
 
 
-def sum_of_shapes(count: int = 5, side: int = 20, frames: int = 120) -> athcodec.MotionClip:
+def sum_of_shapes(count: int = 5, side: int = 12, frames: int = 120) -> athcodec.MotionClip:
     """A sheet that bends far by smooth shapes, whose weights walk at random."""
     rng, (x, y) = np.random.default_rng(3), np.meshgrid(*(np.linspace(0, 1, side),) * 2, indexing="ij")
     waves = [np.sin((1 + i) * x + (2 - i / 2) * y + i) * x for i in range(count)]
