@@ -42,9 +42,10 @@ def in_series_of_levels(seed: int = 5, frames: int = 128, count: int = 12) -> at
     return clip_of(bones, bones.bent(turns[..., None] * np.array([1, 0, 0.5])))
 
 
-def test_levels_that_need_bases_of_their_own_get_one_layer_unless_layers_are_named(tmp_path):
+@pytest.mark.parametrize("effort", ["fast", pytest.param("default", marks=pytest.mark.slow)])
+def test_levels_that_need_bases_of_their_own_get_one_layer_unless_layers_are_named(effort, tmp_path):
     def size(**options) -> int:
-        return athcodec.encode(clip, tmp_path / "a.ath", attributes="none", **options).bytes
+        return athcodec.encode(clip, tmp_path / "a.ath", attributes="none", effort=effort, **options).bytes
 
     clip = in_series_of_levels()
     assert size() <= 1.01 * size(ladder="none") < 0.8 * size(ladder=(1e-2, 1e-3))
