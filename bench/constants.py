@@ -182,6 +182,11 @@ def _tree(module: ModuleType) -> ast.Module:
     return ast.parse(inspect.getsource(module))
 
 
+@cache
+def _imports(module: ModuleType) -> tuple[ast.ImportFrom, ...]:
+    return tuple(node for node in ast.walk(_tree(module)) if isinstance(node, ast.ImportFrom))
+
+
 def _top_names(module: ModuleType) -> list[str]:
     """Return the upper-case names that a module assigns at its top."""
     targets = [target for node in _tree(module).body if isinstance(node, ast.Assign) for target in node.targets]
@@ -215,8 +220,8 @@ def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
     places = [(sys.modules[constant.module], constant.name)]
     for name, module in list(sys.modules.items()):
         if name.startswith("athcodec.") and getattr(module, "__file__", None):
-            for node in ast.walk(_tree(module)):
-                if isinstance(node, ast.ImportFrom) and node.module == constant.module:
+            for node in _imports(module):
+                if node.module == constant.module:
                     places += [(module, one.asname or one.name) for one in node.names if one.name == constant.name]
     return tuple(places)
 

@@ -2,8 +2,9 @@
 
     python -m spec.document FILE [ITEM [MESH]]     answers as spec/conformance.py asks; ITEM is `open` if left out
 
-The blocks run as they stand but for two things that change no result: a quotient by zero is what IEEE 754 says, where
-Python would stop, and pure functions that are asked the same again keep their answers.
+The blocks run as they stand but for three things that change no result: a quotient by zero is what IEEE 754 says, where
+Python would stop, pure functions that are asked the same again keep their answers, and models of numbers make a row of
+their contexts when it is first used.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ import zstandard
 
 FORMAT = Path(__file__).resolve().parent.parent / "FORMAT.md"
 TEXT = FORMAT.read_text(encoding="utf-8")
-# How many answers each of these pure functions keeps.
+# How many answers each of these pure functions keeps; those of the second take lists, too.
+KEPT_OF_NUMBERS = {"averaged": 1 << 16, "number_class": 1 << 16}
 KEPT = {"crc32c": 256, "waves_over_time": 64, "node_waves_over_time": 64, "cantilever": 1024}
 
 # ---- what the document takes for granted ---------------------------------------------------------------------
@@ -153,9 +155,31 @@ def code_of(text: str) -> ast.Module:
     return ast.parse("\n".join(lines), str(FORMAT))
 
 
+class Rows(dict):
+    """Rows of contexts by their number. A decoder uses few of the thousand of a model, and most of its time went by
+    making the others."""
+
+    def __init__(self, context: type, rows: list[list]):
+        self.context, self.rows = context, rows
+
+    def __missing__(self, number: int) -> list:
+        self[number] = [self.context(first.one) for first in self.rows[number]]
+        return self[number]
+
+
+def row_by_row(model: type, context: type):
+    """Return a function that makes such a model, whose attributes are all rows of contexts."""
+    rows = vars(model())
+    return lambda: SimpleNamespace(**{name: Rows(context, rows[name]) for name in rows})
+
+
+@lru_cache(1)
+def compiled(text: str) -> types.CodeType:
+    return compile(ast.fix_missing_locations(Divisions().visit(code_of(text))), str(FORMAT), "exec")
+
+
 def run(text: str = TEXT) -> types.ModuleType:
     """Return a module in which all blocks have been executed; line numbers are those of the text."""
-    tree = ast.fix_missing_locations(Divisions().visit(code_of(text)))
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -166,7 +190,10 @@ def run(text: str = TEXT) -> types.ModuleType:
             raise names["Invalid"]("BAD_CHUNK") from None
 
     names.update(TAKEN_FOR_GRANTED | KINDS | {"utf8": utf8})
-    exec(compile(tree, str(FORMAT), "exec"), names)
+    exec(compiled(text), names)
+    for name in ("NumberModel", "ExactModel"):
+        names[name] = row_by_row(names[name], names["Context"])
+    names.update({name: lru_cache(size)(names[name]) for name, size in KEPT_OF_NUMBERS.items()})
     for name, size in KEPT.items():
         kept = lru_cache(size)(names[name])
         names[name] = lambda *arguments, kept=kept: kept(*(tuple(x) if isinstance(x, list) else x for x in arguments))

@@ -28,7 +28,7 @@ class CountedCore:
         (folder / "counter.c").write_text(COUNTER)
         used, library, counter = compiler().path, folder / "libath_counted.so", folder / "counter.o"
         subprocess.run([used, "-fPIC", "-c", folder / "counter.c", "-o", counter], check=True)
-        flags = [*COMMON, "-O1", "-g0", f"-I{CORE}", f"-I{CORE / 'include'}", "-fPIC", "-shared"]
+        flags = [*COMMON, "-O0", "-g0", f"-I{CORE}", f"-I{CORE / 'include'}", "-fPIC", "-shared"]
         flags.append("-fsanitize-coverage=trace-pc")
         subprocess.run([used, *flags, *decoder_sources(), counter, "-o", library], check=True)
         self._library = ctypes.CDLL(str(library))

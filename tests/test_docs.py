@@ -30,6 +30,7 @@ from athcodec.sources import read_hdf5, sample_path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FRAMES = 50  # Of the sample's motion, as many as the examples name.
 SERVES = re.compile(r"athcodec view (?!.*--export)")  # runs until it is interrupted
 
 
@@ -48,15 +49,16 @@ def files(tmp_path_factory):
     from bench.trees.ride import Skeleton
 
     folder = tmp_path_factory.mktemp("examples")
-    shutil.copy(sample_path(), folder / "tree.h5")
-    with read_hdf5(sample_path()) as clip:
+    with read_hdf5(sample_path()) as sample:
+        clip = sample.replace(positions=sample.block(0, FRAMES), time=sample.time[:FRAMES])
+        athcodec.write(clip, folder / "tree.h5")
         athcodec.encode(clip, folder / "tree.ath", effort="fast")
         clip.attributes["slack"] = np.ones(clip.vertex_count, np.float32)
         athcodec.write(clip, folder / "tree.usdc")
         athcodec.write(clip, folder / "tree.glb")
-        for name, frames in {"calm": slice(0, 50), "gale": slice(60, 120), "storm": slice(60, 120)}.items():
+        for name, frames in {"calm": slice(0, 36), "gale": slice(60, 96), "storm": slice(60, 96)}.items():
             motion = dataclasses.replace(
-                clip, positions=clip.positions[frames], time=clip.time[frames], rest=clip.rest.astype(np.float32)
+                sample, positions=sample.positions[frames], time=sample.time[frames], rest=clip.rest.astype(np.float32)
             )
             athcodec.write(motion, folder / f"{name}.h5")
             athcodec.write(motion, folder / f"{name}.abc")
@@ -268,10 +270,12 @@ def test_a_type_checker_finds_nothing_in_the_script_of_a_user_and_its_mistakes_i
     (tmp_path / "pyrightconfig.json").write_text(
         json.dumps({"extraPaths": [str(ROOT)], "typeCheckingMode": "standard"})
     )
-    command = [sys.executable, "-m", checker, *CHECKERS[checker], "user.py"]
     mistakes = {"rel_error=1e-3": "rel_eror=1e-3", "path, fps": "5, fps", "at_level(0)": "at_level('fine')"}
-    for wrong, right in [("", ""), *((wrong, right) for right, wrong in mistakes.items())]:
-        (tmp_path / "user.py").write_text(USER.replace(right, wrong))
-        environment = os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(tmp_path / "cache")}
-        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment)
-        assert (done.returncode == 0) == (not wrong), done.stdout + done.stderr
+    scripts = {"user": USER} | {f"mistake_{i}": USER.replace(*words) for i, words in enumerate(mistakes.items())}
+    for name, text in scripts.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    command = [sys.executable, "-m", checker, *CHECKERS[checker], *(f"{name}.py" for name in scripts)]
+    environment = os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(tmp_path / "cache")}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment)
+    wrong = set(re.findall(r"(\w+)\.py:\d+.* error: ", done.stdout))
+    assert done.returncode and wrong == scripts.keys() - {"user"}, done.stdout + done.stderr

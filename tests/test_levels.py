@@ -164,7 +164,8 @@ def test_no_level_of_a_clip_of_the_samples_is_worse_than_the_one_before(name):
 @pytest.fixture(scope="module")
 def parts(bushy_clip):
     """A lossless file in layers that shows not all of its levels."""
-    return Parts.of(athcodec.encode(bushy_clip, rel_error=1e-4, segment_frames=16, ladder=LADDER, lossless=True))
+    clip = bushy_clip.replace(positions=bushy_clip.block(0, 20), time=bushy_clip.time[:20])
+    return Parts.of(athcodec.encode(clip, rel_error=1e-4, segment_frames=16, ladder=LADDER, lossless=True))
 
 
 def test_levels_that_are_not_shown_have_no_maps_and_no_number(parts):

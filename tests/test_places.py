@@ -292,7 +292,7 @@ def test_a_draft_keeps_the_places_that_were_found(tmp_path):
 
 @pytest.mark.parametrize("faces", [False, True])
 def test_a_mesh_split_by_its_faces_takes_as_much_as_the_welded_one_and_two_bits_a_vertex(faces):
-    welded = tube_mesh(60, 8, 40)
+    welded = tube_mesh(30, 8, 40)
     options = {"attributes": "all"} if faces else {}
     split, whole = by_faces(welded), welded
     if not faces:
@@ -303,7 +303,7 @@ def test_a_mesh_split_by_its_faces_takes_as_much_as_the_welded_one_and_two_bits_
 
 
 def test_a_table_in_any_order_takes_little_more_than_its_entropy():
-    clip = plant(14, branches=40, longest=9)
+    clip = plant(14, branches=20, longest=9)
     order = shuffled(clip.vertex_count, 3 * clip.vertex_count)
     places = find_places(split_of(clip, order))
     entropy = -sum(n * np.log2(n / len(order)) for n in places.sizes) / 8

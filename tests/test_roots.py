@@ -90,7 +90,7 @@ def test_the_cheapest_forest_is_the_one_that_trying_all_finds():
 
 
 def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():
-    clip = fields.stems(seed=3, plants=20).clip
+    clip = fields.stems(seed=3, plants=4).clip
     true, found = (
         len(athcodec.encode(one, ladder="none", attributes="none"))
         for one in (clip, clip.replace(vertex_branch=None, branch_parent=None, stem_index=None))

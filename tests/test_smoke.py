@@ -150,7 +150,7 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "picture": "CLIP --out OUT",
     "wrappings": "--help",
     "onto": "--picture OUT",
-    "structure": "trellis --short",
+    "structure": "hedge_stems --short",
     "split": "--help",
     "branches": "CLIP --results OUT",
     "constants": "CLIP --modules rotations --frames 4 --rel-error 1e-2 --results OUT",
@@ -162,10 +162,12 @@ RUNS = {  # Words of each verb after a clip, or alone.
 def test_every_verb_of_the_benchmark_runs(verb, core_object, small_file, tmp_path, monkeypatch, capsys):
     from bench import decode
     from bench.__main__ import VERBS, main  # here, because what all verbs need takes long to import
+    from bench.scenes import SCENES, Recipe, fields
 
     assert RUNS.keys() == VERBS.keys()
     monkeypatch.setattr(decode, "compile_program", lambda folder: built(folder, [decode.SOURCE, core_object]))
     monkeypatch.setenv("ATHCODEC_BENCH_DATA", str(tmp_path))
+    monkeypatch.setitem(SCENES, "hedge_stems", Recipe("two shrubs", fields.stems, {"seed": 3, "plants": 2}))
     own = {"CLIP": str(small_file), "OUT": str(tmp_path / "out"), "RAW": "simple (differences, zstd)"}
     words = [own.get(word, word) for word in RUNS[verb].split()]
     if words == ["--help"]:

@@ -42,9 +42,10 @@ def in_series_of_levels(seed: int = 5, frames: int = 128, count: int = 12) -> at
     return clip_of(bones, bones.bent(turns[..., None] * np.array([1, 0, 0.5])))
 
 
-def test_levels_that_need_bases_of_their_own_get_one_layer_unless_layers_are_named(tmp_path):
+@pytest.mark.parametrize("effort", ["fast", pytest.param("default", marks=pytest.mark.slow)])
+def test_levels_that_need_bases_of_their_own_get_one_layer_unless_layers_are_named(effort, tmp_path):
     def size(**options) -> int:
-        return athcodec.encode(clip, tmp_path / "a.ath", attributes="none", **options).bytes
+        return athcodec.encode(clip, tmp_path / "a.ath", attributes="none", effort=effort, **options).bytes
 
     clip = in_series_of_levels()
     assert size() <= 1.01 * size(ladder="none") < 0.8 * size(ladder=(1e-2, 1e-3))
@@ -92,7 +93,7 @@ def test_time_bases_do_not_describe_the_rounding_of_the_rest_pose(tmp_path, monk
     assert learned_before_rounding < 0.95 * size()
 
 
-def sum_of_shapes(count: int = 5, side: int = 20, frames: int = 120) -> athcodec.MotionClip:
+def sum_of_shapes(count: int = 5, side: int = 12, frames: int = 120) -> athcodec.MotionClip:
     """A sheet that bends far by smooth shapes, whose weights walk at random."""
     rng, (x, y) = np.random.default_rng(3), np.meshgrid(*(np.linspace(0, 1, side),) * 2, indexing="ij")
     waves = [np.sin((1 + i) * x + (2 - i / 2) * y + i) * x for i in range(count)]

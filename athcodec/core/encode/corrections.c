@@ -40,14 +40,12 @@ static int32_t last_frame(const track *track, int32_t frame, int32_t away)
     return ath_min(track->frames - 1, frame + away);
 }
 
-/* Returns the error of a frame with `more` parts of a correction added. */
-static void error_with(const track *track, int32_t t, const int32_t q[3], int32_t more, double error[3])
+/* Returns the error of a frame on an axis with `more` parts of a correction added. */
+static double error_with(const track *track, int32_t t, int32_t k, double more)
 {
-    for (int32_t k = 0; k < 3; k++) {
-        double parts = track->parts[t][k] + (double)q[k] * more, sum = track->decoded[t][k];
-        if (parts != 0.0) sum = ath_corrected(sum, parts, track->step);
-        error[k] = (track->is_float64 ? sum : ath_single(sum)) - track->wanted[t][k];
-    }
+    double parts = track->parts[t][k] + more, sum = track->decoded[t][k];
+    if (parts != 0.0) sum = ath_corrected(sum, parts, track->step);
+    return (track->is_float64 ? sum : ath_single(sum)) - track->wanted[t][k];
 }
 
 static void bend_frames(track *track, int32_t from, int32_t to)
@@ -127,11 +125,18 @@ static double estimated_bits(const ath_correction *own, const ath_correction *li
     return bits;
 }
 
-/* A place of a correction. With the vector x in parts of a step, it adds x * (2 * slope + x * curve) to the squared
- * bends. */
+/* Corrections that are tried at a place are on each axis shorter than the whole one by fewer steps than this. */
+enum { SIZES = 3 };
+
+/* A place of a correction. */
 typedef struct {
-    int32_t frame, width, beyond; /* beyond: frames in reach that are beyond the limit */
-    double slope[3], curve;
+    int32_t frame, width;
+    int32_t whole[3];           /* the correction that removes most of the worst frame's error */
+    double still[3];            /* the worst frame's squared error by axis, as it is */
+    double worst[3][SIZES];     /* and with the whole correction, and with shorter ones */
+    double least[3];            /* the smallest of these */
+    int32_t is_weighed, beyond; /* beyond: frames in reach that are beyond the limit */
+    double slope[3], curve; /* the vector x in parts of a step adds x * (2 * slope + x * curve) to the squared bends */
 } place;
 
 /* Fills the frames of a footprint, which an end may cut off. */
@@ -148,20 +153,22 @@ static int32_t footprint_bend(const track *track, int32_t frame, int32_t width, 
 
 static int has_bend(const track *track, int32_t t) { return t > 0 && t < track->frames - 1; }
 
-/* Returns how a correction at a frame changes the bends of the error. Beyond an end that another segment joins, the
- * error goes on and the correction adds nothing. */
-static place place_at(const track *track, int32_t frame, int32_t width)
+/* Fills how a correction changes the bends of the error, which few places need to know. Beyond an end that another
+ * segment joins, the error goes on and the correction adds nothing. */
+static void weigh_place(const track *track, place *place)
 {
-    place place = {frame, width, 0, {0.0, 0.0, 0.0}, 0.0};
-    int32_t reach = ath_footprint_reach[width] + 1, stop = last_frame(track, frame, reach - 1);
-    for (int32_t t = first_frame(frame, reach - 1); t <= stop; t++) place.beyond += track->squares[t] > track->limit2;
+    int32_t frame = place->frame, reach = ath_footprint_reach[place->width] + 1;
     int32_t first = track->closed & 1 ? -1 : 1, last = track->closed & 2 ? track->frames : track->frames - 2;
+    int32_t stop = last_frame(track, frame, reach - 1);
+    place->is_weighed = 1;
+    place->beyond = 0;
+    place->curve = place->slope[0] = place->slope[1] = place->slope[2] = 0.0;
+    for (int32_t t = first_frame(frame, reach - 1); t <= stop; t++) place->beyond += track->squares[t] > track->limit2;
     for (int32_t t = ath_max(first, frame - reach); t <= ath_min(last, frame + reach); t++) {
-        double bend = footprint_bend(track, frame, width, t);
-        for (int32_t k = 0; k < 3 && has_bend(track, t); k++) place.slope[k] += bend * track->bends[t][k];
-        place.curve += bend * bend;
+        double bend = footprint_bend(track, frame, place->width, t);
+        for (int32_t k = 0; k < 3 && has_bend(track, t); k++) place->slope[k] += bend * track->bends[t][k];
+        place->curve += bend * bend;
     }
-    return place;
 }
 
 /* Whether a closed end would cut off more of a footprint than its faint end. */
@@ -186,20 +193,59 @@ static double more_bends(const track *track, const place *place, const int32_t q
 /* Returns the squared error of a frame with a candidate. */
 static double square_with(const track *track, const candidate *tried, int32_t t)
 {
-    double error[3];
-    error_with(track, t, tried->own.q, ath_footprint_part(tried->own.width, t - tried->frame), error);
+    double error[3], part = ath_footprint_part(tried->own.width, t - tried->frame);
+    for (int32_t k = 0; k < 3; k++) {
+        int32_t q = tried->own.q[k];
+        error[k] = q == 0 ? track->error[t][k] : error_with(track, t, k, q * part);
+    }
     return square(error);
+}
+
+/* Fills the squared errors of the worst frame with all that may be tried at a place. */
+static void open_place(const track *track, int32_t frame, int32_t width, place *place)
+{
+    int32_t t = track->worst;
+    double part = ath_footprint_part(width, t - frame);
+    place->frame = frame;
+    place->width = width;
+    place->is_weighed = 0;
+    for (int32_t k = 0; k < 3; k++) {
+        int32_t longest = length_of(place->whole[k]), sign = place->whole[k] < 0 ? -1 : 1;
+        place->least[k] = place->still[k] = track->error[t][k] * track->error[t][k];
+        for (int32_t i = 0; i < ath_min(SIZES, longest); i++) {
+            double error = error_with(track, t, k, sign * (longest - i) * part);
+            place->worst[k][i] = error * error;
+            if (place->worst[k][i] < place->least[k]) place->least[k] = place->worst[k][i];
+        }
+    }
+}
+
+/* Whether some correction with these axes may bring the worst frame within the limit. */
+static int may_fix_worst(const track *track, const place *place, int32_t mask)
+{
+    double squares[3];
+    for (int32_t k = 0; k < 3; k++) squares[k] = mask >> k & 1 ? place->least[k] : place->still[k];
+    return !(squares[0] + squares[1] + squares[2] > track->limit2);
+}
+
+/* Whether a correction brings the worst frame within the limit. */
+static int fixes_worst(const track *track, const place *place, const int32_t q[3])
+{
+    double squares[3];
+    for (int32_t k = 0; k < 3; k++)
+        squares[k] = q[k] == 0 ? place->still[k] : place->worst[k][length_of(place->whole[k]) - length_of(q[k])];
+    return !(squares[0] + squares[1] + squares[2] > track->limit2);
 }
 
 /* Returns whether a candidate costs less than `most`, brings the worst frame within the limit, and worsens no frame
  * beyond it. Fills the cost. */
-static int try_candidate(const track *track, const ath_correction *above, const place *place, double most,
-                         candidate *tried)
+static int try_candidate(const track *track, const ath_correction *above, place *place, double most, candidate *tried)
 {
     int32_t at = place->frame, reach = ath_footprint_reach[place->width], fixed = 0;
+    if (!fixes_worst(track, place, tried->own.q)) return 0;
+    if (!place->is_weighed) weigh_place(track, place);
     double bits = estimated_bits(&tried->own, above + at) + track->bend_bits * more_bends(track, place, tried->own.q);
     if (bits >= most * (bits > 0.0 ? place->beyond : 1)) return 0;
-    if (square_with(track, tried, track->worst) > track->limit2) return 0;
     for (int32_t t = first_frame(at, reach); t <= last_frame(track, at, reach); t++) {
         double after = square_with(track, tried, t), before = track->squares[t];
         if (after > track->limit2 && after > before) return 0;
@@ -225,10 +271,9 @@ static int whole_correction(const double error[3], double scale, int32_t whole[3
 
 /* Tries the axes of a mask: the whole correction, and up to two that are shorter by a step each. Returns 1 if one
  * serves. */
-static int try_axes(const track *track, const ath_correction *above, const place *place, int32_t mask,
-                    const int32_t whole[3], candidate *best)
+static int try_axes(const track *track, const ath_correction *above, place *place, int32_t mask, candidate *best)
 {
-    enum { SIZES = 3 };
+    const int32_t *whole = place->whole;
     candidate tried = {place->frame, {{0, 0, 0}, place->width}, 0.0};
     int32_t longest = 0, found = 0;
     for (int32_t k = 0; k < 3; k++)
@@ -249,23 +294,24 @@ static int try_frame(const track *track, const ath_correction *above, int32_t fr
 {
     static const int32_t masks[7] = {1, 2, 4, 3, 5, 6, 7}, stop_of[3] = {3, 6, 7}; /* by the number of axes */
     double scale = track->step * ath_footprint_part(width, track->worst - frame) / ATH_FOOTPRINT_PARTS;
-    int32_t whole[3], found = 0;
+    int32_t found = 0;
+    place place;
     if (is_any(track->own + frame) || is_cut(track->frames, track->closed, frame, width)) return 0;
-    if (!whole_correction(track->error[track->worst], scale, whole)) return 0;
-    const place place = place_at(track, frame, width);
+    if (!whole_correction(track->error[track->worst], scale, place.whole)) return 0;
+    open_place(track, frame, width, &place);
     for (int32_t axes = 0, i = 0; axes < 3 && !found; axes++)
-        for (; i < stop_of[axes]; i++) found |= try_axes(track, above, &place, masks[i], whole, best);
+        for (; i < stop_of[axes]; i++)
+            if (may_fix_worst(track, &place, masks[i])) found |= try_axes(track, above, &place, masks[i], best);
     return found;
 }
 
 static void apply(track *track, const candidate *chosen)
 {
-    static const int32_t none[3] = {0};
     int32_t at = chosen->frame, reach = ath_footprint_reach[chosen->own.width];
     track->own[at] = chosen->own;
     ath_add_correction(track->frames, at, &chosen->own, track->parts);
     for (int32_t t = first_frame(at, reach); t <= last_frame(track, at, reach); t++) {
-        error_with(track, t, none, 0, track->error[t]);
+        for (int32_t k = 0; k < 3; k++) track->error[t][k] = error_with(track, t, k, 0.0);
         track->squares[t] = square(track->error[t]);
     }
     bend_frames(track, at - reach - 1, at + reach + 1);
