@@ -1,7 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
 import { ACESFilmicToneMapping, Box3, DirectionalLight, Fog, HemisphereLight, NoToneMapping, PerspectiveCamera, Scene, Vector3 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Easel } from "./easel.js";
 import { blow, meadow, thin, tintMeadow } from "./ground.js";
@@ -52,11 +51,7 @@ export class Stage {
     this.steady ||= !scenery;
     if (!this.steady && isSoftware(this.renderer.getContext())) this.less = QUALITY.length - 1;
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.12;
-    this.controls.addEventListener("change", changed);
-    this.controls.addEventListener("start", () => { this.moved = true; });
+    this.controls = { target: new Vector3(), maxDistance: Infinity, update: () => this.camera.lookAt(this.controls.target), dispose() {} };
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.#toned = () => {
       this.#tint();
@@ -67,6 +62,15 @@ export class Stage {
     this.resized = resized;
     this.#sized.observe(canvas.parentElement);
     this.#resize();
+  }
+
+  /** Lets the view be turned by hand from now on. */
+  steer(OrbitControls) {
+    const { target, maxDistance } = this.controls, controls = this.controls = new OrbitControls(this.camera, this.canvas);
+    controls.target.copy(target);
+    Object.assign(controls, { maxDistance, enableDamping: true, dampingFactor: 0.12 }).update();
+    controls.addEventListener("change", this.changed);
+    controls.addEventListener("start", () => { this.moved = true; });
   }
 
   dispose() {
