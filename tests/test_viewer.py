@@ -247,7 +247,8 @@ def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_import
 def test_the_package_has_the_viewers_material():
     """It has leaves where a file names its surfaces, and is a plain material where it does not."""
     script = f"""import {{ register }} from "node:module";
-      register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())}, {{ data: {{ three: "three.webgpu.js" }} }});
+      const modules = {json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())};
+      register(modules, {{ data: {{ three: "three.webgpu.js" }} }});
       const {{ ATHPlantMaterial }} = await import({json.dumps((WEB / "ATHLoader.js").as_uri())});
       const shader = {{ vertexShader: "#include <common>", fragmentShader: "#include <map_fragment>" }};
       new ATHPlantMaterial({{ surfaces: "bark, pinnae" }}).onBeforeCompile(shader);

@@ -39,6 +39,8 @@ export class Stage {
 
   cards = [];
 
+  shape = 1; // Width of what is looked at, over its height.
+
   #toned = null;
 
   #sized = new ResizeObserver(() => this.fit());
@@ -110,9 +112,9 @@ export class Stage {
     return true;
   }
 
-  // The best part of the picture beside the cards, [left, top, right, bottom]: each card takes all that lies on one side of it.
+  // The part of the picture beside the cards where the plant is largest, [left, top, right, bottom]: each card takes all that lies on one side of it.
   #free(width, height) {
-    const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(r - l, b - t) + 0.1 * Math.max(r - l, b - t);
+    const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(TALL * (b - t), (WIDE * (r - l)) / this.shape) + 0.01 * (r - l);
     let rooms = [[0, 0, width, height]];
     for (const card of this.cards.filter((each) => each.checkVisibility({ visibilityProperty: true }))) {
       const rect = card.getBoundingClientRect(), [left, top, right, bottom] = [rect.left - x, rect.top - y, rect.right - x, rect.bottom - y];
@@ -199,6 +201,9 @@ export class Stage {
 
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
+    const { x, y, z } = box.getSize(new Vector3());
+    this.shape = Math.max(0.1, Math.hypot(x * FROM.z, z * FROM.x) / Math.max(y, 1e-6));
+    this.#resize();
     const distance = this.#placeEye(box);
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;
