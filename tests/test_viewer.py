@@ -230,7 +230,7 @@ def test_the_bundles_are_small_and_their_licences_are_there():
 
 
 def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_imported():
-    """Each gives its commands to the controller, app.js, when main.js or later.js begins it; there is no document in Node."""
+    """Each gives its commands to the controller, app.js, when main.js or later.js begins it; Node has no document."""
     page = VIEWER / "page"
     begins = "".join((page / name).read_text("utf-8") for name in ("main.js", "later.js"))
     views = re.findall(r'^import \w+ from "\./(\w+)\.js";$', begins, re.M)
