@@ -109,6 +109,8 @@ def opened(browser):
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(address)
         page.wait_for_function(f"() => {until}")
+        if "athcodecViewer" in until:  # and all of the page
+            page.wait_for_function("() => athcodecViewer.modules")
         return page
 
     yield visit

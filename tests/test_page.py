@@ -91,8 +91,8 @@ def test_one_sentence_says_what_the_file_holds_and_how_small_it_is(page, sample_
     size = sample_ath.stat().st_size
     text = page.inner_text("#sizes").replace("\xa0", " ").replace("\n", " ")
     assert text == (
-        f"{seconds:.2g} s of motion in {points:,} points within {error:.2g} mm: {size / 1e3:.0f} kB instead of "
-        f"{points * frames * 12 / 1e6:.2f} MB (float32) or {branches * frames * 28 / 1e3:.0f} kB (GLB)"
+        f"A moving plant, {seconds:.2g} s: {points:,} points within {error:.2g} mm {size / 1e3:.0f} kB instead of "
+        f"{points * frames * 12 / 1e6:.2f} MB uncompressed or {branches * frames * 28 / 1e3:.0f} kB as GLB"
     )
     assert f"{size:,} bytes" in page.get_attribute("#sizes", "title")
 
@@ -492,6 +492,20 @@ def test_no_card_covers_the_plant(opened_file, sample_ath, size):
         found = page.evaluate(PLACED)
         assert found["over"] == found["outside"] == [] and found["share"] > 0.3, (panel, found)
         page.click("#toggle-panel")
+
+
+def test_the_plant_takes_seventy_per_cent_of_the_free_height_at_every_size_of_the_window(opened_file):
+    page = opened_file(athcodec.sample_path("leafed").read_bytes())
+    for width, height in ((1440, 900), (1024, 768), (844, 390), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        if height < 400:  # as it opens there
+            page.click("#toggle-panel")
+        for _ in range(50):  # cards are measured when the browser has laid them out
+            tall = page.evaluate(PLACED)["tall"]
+            if abs(tall - 0.7) < 0.03:
+                break
+            page.wait_for_timeout(100)
+        assert tall == pytest.approx(0.7, abs=0.03), (width, height, page.evaluate("athcodecViewer.stage.room"))
 
 
 def test_in_a_window_that_cards_fill_the_plant_stands_behind_them(opened_file):

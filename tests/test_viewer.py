@@ -110,10 +110,14 @@ def test_an_exported_page_holds_everything(sample_ath, tmp_path, capsys):
     file = re.search(r'id="ath-file" data-name="sample.ath">([^<]*)<', text)[1]
     assert base64.b64decode(file) == sample_ath.read_bytes()
     modules = json.loads(re.search(r'<script type="importmap">(.*?)</script>', text)[1])["imports"]
-    assert modules.keys() == {"three"}
-    kind, _, body = modules["three"].partition(",")
-    assert kind == "data:text/javascript;base64" and base64.b64decode(body) == (WEB / "three.js").read_bytes()
-    assert not re.search(r'(?:from|import\()"\./', text)
+    assert modules.keys() == {"three", "viewer", "later"}
+    for name, url in modules.items():
+        kind, _, body = url.partition(",")
+        module = base64.b64decode(body).decode()
+        assert kind == "data:text/javascript;base64"
+        beside = re.sub(r'(from|import\()"(three|viewer|later|model)"', r'\1"./\2.js"', module)
+        assert beside == (WEB / f"{name}.js").read_text("utf-8")
+        assert not re.search(r'(?:from|import\()"\./', module)
     outside = re.sub(r"<script.*?</script>|<style.*?</style>", "", text, flags=re.DOTALL)
     assert not re.search(r'(?:src|href)="(?!data:)', outside)
     assert "connect-src 'none'" in outside
@@ -171,6 +175,35 @@ def test_the_page_is_served_compressed_and_small(served):
     assert size <= MOST_PAGE_BYTES
 
 
+@pytest.mark.browser
+def test_what_the_first_picture_does_not_need_comes_behind_it_and_then_works(opened, sample_ath):
+    """While it is held up the plant plays, and controls that need it cannot be used; then the view can be turned."""
+    from bench.throttled_server import ThrottledServer
+
+    held = []
+    with ThrottledServer({"tree.ath": sample_ath.read_bytes()}) as line:
+        page = opened("about:blank", "true")
+        page.route("**/later.js", lambda route: held.append(route))
+        page.goto(line.page("tree.ath"))
+        page.wait_for_function(
+            "() => document.querySelector('#canvas.drawn') && document.querySelector('#time').value > 0"
+        )
+        assert page.evaluate("document.querySelector('#picture').closest('[inert]') !== null")
+        assert page.evaluate("athcodecViewer.modules === undefined")
+        for _ in range(100):
+            if held:
+                break
+            page.wait_for_timeout(100)
+        held[0].continue_()
+        page.wait_for_function("() => athcodecViewer.modules")
+        assert page.evaluate("document.querySelector('#picture').closest('[inert]') === null")
+        before = page.evaluate("athcodecViewer.stage.camera.position.toArray()")
+        page.locator("#canvas").press("ArrowLeft")
+        page.wait_for_function(
+            "(before) => String(athcodecViewer.stage.camera.position.toArray()) !== String(before)", arg=before
+        )
+
+
 def test_without_scripts_the_server_has_a_still_of_the_file(served, sample_ath):
     with get(served.split("?file=")[0] + "still.svg") as answer, athcodec.open(sample_ath) as decoder:
         assert answer.headers["Content-Type"] == "image/svg+xml" and answer.read().decode() == still_svg(decoder)
@@ -197,13 +230,14 @@ def test_the_bundles_are_small_and_their_licences_are_there():
 
 
 def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_imported():
-    """Each gives its commands to the controller, app.js, when main.js begins it; there is no document in Node."""
-    page, main = VIEWER / "page", (VIEWER / "page" / "main.js").read_text("utf-8")
-    views = re.findall(r'^import \w+ from "\./(\w+)\.js";$', main, re.M)
+    """Each gives its commands to the controller, app.js, when main.js or later.js begins it; Node has no document."""
+    page = VIEWER / "page"
+    begins = "".join((page / name).read_text("utf-8") for name in ("main.js", "later.js"))
+    views = re.findall(r'^import \w+ from "\./(\w+)\.js";$', begins, re.M)
     assert len(views) > 10
     for name in views:
         imported = set(re.findall(r'from "\./(\w+)\.js"', (page / f"{name}.js").read_text("utf-8")))
-        assert not imported & {*views, "main"}, name
+        assert not imported & {*views, "main", "later"}, name
     script = f"""import {{ register }} from "node:module";
       register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
       for (const view of {json.dumps(views)}) await import({json.dumps(page.as_uri())} + `/${{view}}.js`);"""
@@ -213,7 +247,8 @@ def test_no_view_of_the_page_imports_another_or_does_anything_where_it_is_import
 def test_the_package_has_the_viewers_material():
     """It has leaves where a file names its surfaces, and is a plain material where it does not."""
     script = f"""import {{ register }} from "node:module";
-      register({json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())});
+      const modules = {json.dumps((ROOT / "tests" / "node" / "page_modules.mjs").as_uri())};
+      register(modules, {{ data: {{ three: "three.webgpu.js" }} }});
       const {{ ATHPlantMaterial }} = await import({json.dumps((WEB / "ATHLoader.js").as_uri())});
       const shader = {{ vertexShader: "#include <common>", fragmentShader: "#include <map_fragment>" }};
       new ATHPlantMaterial({{ surfaces: "bark, pinnae" }}).onBeforeCompile(shader);
@@ -1135,7 +1170,7 @@ def test_the_page_works_by_keyboard(opened_file, sample_ath):
     assert pressed("[", "athcodecViewer.motion.target") < page.evaluate("athcodecViewer.motion.levelCount") - 1
     assert pressed("a", "athcodecViewer.motion.automatic") is True
     assert pressed("c", "document.querySelector('#colour [aria-checked=true]').textContent") == "Part"
-    assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Branch lines"
+    assert pressed("s", "document.querySelector('#show [aria-checked=true]').textContent") == "Lines"
     assert pressed("l", "athcodecViewer.motion.wrap") == "clamp", "a file without loops was repeated"
     assert pressed("l", "athcodecViewer.motion.wrap") == "loop"
     assert pressed("d", "athcodecViewer.plants.length") == 2

@@ -25,9 +25,9 @@ CACHE_VARIABLE = "ATHCODEC_VIEWER_CACHE"
 DEFAULT_CACHE = Path("~/.cache/athcodec-viewer")
 MOST_BYTES = 200_000
 """Of what is ours in the bundles, loader, worker with decoder and page, compressed by gzip as web hosts send them."""
-MOST_PAGE_BYTES = 286_000
+MOST_PAGE_BYTES = 250_000
 """Of all that the page takes before its first picture, compressed by gzip: its own files and three.js."""
-OURS = ("ath_worker.js", "viewer.js")
+OURS = ("ath_worker.js", "viewer.js", "later.js")
 
 
 class BuildError(Exception):

@@ -43,7 +43,7 @@ TYPES = {
 """Of the page's files, by suffix."""
 PASSED_ON = ("Content-Length", "Content-Range", "Content-Type", "ETag", "Last-Modified", "Accept-Ranges")
 
-_BESIDE = re.compile(r'(from|import\()"\./(three|model)\.js"')
+_BESIDE = re.compile(r'(from|import\()"\./(three|viewer|later|model)\.js"')
 """Modules that the page's own names as files beside it."""
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval' data:; style-src 'unsafe-inline'; "
@@ -157,9 +157,8 @@ def self_contained(
     """Return the page with everything inside: styles, modules as data URLs, the worker and the file as text. still: an
     SVG element, for browsers that run no scripts."""
     text = PAGE.read_text("utf-8")
-    modules = ("three", "model") if _is_glb(data) else ("three",)
+    modules = ["three", "viewer", "later", *(["model"] if _is_glb(data) else [])]
     inside = json.dumps({"imports": {name: _data_url(_module(f"{name}.js")) for name in modules}})
-    main = _script(_module("viewer.js"))
     worker = _script((WEB / "ath_worker.js").read_text("utf-8"))
     first = "" if clip is None else f' data-clip="{html.escape(clip)}"'
     file = (
@@ -181,7 +180,7 @@ def self_contained(
         (
             r"</body>",
             f'<script type="text/plain" id="ath-worker">{worker}</script>\n{file}\n'
-            f'<script type="module">{main}</script>\n</body>',
+            '<script type="module">import "viewer";</script>\n</body>',
         ),
     ):
         text = re.sub(old, lambda _, new=new: new, text, flags=re.DOTALL)

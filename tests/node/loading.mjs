@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { register } from "node:module";
 
 const WEB = new URL("../../athcodec/viewer/web/", import.meta.url), HASTE = 20;
-register(new URL("page_modules.mjs", import.meta.url));
+register(new URL("page_modules.mjs", import.meta.url), { data: { three: "three.webgpu.js" } });
 
 const clock = performance.now.bind(performance), later = globalThis.setTimeout;
 performance.now = () => HASTE * clock();

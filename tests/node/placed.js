@@ -1,4 +1,5 @@
-// Where the plant of the viewer's page is in the picture: which cards are over it, and whether it or a control is outside of the window.
+// Where the plant of the viewer's page is in the picture: its share of the height above the controls and below a header that goes
+// over the whole width, which cards are over it, and whether it or a control is outside of the window.
 () => {
   const { stage, plants: [{ ath, space }] } = athcodecViewer, { camera, width, height } = stage, point = camera.position.clone(), x = [], y = [];
   stage.render();
@@ -12,5 +13,6 @@
   const meets = ({ left, top, right, bottom }) => left < plant.right && right > plant.left && top < plant.bottom && bottom > plant.top;
   const outside = ({ left, top, right, bottom }) => left < 0 || top < 0 || right > width || bottom > height;
   const share = Math.max(plant.right - plant.left, plant.bottom - plant.top) / Math.min(width, height);
-  return { over: seen("header, nav, #panel, footer").filter(meets), outside: [plant, ...seen("header, nav button, footer *")].filter(outside), share };
+  const [head, foot] = seen("header, footer"), top = head.width > 0.8 * width ? head.bottom : 0;
+  return { tall: (plant.bottom - plant.top) / (foot.top - top), over: seen("header, nav, #panel, footer").filter(meets), outside: [plant, ...seen("header, nav button, footer *")].filter(outside), share };
 }

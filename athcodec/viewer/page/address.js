@@ -120,7 +120,7 @@ function restore() {
 // Once all is here that plants are drawn with.
 async function plantAll(count) {
   const { ath } = main();
-  await ath.arrays.catch(() => {});
+  await Promise.all([app.later(), ath.arrays.catch(() => {})]);
   if (main()?.ath === ath) app.forestOf(count);
 }
 

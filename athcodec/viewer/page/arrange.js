@@ -25,7 +25,7 @@ function arrange(first = null) {
     plant.motion.addEventListener("clip", app.fromTheStart);
     plant.motion.addEventListener("ready", () => { state.dirty = true; });
   }
-  if (plants.length > 1) app.forestSwitch(false);
+  if (plants.length > 1 && state.forest) app.forestSwitch(false);
   stage.setPanes(plants.map((plant) => ({
     scene: stage.scene([plant.root]), foot: plant.foot, before: (width, height) => plant.prepare(width, height),
   })));

@@ -55,7 +55,7 @@ function openAddress() {
 function ask() {
   say("Plants in motion", "Look at one of these, or open an .ath file, or a GLB that holds one. A file of yours stays on this device.");
   app.loadingStory(null);
-  app.beginStart();
+  app.later().then(() => { if (asked === 0) app.beginStart(); });
 }
 
 function say(title, text, technical = "", again = null) {
@@ -66,7 +66,7 @@ function say(title, text, technical = "", again = null) {
   $("again").hidden = !again;
   $("again").onclick = again;
   message.hidden = false;
-  app.endStart();
+  app.endStart?.();
   breath().then(() => app.staged).then(app.bare);
 }
 
@@ -115,7 +115,7 @@ function close(files) {
 async function open(source, name, beside = false, again = null, clip = null) {
   const wish = ++asked, retry = () => open(source, name, beside, again, clip);
   $("message").hidden = true;
-  app.endStart();
+  app.endStart?.();
   if (!beside) {
     Object.assign(counters, { started: performance.now(), firstPicture: null, firstMotion: null, arrived: {}, pictures: 0 });
     $("trouble").hidden = true;

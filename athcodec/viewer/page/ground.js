@@ -6,7 +6,7 @@ import { chance } from "./chance.js";
 
 const REACH = 60; // Radius of the disc, over the radius of the meadow.
 const BLADES = 26000, TALL = 0.015, WIDE = 0.0015; // Number of blades; height and width over the meadow's radius.
-const COLOURS = { day: [0x5f7a44, 0x86985a], dusk: [0x4a5b44, 0x657553] };
+const COLOURS = { day: [0x5f7a44, 0x86985a], dusk: [0x3d4d39, 0x556447] };
 
 const NOISE = /* glsl */`
 varying vec2 athMeadow;

@@ -148,7 +148,7 @@ export default function begin() {
     for (const plant of app.plants) plant.setColour(value);
     $("scale").hidden = value !== "error";
     tellLegend();
-    app.colourForest();
+    if (state.forest) app.colourForest();
     state.dirty = true;
   });
   app.show = new Choice($("show"), (value) => {

@@ -6,22 +6,17 @@ import { dataTexture, injectMotion, limbMaterial, motionUniforms } from "athcode
 import address from "./address.js";
 import { app, counters, loader, state } from "./app.js";
 import arrange from "./arrange.js";
-import camera from "./camera.js";
 import clips from "./clips.js";
 import files from "./files.js";
-import forests from "./forests.js";
 import intro from "./intro.js";
-import keys from "./keys.js";
 import look from "./look.js";
 import panel from "./panel.js";
 import { lineMaterial, meshMaterial } from "./plant.js";
 import scripts from "./scripts.js";
-import sharing from "./sharing.js";
 import { Stage } from "./stage.js";
-import start from "./samples.js";
 import story from "./story.js";
 import time from "./time.js";
-import { $ } from "./ui.js";
+import { $, note } from "./ui.js";
 import wind from "./wind.js";
 
 const TELL_MS = 250, PATIENCE_MS = 2000;
@@ -69,6 +64,7 @@ function draw() {
   app.stage.render();
   $("canvas").classList.add("drawn");
   if (app.plants.length > 0) app.markFirst();
+  if (counters.firstPicture) complete();
   counters.frames++;
   counters.frameMs = counters.frameMs * 0.8 + 0.2 * (performance.now() - start);
 }
@@ -80,6 +76,8 @@ function count(now) {
   Object.assign(counters, { frames: 0, since: now });
   for (const tell of [app.tellFacts, app.tellLevel, app.tellScale, app.tellTime, app.splitLabels, app.write]) tell();
 }
+
+const complete = () => app.later().catch(() => note("Parts of this page cannot be fetched. Load it again."));
 
 const painted = () => new Promise((done) => { requestAnimationFrame(() => setTimeout(done)); });
 const late = () => new Promise((done) => { setTimeout(done, PATIENCE_MS); });
@@ -96,8 +94,14 @@ async function setUp() {
   }
 }
 
-for (const begin of [address, arrange, camera, clips, files, forests, intro, look, panel, sharing, start, story, time, wind, scripts, keys]) begin();
+let rest = null;
+
+/** Fetches what the first picture does not need, once; resolves when it can be used. */
+app.later = () => rest ??= import("./later.js").then(({ begin }) => begin());
+
+for (const begin of [address, arrange, clips, files, intro, look, panel, story, time, wind, scripts]) begin();
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) app.setPlaying(false);
 app.openAddress();
 loader.preload();
 app.staged = setUp();
+late().then(complete); // a file may never come

@@ -1,20 +1,17 @@
-// Functions that scripts and tests can call: globalThis.athcodecViewer.
-
-import * as three from "three";
-import * as loading from "athcodec-three";
+// Functions that scripts and tests can call: globalThis.athcodecViewer. later.js adds `modules` to it, behind the first picture.
 
 import { app, counters, main, state } from "./app.js";
 
+const CALLS = ["open", "loadAgain", "seek", "setPlaying", "setLevel", "setSplit", "setWind", "moveView", "playClip", "forestSwitch", "forestOf", "forests", "frameView"];
+
 export default function begin() {
-  const { open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, moveView, playClip, forestSwitch, forestOf, forests, frameView } = app;
   globalThis.athcodecViewer = {
-    counters, state, open, loadAgain, seek, setPlaying, setLevel, setSplit, setWind, moveView, playClip, forestSwitch, forestOf, forests, frameView,
-    modules: { three, loading },
+    counters, state, ...Object.fromEntries(CALLS.map((name) => [name, (...values) => (app[name] ? app[name](...values) : app.later().then(() => app[name](...values)))])),
     get stage() { return app.stage; },
     get plants() { return app.plants; },
     get motion() { return main()?.motion; },
     async shown(seconds, level) {
-      setPlaying(false);
+      app.setPlaying(false);
       const { motion } = main();
       await motion.show(motion.start + seconds, level);
       return { level: motion.level, frame: motion.frame };

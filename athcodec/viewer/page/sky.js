@@ -8,8 +8,8 @@ const SHADOW_PIXELS = 2048;
 // Haze: the one colour that sky, hills and ground end in. `back`: the light that the sky has opposite to the sun.
 const DAY = { zenith: 0x7fb2e2, haze: 0xcfe0e8, glow: 0xfff0d6, cloud: 0xffffff, hills: 0x7d9a8c, sun: 0xfff1d8, sunlight: 3.0, above: 0xdcebf8, below: 0x8c8f62, fill: 1.7,
   back: 0.9 };
-const DUSK = { zenith: 0x131b2a, haze: 0x39455a, glow: 0x6b6470, cloud: 0x59606f, hills: 0x1f2937, sun: 0xffcf9e, sunlight: 1.5, above: 0x9fb4dc, below: 0x4a5148, fill: 1.6,
-  back: 0.7 };
+const DUSK = { zenith: 0x131b2a, haze: 0x39455a, glow: 0x6b6470, cloud: 0x59606f, hills: 0x1f2937, sun: 0xffcf9e, sunlight: 2.0, above: 0xb4c4e4, below: 0x6a7060, fill: 2.8,
+  back: 1.7 };
 
 const VERTEX = "varying vec3 way; void main() { way = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }";
 const FRAGMENT = /* glsl */`

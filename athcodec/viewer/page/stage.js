@@ -1,7 +1,6 @@
 // The stage: renderer, camera and light, and one or two panes, each with its own scene; two share the view, on either side of a split.
 
 import { ACESFilmicToneMapping, Box3, DirectionalLight, Fog, HemisphereLight, NoToneMapping, PerspectiveCamera, Scene, Vector3 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { Easel } from "./easel.js";
 import { blow, meadow, thin, tintMeadow } from "./ground.js";
@@ -40,6 +39,8 @@ export class Stage {
 
   cards = [];
 
+  shape = 1; // Width of what is looked at, over its height.
+
   #toned = null;
 
   #sized = new ResizeObserver(() => this.fit());
@@ -52,11 +53,7 @@ export class Stage {
     this.steady ||= !scenery;
     if (!this.steady && isSoftware(this.renderer.getContext())) this.less = QUALITY.length - 1;
     this.camera = new PerspectiveCamera(38, 1, 0.01, 1000);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.12;
-    this.controls.addEventListener("change", changed);
-    this.controls.addEventListener("start", () => { this.moved = true; });
+    this.controls = { target: new Vector3(), maxDistance: Infinity, update: () => this.camera.lookAt(this.controls.target), dispose() {} };
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.#toned = () => {
       this.#tint();
@@ -67,6 +64,15 @@ export class Stage {
     this.resized = resized;
     this.#sized.observe(canvas.parentElement);
     this.#resize();
+  }
+
+  /** Lets the view be turned by hand from now on. */
+  steer(OrbitControls) {
+    const { target, maxDistance } = this.controls, controls = this.controls = new OrbitControls(this.camera, this.canvas);
+    controls.target.copy(target);
+    Object.assign(controls, { maxDistance, enableDamping: true, dampingFactor: 0.12 }).update();
+    controls.addEventListener("change", this.changed);
+    controls.addEventListener("start", () => { this.moved = true; });
   }
 
   dispose() {
@@ -106,9 +112,9 @@ export class Stage {
     return true;
   }
 
-  // The best part of the picture beside the cards, [left, top, right, bottom]: each card takes all that lies on one side of it.
+  // The part of the picture beside the cards where the plant is largest, [left, top, right, bottom]: each card takes all that lies on one side of it.
   #free(width, height) {
-    const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(r - l, b - t) + 0.1 * Math.max(r - l, b - t);
+    const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(TALL * (b - t), (WIDE * (r - l)) / this.shape) + 0.01 * (r - l);
     let rooms = [[0, 0, width, height]];
     for (const card of this.cards.filter((each) => each.checkVisibility({ visibilityProperty: true }))) {
       const rect = card.getBoundingClientRect(), [left, top, right, bottom] = [rect.left - x, rect.top - y, rect.right - x, rect.bottom - y];
@@ -195,6 +201,9 @@ export class Stage {
 
   /** The whole of a box (in the world) in view, from any side; `ground`: its height and size. */
   look(box, ground) {
+    const { x, y, z } = box.getSize(new Vector3());
+    this.shape = Math.max(0.1, Math.hypot(x * FROM.z, z * FROM.x) / Math.max(y, 1e-6));
+    this.#resize();
     const distance = this.#placeEye(box);
     this.camera.near = distance / 500;
     this.camera.far = distance * 60;

@@ -21,12 +21,12 @@ function tellSizes() {
   const { metadata, motion: { info, clips, levelCount }, channel } = app.opened[0], seconds = clips.reduce((sum, { duration }) => sum + duration, 0);
   const error = Math.max(...clips.map(({ errors }) => errors[levelCount - 1].max)), isWind = [metadata, ...Object.values(metadata.clips ?? {})].some(({ strength }) => Number.isFinite(strength));
   const points = `${countText(info.vertexCount)} ${info.vertexCount === 1 ? "point" : "points"}`;
-  $("what").textContent = `${Number(seconds.toPrecision(2))} s of ${isWind ? "wind" : "motion"} in ${points} within ${shortLength(error, metadata.unit)}:`;
+  $("what").textContent = `A moving plant, ${Number(seconds.toPrecision(2))} s${isWind ? " of wind" : ""}: ${points} within ${shortLength(error, metadata.unit)}`;
   $("file-size").textContent = bytesText(info.fileLength);
-  const others = [[info.vertexCount * FLOAT3, "float32"], [info.branchCount * JOINT, "GLB"]].map(([each, name]) => [info.frameCount * each, name]);
-  $("source-size").textContent = others.filter(([bytes]) => bytes > info.fileLength).map(([bytes, name]) => `${bytesText(bytes)} (${name})`).join(" or ");
+  const others = [[info.vertexCount * FLOAT3, "uncompressed"], [info.branchCount * JOINT, "as GLB"]].map(([each, name]) => [info.frameCount * each, name]);
+  $("source-size").textContent = others.filter(([bytes]) => bytes > info.fileLength).map(([bytes, name]) => `${bytesText(bytes)} ${name}`).join(" or ");
   $("instead").hidden = $("source-size").textContent === "";
-  $("sizes").title = `The whole file: ${countText(info.fileLength)} bytes. float32: ${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes. `
+  $("sizes").title = `The whole file: ${countText(info.fileLength)} bytes. Uncompressed, as float32: ${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes. `
     + `GLB: a rotation and a translation of a joint for each of ${countText(info.branchCount)} branches × ${countText(info.frameCount)} frames × ${JOINT} bytes, before its meshes`;
   $("sizes").hidden = $("levels").hidden = $("replay").hidden = false;
 }

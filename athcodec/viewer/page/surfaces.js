@@ -120,7 +120,7 @@ if (athIsLeaf && dot(normal, normalize(vViewPosition)) < 0.0) normal = -normal;
 }
 `;
 
-// Light shines through a leaf from behind: the sun's, shadowed as it is on the leaf, yellower than what it reflects.
+// Light shines through a leaf from behind, yellower than what it reflects: the sun's, shadowed as it is on the leaf, and that of the sky.
 const THROUGH = /* glsl */`
 #if NUM_DIR_LIGHTS > 0
 if (athIsLeaf) {
@@ -132,6 +132,9 @@ if (athIsLeaf) {
     directionalLightShadows[0].shadowBias, directionalLightShadows[0].shadowRadius, vDirectionalShadowCoord[0]) : 1.0;
   #endif
   vec3 through = diffuseColor.rgb * vec3(1.5, 1.45, 0.45);
+#if NUM_HEMI_LIGHTS > 0
+  reflectedLight.indirectDiffuse += 0.45 * athThin * getHemisphereLightIrradiance(hemisphereLights[0], -normal) * BRDF_Lambert(through);
+#endif
   reflectedLight.directDiffuse += athThin * (0.55 * behind + 0.25 * toward) * lit * directionalLights[0].color * through;
 }
 #endif

@@ -1,6 +1,7 @@
 // <ath-viewer src="oak.ath">: see element.d.ts.
 
 import { PerspectiveCamera, Vector3 } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { ATHLoader } from "athcodec-three";
 
 import { Easel } from "../page/easel.js";
@@ -33,6 +34,7 @@ const easel = new Easel(); // of all elements
 class Stand extends Stage {
   constructor(canvas, changed, scenery) {
     super(canvas, changed, () => this.#fit(), easel, scenery);
+    this.steer(OrbitControls);
   }
 
   #box = null;
