@@ -163,8 +163,8 @@ def looks(path):
         if prim.IsA(UsdGeom.Mesh):
             attributes = [prim.GetAttribute(name) for name in NAMES if prim.HasAttribute(name)]
             found[prim.GetName()] = [
-                [one.GetName(), str(one.GetTypeName()), one.GetMetadata("interpolation"), one.GetCustomDataByKey("athcodec"),
-                 np.asarray(one.Get()).tolist()]
+                [one.GetName(), str(one.GetTypeName()), one.GetMetadata("interpolation"),
+                 one.GetCustomDataByKey("athcodec"), np.asarray(one.Get()).tolist()]
                 for one in attributes if one.IsAuthored()
             ]
     return found

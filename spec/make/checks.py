@@ -5,7 +5,6 @@ import struct
 from spec.make.base import *
 from spec.make.host import hosted
 from spec.make.joins import joined
-from spec.make.layers import layered
 from spec.make.polygons import mixed_polygons
 from spec.make.source_rest import bent
 from spec.make.static import attribute, frame, metadata, plain, static, with_static
@@ -89,13 +88,6 @@ static(
 attribute(
     "name-beyond-of-none: a name that goes on behind the chunk, of an array without elements",
     struct.pack("<BBHII", 1, 1, 5, 1, 0) + b"age",
-)
-invalid(
-    "source-rest-cut-behind-damage TRUNCATED rest: the file ends within SOURCE_REST, and a REFINED_REST is damaged",
-    lambda: cut(
-        lambda draft: len(draft.file()) - 1,
-        layered(source_rest=bent(FORK, Chance(207, large=9))).draft().change(REFINED_REST, 4, checksum=0),
-    ),
 )
 for name_, reason_, fields_ in (  # A count at its limit is refused for what is wrong behind it.
     (
