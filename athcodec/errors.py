@@ -1,8 +1,8 @@
 """Every error that athcodec raises on purpose, one class per cause.
 
 The codes are those of FORMAT.md, "Errors", and of core/include/ath.h; they never change once released. A message is
-one line:
-what is wrong, where, what was found and what was expected.
+one short line: what is wrong, where, what was found and what was expected. Messages quote text of files, so every error
+and warning makes its message with `one_line`.
 
 Examples
 --------
@@ -15,7 +15,42 @@ Examples
 
 from __future__ import annotations
 
+import re
 from typing import Self
+
+LONGEST_MESSAGE, MESSAGE_HEAD, MESSAGE_TAIL = 2000, 1500, 450  # Characters; the head and the tail stay of a longer one.
+LONGEST_WORD, WORD_HEAD, WORD_TAIL = 400, 250, 120  # The same for what has no space in it, such as a number or a path.
+_LONG_WORD = re.compile(rf"[^ ]{{{LONGEST_WORD + 1},}}")
+
+
+def one_line(text: object) -> str:
+    """Return text of a message as one short line of printable characters.
+
+    Parameters
+    ----------
+    text : object
+        What the message says; `str` of it may hold names, numbers and other text of a file.
+
+    Returns
+    -------
+    str
+        The text with unprintable characters, line breaks among them, as Python's escapes. The middle is left out of
+        words of more than `LONGEST_WORD` characters, and of the line where it has more than `LONGEST_MESSAGE`.
+    """
+    line = str(text)
+    if not line.isprintable():
+        line = "".join(character if character.isprintable() else ascii(character)[1:-1] for character in line)
+    line = _LONG_WORD.sub(_shortened, line)
+    if len(line) > LONGEST_MESSAGE:  # It has spaces enough, because its words are short.
+        line = f"{line[:MESSAGE_HEAD].rpartition(' ')[0]} ... {line[-MESSAGE_TAIL:].partition(' ')[2]}"
+    return line
+
+
+def _shortened(match: re.Match[str]) -> str:
+    """Return the head and the tail of a word. A URL loses its tail, which may be a key that only the part before it
+    marks as one."""
+    word = match[0]
+    return f"{word[:WORD_HEAD]}...{'' if '://' in word else word[-WORD_TAIL:]}"
 
 
 class AthError(Exception):
@@ -36,13 +71,13 @@ class AthError(Exception):
     """
 
     def __init__(self, message: object = "", *, python: str = "", shell: str = ""):
-        super().__init__(f"{message}; {python}" if python else message)
-        self.for_shell = f"{message}; {shell}" if shell else str(self)
+        super().__init__(one_line(f"{message}; {python}" if python else message))
+        self.for_shell = one_line(f"{message}; {shell}") if shell else str(self)
 
     def about(self, subject: str) -> Self:
         """Return the same error with a name before its messages."""
         error = type(self)(f"{subject}: {self}")
-        error.for_shell = f"{subject}: {self.for_shell}"
+        error.for_shell = one_line(f"{subject}: {self.for_shell}")
         return error
 
 
@@ -50,7 +85,20 @@ class ClipError(AthError, ValueError):
     """A motion clip, or the source file it comes from, is not usable."""
 
 
-class SourceWarning(UserWarning):
+class AthWarning(UserWarning):
+    """Base of all warnings of athcodec.
+
+    Parameters
+    ----------
+    message : str
+        What is not as the user may expect, and where.
+    """
+
+    def __init__(self, message: object = ""):
+        super().__init__(one_line(message))
+
+
+class SourceWarning(AthWarning):
     """A source holds something that is part of its picture and is not read, or that is hidden and costs precision."""
 
 
@@ -58,7 +106,7 @@ class GuessWarning(SourceWarning):
     """What a source means was guessed; the message says what was taken for what, and how to say otherwise."""
 
 
-class CoarseWarning(UserWarning):
+class CoarseWarning(AthWarning):
     """An error is so large a part of the plant that little of its motion may be left: that of a bound which was asked
     for, or that of a skeleton; or a rest pose is less exact than the motion, and a mesh is to lie on it."""
 

@@ -56,11 +56,11 @@ console.log(JSON.stringify({ shown, failure: failure?.message ?? null, source: [
 """
 
 
-# Plays 60 pictures a second by a clock of its own, in which a segment takes `cost` ms at the deepest level, and a tenth
-# of that at others.
+# Plays 60 pictures a second by a clock of its own, in which a segment takes `cost` ms at the deepest level, and a
+# `share` of that for each step at others.
 PLAY_ON = """
 import { openPlant } from "./plant.js";
-const [url, cost, rounds] = process.argv.slice(2), { AthFile } = await import("athcodec-three/decoder");
+const [url, cost, rounds, share] = process.argv.slice(2), { AthFile } = await import("athcodec-three/decoder");
 const plant = await openPlant(url), { file } = plant, deepest = file.info.levelCount - 1;
 const alone = file.preparation(0, deepest);
 let clock = 0, steps = 1, spent = 0, longest = 0;
@@ -70,7 +70,7 @@ performance.now = () => clock;
 const preparation = file.preparation.bind(file);
 file.preparation = (...given) => {
   const work = preparation(...given), step = work.step.bind(work);
-  work.step = () => { clock += (work.level === deepest ? 1 : 0.1) * Number(cost) / steps; return step(1); };
+  work.step = () => { clock += (work.level === deepest ? 1 : Number(share)) * Number(cost) / steps; return step(1); };
   return work;
 };
 const shown = [], view = { distance: 1e-3, fov: 0.8, height: 1080 };
@@ -84,7 +84,9 @@ for (let picture = 0; picture / 60 < rounds * file.clips[0].lastTime; picture++)
     await new Promise((done) => setTimeout(done, 1));
   }
 }
-console.log(JSON.stringify({ shown, deepest, steps, longest, failure: plant.failure?.message ?? null }));
+const sizes = Array.from({ length: deepest + 1 }, (_, level) =>
+  file.ranges(level, 0, file.info.segmentCount - 1, true).reduce((sum, { size }) => sum + size, 0));
+console.log(JSON.stringify({ shown, deepest, sizes, steps, longest, failure: plant.failure?.message ?? null }));
 """
 
 
@@ -142,13 +144,24 @@ def swaying() -> bytes:
 @pytest.mark.parametrize("cost", [110, 200])
 def test_the_shown_level_never_falls_at_the_boundaries_of_segments(cost, swaying, tmp_path):
     with ThrottledServer({"plant.ath": swaying}) as server:
-        result = json.loads(run(tmp_path, PLAY_ON, f"{server.address}plant.ath", cost, 1.5))
+        result = json.loads(run(tmp_path, PLAY_ON, f"{server.address}plant.ath", cost, 1.5, 0.1))
     assert result["failure"] is None and result["steps"] > 100, "one step is little"
     segments, levels = np.transpose(result["shown"])
     arrival = np.argmax(levels == result["deepest"])
     assert (levels[np.argmax(levels >= 0) :] >= 0).all() and (np.diff(segments[arrival:]) != 0).sum() > 6
     assert (levels[arrival:] == result["deepest"]).all()
     assert result["longest"] <= 500 / 60 + cost / result["steps"], "half of a picture's time, and a step"
+
+
+@pytest.mark.web
+def test_boundaries_of_segments_show_a_middle_level_where_the_finest_comes_too_late(swaying, tmp_path):
+    with ThrottledServer({"plant.ath": swaying}) as server:
+        result = json.loads(run(tmp_path, PLAY_ON, f"{server.address}plant.ath", 3000, 1.5, 0.005))
+    middle = max(level for level, size in enumerate(result["sizes"]) if 8 * size <= result["sizes"][-1])
+    segments, levels = np.transpose(result["shown"])
+    arrival = np.argmax(levels == middle)
+    assert result["failure"] is None and 0 < middle < result["deepest"]
+    assert (np.diff(segments[arrival:]) != 0).sum() > 6 and (levels[arrival:] >= middle).all()
 
 
 def page_blocks() -> list[str]:

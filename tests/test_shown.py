@@ -6,13 +6,14 @@ import json
 import subprocess
 import sys
 import warnings
+import zipfile
 
 import numpy as np
 import pytest
 from plants import plant
 
 import athcodec
-from athcodec import cli
+from athcodec import cli, errors
 from athcodec.files.shown import redacted, shown
 
 HOSTILE = "\x1b]0;owned\x07\x9b31m\u202ename"
@@ -33,6 +34,65 @@ def test_urls_are_shown_without_users_passwords_and_values():
     assert redacted(f"got {URL} and {URL}") == f"got {plain} and {plain}"
     assert redacted("s3://bucket/trees/a?.h5 and C:/a?b=c") == "s3://bucket/trees/a?.h5 and C:/a?b=c"
     assert redacted("filecache::https://ann:secret@h/x") == "filecache::https://h/x"
+
+
+def _classes(base: type) -> list[type]:
+    return [base, *(each for sub in base.__subclasses__() for each in _classes(sub))]
+
+
+@pytest.mark.parametrize(
+    "kind", [*_classes(errors.AthError), *_classes(errors.AthWarning)], ids=lambda kind: kind.__name__
+)
+def test_every_error_and_warning_is_one_short_line(kind):
+    text = str(kind(f"{HOSTILE}\n{'9' * 5000}\r\u2028 {'a name ' * 5000} the end"))
+    assert text.isprintable() and len(text) <= 2000
+    assert text.startswith(r"\x1b]0;owned\x07\x9b31m\u202ename\n999") and text.endswith("the end")
+    assert str(kind(text)) == text and str(kind("Grün 木 é, 1,000 frames")) == "Grün 木 é, 1,000 frames"
+
+
+def test_an_error_about_a_file_with_a_line_break_in_its_name_is_one_line():
+    error = errors.ClipError("no clip", shell="athcodec info shows it").about("a\nb")
+    assert str(error) == r"a\nb: no clip" and error.for_shell == r"a\nb: no clip; athcodec info shows it"
+
+
+def test_a_shortened_url_keeps_nothing_behind_its_keys():
+    assert "secret" not in redacted(errors.one_line(f"https://host/{'a' * 500}?sig={'secret' * 99}"))
+
+
+def _archive(path, name: str, content: bytes) -> None:
+    """Write an archive of NumPy with one usable array, and a member of this name."""
+    np.savez(path, positions=np.zeros((2, 3, 3)))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(name, content)
+
+
+LEGACY = "# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\nPOINTS {} float\n0 0 0\n"
+
+
+@pytest.mark.parametrize("content", [b"x", b""], ids=["broken", "empty"])
+def test_a_member_of_an_archive_with_a_line_break_in_its_name_is_named_in_one_line(content, tmp_path, capsys):
+    _archive(tmp_path / "a.npz", f"a\nb{HOSTILE}.npy", content)
+    with pytest.raises(errors.ClipError) as caught:
+        athcodec.read(tmp_path / "a.npz")
+    assert str(caught.value).isprintable() and r"a\nb\x1b]0;owned" in str(caught.value)
+    assert cli.main(["encode", str(tmp_path / "a.npz"), str(tmp_path / "a.ath")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and r"a\nb\x1b]0;owned" in err
+
+
+def test_what_is_not_read_is_named_in_one_short_line(tmp_path, capsys):
+    _archive(tmp_path / "a.npz", f"a\nb{HOSTILE}{'9' * 5000}.txt", b"x")
+    assert cli.main(["encode", str(tmp_path / "a.npz"), str(tmp_path / "a.ath"), "--effort", "fast"]) == 0
+    [line] = [line for line in capsys.readouterr().err.split("\n") if "not read" in line]
+    assert line.isprintable() and r"a\nb\x1b]0;owned" in line and len(line) < 1000
+
+
+@pytest.mark.parametrize("count", ["9" * 1000, "9" * 4000 + "\x07"], ids=["digits", "controls"])
+def test_a_count_of_a_thousand_digits_is_refused_in_one_short_line(count, tmp_path):
+    (tmp_path / "a.vtk").write_text(LEGACY.format(count))
+    with pytest.raises(errors.ClipError, match="999") as caught:
+        athcodec.read(tmp_path / "a.vtk")
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 1000
 
 
 @pytest.fixture

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from files import Parts
-from moving_meshes import mixed_clip
+from moving_meshes import mixed_clip, swaying
 from programs import run_script, usd_plugin_python
 
 import athcodec
 from athcodec.cli import main
 from athcodec.decoding import container as ct
+from athcodec.motion.clip import MotionClip
 
 pytestmark = pytest.mark.programs
 
@@ -100,6 +101,85 @@ print(json.dumps({name: [kind, sorted(own)] for name, (kind, own) in ours.items(
     )
     assert len(prims) == len(clip.metadata["part_names"]) > 1
     assert {kind for kind, _ in prims.values()} == {"Mesh", "BasisCurves"}
+
+
+def looking_clip(metadata: dict, face_material: list[int] | None, uv: str = "") -> MotionClip:
+    """Two objects: a closed box beside a card, a tube whose seam is cut open and two triangles of opposite sides; and a
+    square pyramid without its base."""
+    angle = np.linspace(0, 2 * np.pi, 7)
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    box = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    card = [(8, 9, 10, 11)]
+    tube = [(12 + i, 13 + i, 20 + i, 19 + i) for i in range(6)]
+    twisted = [(26, 27, 28), (26, 27, 29)]
+    pyramid = [(30, 31, 34), (31, 32, 34), (32, 33, 34), (33, 30, 34)]
+    faces = [*box, *card, *tube, *twisted, *pyramid]
+    points = [*corners, (3, 0, 0), (4, 0, 0), (4, 1, 0), (3, 1, 0)]
+    points += [(6 + 0.1 * np.cos(a), 5 * y, 0.1 * np.sin(a)) for y in (0, 1) for a in angle]
+    points += [(9, 0, 0), (9, 1, 0), (10, 0, 0), (10, 0, 1)]
+    points += [(12, 0, 0), (13, 0, 0), (13, 0, 1), (12, 0, 1), (12.5, 0.2, 0.5)]
+    points[18], points[25] = points[12], points[19]
+    attributes = {
+        "face_vertex_counts": np.array([len(face) for face in faces], np.int32),
+        "face_vertex_indices": np.concatenate(faces).astype(np.int32),
+        "part_vertex_counts": np.array([30, 5], np.int32),
+    }
+    domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "part_vertex_counts": "constant"}
+    if uv:
+        rows = {"vertex": len(points), "corner": sum(map(len, faces))}[uv]
+        attributes["uv"], domains["uv"] = np.linspace(0, 2, 2 * rows, dtype=np.float32).reshape(-1, 2)[::-1], uv
+    if face_material is not None:
+        attributes["face_material"] = np.resize(np.array(face_material, np.int32), len(faces))
+        domains["face_material"] = "face"
+    metadata = {"part_kinds": ["mesh", "mesh"], "part_names": ["thing", "system"]} | metadata | {"domains": domains}
+    rest = np.array(points, np.float64)
+    return MotionClip(swaying(rest, 4), np.arange(4) / 24, rest=rest, attributes=attributes, metadata=metadata)
+
+
+LOOKS = {
+    "guessed": ({}, None, ""),
+    "names": ({"part_names": ["my_Stemless", "Leafy fruit tree"]}, None, ""),
+    "stated sides": ({"part_usd": [{"doubleSided": "true"}, {}]}, None, ""),
+    "materials": ({"material_names": ["Bark", "no word", "system", "PETAL"]}, [0, 1, 2, 7, -1, 3], ""),
+    "surfaces of corners": ({"surfaces": "stalks, pinnae"}, None, "corner"),
+    "surfaces of vertices": ({"surfaces": "bark, leaves"}, None, "vertex"),
+    "no surfaces": ({"surfaces": "leaves, bark"}, None, "vertex"),
+}
+
+
+def test_meshes_look_as_decode_writes_them(tmp_path):
+    pairs = []
+    for name, (metadata, face_material, uv) in LOOKS.items():
+        file, written = tmp_path / f"{name}.ath", tmp_path / f"{name}.usda"
+        athcodec.encode(looking_clip(metadata, face_material, uv), file, rel_error=1e-3, effort="fast")
+        assert main(["decode", str(file), str(written)]) == 0
+        pairs.append([str(file), str(written)])
+    looks = script(
+        """
+NAMES = "doubleSided", "primvars:displayColor", "primvars:displayColor:indices"
+def looks(path):
+    stage, found = Usd.Stage.Open(path), {}
+    for prim in stage.GetDefaultPrim().GetChildren():
+        if prim.IsA(UsdGeom.Mesh):
+            attributes = [prim.GetAttribute(name) for name in NAMES if prim.HasAttribute(name)]
+            found[prim.GetName()] = [
+                [one.GetName(), str(one.GetTypeName()), one.GetMetadata("interpolation"),
+                 one.GetCustomDataByKey("athcodec"), np.asarray(one.Get()).tolist()]
+                for one in attributes if one.IsAuthored()
+            ]
+    return found
+every = []
+for file, written in json.loads(sys.argv[1]):
+    every.append(looks(file))
+    assert every[-1] == looks(written), (file, every[-1], looks(written))
+print(json.dumps(every))
+""",
+        json.dumps(pairs),
+    )
+    guessed = looks[0]["thing"]
+    assert guessed[0] == ["doubleSided", "bool", None, {"guessed": True}, True]
+    assert guessed[2][-1] == [0] * 6 + [1] + [0] * 6 + [1] * 2
+    assert len({json.dumps(each) for each in looks}) >= 6
 
 
 def test_clips_are_variants_and_can_be_asked_for_by_name(medley_ath, medley_clips):

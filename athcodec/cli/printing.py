@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from athcodec import errors
 from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, level_rows, parts_of, size_of
 from athcodec.errors import AthError
 from athcodec.files.shown import counted, echo, print_parts, print_table, redacted
@@ -234,7 +235,7 @@ def _finite(value: Any) -> Any:
 
 
 def say(kind: str, message: str) -> None:
-    echo(f"athcodec: {kind}: {message}".replace("\n", " "), file=sys.stderr)
+    echo(f"athcodec: {kind}: {errors.one_line(message)}", file=sys.stderr)
 
 
 def say_seam(seam: Seam, path: str) -> None:

@@ -10,7 +10,7 @@ from os import fspath
 from pathlib import Path
 from typing import Protocol
 
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, one_line
 from athcodec.files.atomic import FileId
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.options import MAX_MEMORY
@@ -129,7 +129,7 @@ def naming(path: FilePath, *errors: type[Exception]) -> Iterator[None]:
     try:
         yield
     except ClipError as error:
-        if str(error).startswith(f"{fspath(path)}: "):
+        if str(error).startswith(one_line(f"{fspath(path)}: ")):
             raise
         raise error.about(fspath(path)) from error
     except errors as error:

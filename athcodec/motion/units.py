@@ -41,7 +41,7 @@ _LONG_NAMES = {
     "foot": "ft",
     "feet": "ft",
 }
-_QUANTITY = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)\s*")
+_QUANTITY = re.compile(r"\s*((?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z]*)\s*")
 
 
 @dataclass(frozen=True)

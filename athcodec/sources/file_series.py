@@ -32,9 +32,9 @@ SAME = 1e-5  # Largest relative difference of times that two places state alike.
 SHOWN = 3  # Times or numbers in a message.
 HEAD_BYTES = 4096  # Where a text states a time, it does so at its beginning.
 # A time in a comment is what the comment, or a part of it, begins with: "export time: 3 s" is none.
-_IN_TEXT = re.compile(
-    r"(?:^|[,;|(\[]|\b(?:simulation|at)\b)\s*(?:(?:time|timevalue)\s*[:=]?|t\s*=)\s*"
-    r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)(?![\w:/.-]*[\w:/])",
+_IN_TEXT = re.compile(  # Nothing is tried twice: a comment may be as long as a file.
+    r"(?:^|[,;|(\[]|\b(?:simulation|at)\b)[^\S\n]*+(?:(?:time|timevalue)\s*+[:=]?+|t\s*+=)\s*+"
+    r"([-+]?(?>\d+(?:\.\d*)?|\.\d+)(?>e[-+]?\d+)?+)(?![.-]*+[\w:/])",
     re.IGNORECASE | re.MULTILINE,
 )
 

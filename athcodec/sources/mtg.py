@@ -146,7 +146,8 @@ class _Plants:
         self._topology_columns = 0
         self._line = 0
         self.later_rows = 0
-        text = re.sub(r"\(#.*?#\)", _only_breaks, text, flags=re.DOTALL)
+        closed = text.rfind("#)") + 2  # Behind it no comment ends, and none is looked for.
+        text = re.sub(r"\(#.*?#\)", _only_breaks, text[:closed], flags=re.DOTALL) + text[closed:]
         lines = [line.partition("#")[0] for line in text.splitlines()]
         rows = self._header(lines)
         for self._line, cells in rows:

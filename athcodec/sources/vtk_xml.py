@@ -292,8 +292,9 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
     """Return the XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
-    match = re.search(rb"<AppendedData[^>]*encoding\s*=\s*[\"']raw[\"'][^>]*>", data)
-    if not match:
+    tags = re.finditer(rb"<AppendedData([^<>]*+)>", data)
+    match = next((tag for tag in tags if re.search(rb"encoding\s*+=\s*+[\"']raw[\"']", tag[1])), None)
+    if match is None:
         return data, None
     end = data.rfind(b"</AppendedData>")
     start = data.find(b"_", match.end()) + 1

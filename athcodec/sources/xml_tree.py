@@ -9,7 +9,9 @@ from athcodec.errors import ClipError
 from athcodec.files.reading import Budget
 
 XML_BYTES, TEXT_BYTES = 224, 40  # Bytes that an element or attribute takes, and a byte of text that becomes numbers.
-_NAMED_DOCTYPE = re.compile(rb"""<!DOCTYPE\s+[\w.:-]+(\s+SYSTEM\s+("[^"<>]*"|'[^'<>]*'))?\s*(\[\s*\])?\s*>""")
+_NAMED_DOCTYPE = re.compile(
+    rb"""<!DOCTYPE\s++[\w.:-]++(\s++SYSTEM\s++("[^"<>]*+"|'[^'<>]*+'))?+\s*+(\[\s*+\])?+\s*+>"""
+)
 
 
 def parse_xml(data: bytes, tag: str, budget: Budget) -> ElementTree.Element:

@@ -5,8 +5,9 @@ import struct
 from spec.make.base import *
 from spec.make.host import hosted
 from spec.make.joins import joined
+from spec.make.polygons import mixed_polygons
 from spec.make.source_rest import bent
-from spec.make.static import attribute, frame, metadata, plain, static
+from spec.make.static import attribute, frame, metadata, plain, static, with_static
 
 ONE, TWO_ROOTS = [Stem(-1, 1)], [Stem(-1, 2), Stem(-1, 2)]
 
@@ -87,4 +88,26 @@ static(
 attribute(
     "name-beyond-of-none: a name that goes on behind the chunk, of an array without elements",
     struct.pack("<BBHII", 1, 1, 5, 1, 0) + b"age",
+)
+for name_, reason_, fields_ in (  # A count at its limit is refused for what is wrong behind it.
+    (
+        "vertices-2-26",
+        "2^26 vertices are allowed, but not two branches of one place",
+        {"vertex_count": 1 << 26, "branch_count": 2},
+    ),
+    ("branches-2-20", "2^20 branches are allowed, but not of one place", {"branch_count": 1 << 20}),
+    ("frames-2-20", "2^20 frames are allowed, but not in one segment", {"frame_count": 1 << 20}),
+    ("segments-2-20", "2^20 segments are allowed, but not of one frame", {"segment_count": 1 << 20}),
+    (
+        "full-levels-33-of-many-segments",
+        "Full_Level_Count 33, and tables above Max_Table_Bytes",
+        {"full_level_count": 33, "level_count": 33, "frame_count": 1 << 16, "segment_count": 1 << 16},
+    ),
+):
+    header(f"{name_}: {reason_}", **fields_)
+static(
+    "faces-128-corners-of-int8: a face of more corners than the type of their numbers holds",
+    lambda: not_refused(
+        lambda: with_static((FACES, mixed_polygons([[k % 5 for k in range(128)]], types=("<u4", "|i1"))))
+    ),
 )

@@ -35,10 +35,18 @@ def run(budget: float) -> list[Row]:
 
 def _note(outcome: targets.Outcome, fuzzer: bool) -> str:
     if outcome.kind:
-        return f"kept {outcome.artifact}" if outcome.artifact else outcome.log.strip().splitlines()[0]
+        return f"kept {outcome.artifact}" if outcome.artifact else _failure(outcome.log.strip().splitlines()[0])
     if outcome.target.startswith(cli.SOURCES):
         return "files read"
     return f"{outcome.edges:,} edges" if fuzzer else targets.NO_FUZZER
+
+
+def _failure(line: str) -> str:
+    """Return the end of what a reader's process says of its failure, without the input that made it fail."""
+    try:
+        return json.loads(line)["failure"].strip().splitlines()[-1]
+    except (ValueError, LookupError, TypeError):
+        return line[:200]
 
 
 def _coverage_row() -> Row:

@@ -1,8 +1,8 @@
 """Fuzzing of the readers of other formats: `python -m fuzz.sources KIND SECONDS SEED`, for cli.py.
 
 An input is a file of one format. It passes where it gives a clip, or one line of a ClipError, within SECONDS of time
-and MEMORY. Inputs are valid files, mutated by what they are made of: members of JSON, numbers in text, fields of
-headers, arrays of archives.
+and MEMORY; warnings are one line, too. Inputs are valid files, mutated by what they are made of: members of JSON,
+numbers in text, fields of headers, arrays of archives.
 """
 
 from __future__ import annotations
@@ -44,24 +44,25 @@ class Failed(Exception):
 def attempt(kind: str, data: bytes, folder: Path) -> bool:
     """Whether the file gives a clip. Raises Failed."""
     import athcodec
-    from athcodec.errors import ClipError
+    from athcodec.errors import LONGEST_MESSAGE, ClipError
 
     path = folder / f"a.{kind}"
     path.write_bytes(data)
-    with _timed(), warnings.catch_warnings():
+    with _timed(), warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("error")
-        warnings.simplefilter("ignore", athcodec.errors.SourceWarning)
+        warnings.simplefilter("always", athcodec.errors.SourceWarning)
         try:
             with athcodec.read(path, max_memory=BUDGET) as clip:
                 clip.block(0, min(clip.frame_count, 2))
-            return True
+            refused = None
         except ClipError as error:
-            text = str(error)
-            if "\n" in text or not text.strip() or len(text) > 2000:
-                raise Failed(f"a message that is not one short line: {text[:300]!r}") from error
-            return False
+            refused = error
         except Exception as error:
             raise Failed("".join(traceback.format_exception(error)[-6:])) from error
+    for text in (str(message) for message in (refused, *(one.message for one in warned)) if message is not None):
+        if not text.isprintable() or not text.strip() or len(text) > LONGEST_MESSAGE:
+            raise Failed(f"a message that is not one short line: {text[:300]!r}") from refused
+    return refused is None
 
 
 @contextmanager

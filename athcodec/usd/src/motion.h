@@ -40,6 +40,10 @@ class Motion
     // reported once.
     bool Points(int clip, int frame, int level, size_t first, size_t count, VtVec3fArray *points) const;
 
+    // The source's rest pose, x, y and z of each vertex in scene units; the reference pose where the file ends before
+    // it. Empty where its bytes are damaged, which is reported.
+    std::vector<double> Rest() const;
+
   private:
     struct Frame {
         int clip, frame, level;
@@ -51,6 +55,7 @@ class Motion
 
     std::string _path;
     std::shared_ptr<const char> _bytes;
+    size_t _size = 0;
     ath_player *_player = nullptr;
     ath_info _info{};
     mutable std::mutex _mutex;        // Guards all members below, and the player.

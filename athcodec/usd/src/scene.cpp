@@ -1,4 +1,5 @@
 #include "scene.h"
+#include "looks.h"
 #include "static_data.h"
 
 #include <pxr/gf/half.h>
@@ -204,6 +205,15 @@ void Ints(const SdfPrimSpecHandle &prim, const char *name, const std::vector<int
         ->SetDefaultValue(VtValue(VtIntArray(values.begin(), values.end())));
 }
 
+bool IsDoubleSided(const Object &object) { return Text(object.details, "doubleSided") == "true"; }
+
+SdfAttributeSpecHandle DoubleSided(const SdfPrimSpecHandle &prim)
+{
+    const auto spec = Attribute(prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform);
+    spec->SetDefaultValue(VtValue(true));
+    return spec;
+}
+
 void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const Polygons &faces, Object *object)
 {
     if (object->kind == "mesh") {
@@ -215,9 +225,7 @@ void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const 
         Token(object->prim, "subdivisionScheme", Text(object->details, "subdivisionScheme").value_or("none"));
         Ints(object->prim, "faceVertexCounts", std::vector<int>(counts, counts + object->face_count));
         Ints(object->prim, "faceVertexIndices", own);
-        if (Text(object->details, "doubleSided") == "true")
-            Attribute(object->prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform)
-                ->SetDefaultValue(VtValue(true));
+        if (IsDoubleSided(*object)) DoubleSided(object->prim);
     } else if (object->kind == "curves") {
         object->prim = SdfPrimSpec::New(root, name, SdfSpecifierDef, "BasisCurves");
         Ints(object->prim, "curveVertexCounts", object->curves);
@@ -397,6 +405,59 @@ std::vector<std::string> Primvars(const StaticData &data, const ath_info &info, 
     return left;
 }
 
+// ---- looks ----
+
+// Marks what the file does not state, so that readers do not take it for a statement.
+void MarkGuess(const SdfAttributeSpecHandle &spec)
+{
+    const VtDictionary marks{{"guessed", VtValue(true)}};
+    spec->SetInfo(SdfFieldKeys->CustomData, VtValue(VtDictionary{{"athcodec", VtValue(marks)}}));
+}
+
+// One colour, or one for each material that the object's faces have.
+void DisplayColor(const Object &object, const std::vector<GfVec3f> &colours, const std::vector<int> &of_face)
+{
+    if (colours.empty()) return;
+    const bool has_one = std::all_of(colours.begin(), colours.end(), [&](auto &each) { return each == colours[0]; });
+    const auto spec = Attribute(object.prim, "primvars:displayColor", SdfValueTypeNames->Color3fArray);
+    spec->SetDefaultValue(VtValue(VtVec3fArray(colours.begin(), has_one ? colours.begin() + 1 : colours.end())));
+    spec->SetInfo(TfToken("interpolation"), VtValue(TfToken(has_one ? "constant" : "uniform")));
+    if (!has_one) Ints(object.prim, "primvars:displayColor:indices", of_face);
+    MarkGuess(spec);
+}
+
+// Gives objects colours, unless the file has some, and both sides to open faces.
+void Show(const Motion &motion, const StaticData &data, std::vector<Object> *objects)
+{
+    std::vector<ObjectFaces> faces;
+    for (const Object &object : *objects)
+        faces.push_back({object.name, object.first_face, object.face_count, IsDoubleSided(object)});
+    const auto uv = data.arrays.find("uv");
+    const std::string domain = uv == data.arrays.end() ? "" : DomainOf(data, "uv", uv->second, motion.Info());
+    const bool has_uv = domain == "vertex" || domain == "corner", has_faces = !data.faces.counts.empty();
+    const Looks looks = LooksOf(data, has_faces ? motion.Rest() : std::vector<double>{}, has_uv ? &uv->second : nullptr,
+                                domain == "corner", faces);
+    const bool has_colours =
+        data.arrays.count("colors") || std::find(data.unread.begin(), data.unread.end(), "colors") != data.unread.end();
+    for (Object &object : *objects) {
+        std::vector<GfVec3f> colours;
+        std::vector<int> of_face;
+        if (object.kind == "mesh") {
+            const auto first = looks.materials.begin() + object.first_face, last = first + object.face_count;
+            const auto open = looks.is_open.begin() + object.first_face;
+            const std::set<int> used(first, last);
+            for (const int material : used) colours.push_back(looks.colours[size_t(material)]);
+            for (auto face = first; face != last; ++face)
+                of_face.push_back(int(std::distance(used.begin(), used.find(*face))));
+            if (!IsDoubleSided(object) && std::any_of(open, open + object.face_count, [](char is) { return is; }))
+                MarkGuess(DoubleSided(object.prim));
+        } else {
+            colours.push_back(LineColour(object.name));
+        }
+        if (!has_colours) DisplayColor(object, colours, of_face);
+    }
+}
+
 // ---- the layer ----
 
 double MetresPerUnit(const JsObject &metadata)
@@ -523,6 +584,7 @@ Scene Scene::Of(const Motion &motion, const Choice &choice, bool metadata_only)
     std::set<std::string> taken;
     for (Object &object : objects)
         DefineObject(root, Distinct(Identifier(object.name, "part"), &taken), data.faces, &object);
+    Show(motion, data, &objects);
     const std::vector<std::string> left = Primvars(data, info, &objects);
     if (!left.empty())
         scene.layer->SetCustomLayerData({{"athcodec:notShown", VtValue(VtStringArray(left.begin(), left.end()))}});

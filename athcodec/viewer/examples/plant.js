@@ -34,6 +34,8 @@ export async function openPlant(url) {
   const damaged = new Set(), costs = []; // costs: milliseconds that a segment takes at each level
   let works = [], before = { seconds: 0, frame: 0 }; // works: preparations of the segment that is shown and of the next
   const find = (index, level) => works.find((each) => each.index === index && each.level === level);
+  const sizes = Array.from({ length: file.info.levelCount }, (_, level) => // bytes of motion at each level
+    file.ranges(level, clip.firstSegment, last, true).reduce((sum, { size }) => sum + size, 0));
   const segmentsAt = (level) => works.flatMap((each) => (each.level === level && each.segment ? [each.segment] : []));
 
   // Fetches what a level of a segment needs. Returns whether it is there.
@@ -72,15 +74,18 @@ export async function openPlant(url) {
     const left = [now, next].reduce((sum, index) => sum + (costs[level] ?? 0) * (1 - (find(index, level)?.progress ?? 0)), 0);
     const updates = (file.segmentStart(now + 1) - frame) / (frame - before.frame); // until the next segment is shown
     const passed = seconds - before.seconds, due = updates > 0 ? Math.min(1.5 * left / updates, 500 * Math.min(passed, 0.1)) : 0;
-    const end = performance.now() + Math.max(budget, due), has = (index) => works.some((each) => each.index === index && each.segment);
+    const end = performance.now() + Math.max(budget, due);
+    const middle = Math.max(0, sizes.findLastIndex((size) => size <= sizes[level] / 8));
+    const has = (index, least) => works.some((each) => each.index === index && each.segment && each.level >= least);
     before = { seconds, frame };
 
     works = works.filter((each) => {
-      const stays = [now, next].includes(each.index) && (each.segment || [0, level].includes(each.level));
+      const stays = [now, next].includes(each.index) && (each.segment || [0, middle, level].includes(each.level));
       if (!stays) each.segment ? each.segment.free() : each.cancel();
       return stays;
     });
-    const wishes = [...[now, next].filter((index) => !has(index)).map((index) => [index, 0]), [now, level], [next, level]];
+    const coarse = [now, next].flatMap((index) => [0, middle].filter((each) => !has(index, each)).map((each) => [index, each]));
+    const wishes = [...coarse, [now, level], [next, level]]; // A middle level, of an eighth of the bytes, comes soon.
     wishes.filter((wish) => isFetched(...wish)).every((wish) => isDecoded(...wish, end));
 
     const decoded = works.filter(({ index, segment }) => index === now && segment).sort((a, b) => a.level - b.level);
