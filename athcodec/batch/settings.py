@@ -30,6 +30,7 @@ from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import AXES, METRES, parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
 from athcodec.sources import format_named, formats
+from athcodec.untyped import JsonMapping, JsonObject, Keywords
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
@@ -50,7 +51,7 @@ READING = (
 # These settings change a clip before it is encoded.
 SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
 
-Settings = dict[str, Any]
+Settings = JsonObject
 
 
 def load_settings(path: FilePath) -> dict[str, Settings]:
@@ -87,7 +88,7 @@ def load_settings(path: FilePath) -> dict[str, Settings]:
     return content
 
 
-def check_settings(settings: Mapping[str, Any], where: str = "settings", folder: FilePath = ".") -> Settings:
+def check_settings(settings: JsonMapping, where: str = "settings", folder: FilePath = ".") -> Settings:
     """Check the settings of clips, and bring them to the form in which the manifest has them.
 
     Parameters
@@ -144,7 +145,7 @@ def loop_frames(settings: Settings) -> int | None:
     return blend if settings.get("loop", blend > 0) else None
 
 
-def reading_options(settings: Settings) -> dict[str, Any]:
+def reading_options(settings: Settings) -> Keywords:
     """Return keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
     if options.get("rest") == HOST:  # how it is stored
@@ -154,7 +155,7 @@ def reading_options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def coding_options(settings: Settings) -> dict[str, Any]:
+def coding_options(settings: Settings) -> Keywords:
     """Return keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:

@@ -19,6 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.options import real, set_numbers, whole
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
@@ -157,7 +158,7 @@ class MotionClip:
     MotionClip(60 frames, 20 vertices, 1 branch, float32)
     """
 
-    positions: Any
+    positions: ArrayLike
     time: np.ndarray
     vertex_branch: np.ndarray | None = None
     branch_parent: np.ndarray | None = None
@@ -165,7 +166,7 @@ class MotionClip:
     edges: np.ndarray | None = None
     faces: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: JsonObject = field(default_factory=dict)
     rest_pose: str = "first"
     stem_index: np.ndarray | None = None
     clip_ranges: tuple[ClipRange, ...] = ()
@@ -521,7 +522,7 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
     return times
 
 
-def stated_fps(metadata: Mapping[str, Any]) -> float | None:
+def stated_fps(metadata: JsonMapping) -> float | None:
     """Return the frames per second in `metadata["fps"]`; None if it is missing or no positive number."""
     try:
         fps = real("fps", cast(Any, metadata.get("fps")))
@@ -530,7 +531,7 @@ def stated_fps(metadata: Mapping[str, Any]) -> float | None:
     return fps if 0 < fps < float("inf") else None
 
 
-def frame_rate(metadata: Mapping[str, Any]) -> float:
+def frame_rate(metadata: JsonMapping) -> float:
     """Return the frames per second in `metadata["fps"]`, by default 30. Raises ClipError for no positive number."""
     fps = stated_fps(metadata) if "fps" in metadata else DEFAULT_FPS
     if fps is None:
@@ -650,7 +651,7 @@ def stem_index_of(vertex_branch: np.ndarray, along: np.ndarray) -> np.ndarray:
     return places
 
 
-def check_attributes(attributes: Mapping[str, Any] | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
+def check_attributes(attributes: JsonMapping | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
     """Return named arrays, little-endian and without records, and the names of those that no file holds (`NOT_KEPT`).
 
     Raises ClipError unless the names are free, and the values numbers, booleans or bytes.

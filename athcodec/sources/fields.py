@@ -21,6 +21,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Part, Topology
 from athcodec.sources.mesh import kind_of
 from athcodec.sources.scene_objects import scene_fields
+from athcodec.untyped import JsonObject
 
 AMBIGUOUS = "u"  # Name of the displacement in some programs and of the velocity in others.
 DISPLACEMENTS = ("displacement", "displacements", "disp", "displ", AMBIGUOUS)
@@ -57,7 +58,7 @@ class Steps(Protocol):
 def clip_of_steps(
     steps: Steps,
     time: np.ndarray,
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     name: str,
     options: ReadOptions,
     static: dict[str, np.ndarray],

@@ -22,6 +22,7 @@ from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget, read_plain
 from athcodec.motion.clip import RESERVED_NAMES, polygons
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_fields, scene_of_json
+from athcodec.untyped import JsonObject
 
 FLOAT32_DIGITS = 9
 WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # Bytes that a word of text and the value made of it take.
@@ -65,7 +66,7 @@ class Mesh:
     faces: np.ndarray | None = None
     edges: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: JsonObject = field(default_factory=dict)
     not_read: dict[str, list[str]] = field(default_factory=dict)
 
     @property
@@ -427,7 +428,7 @@ class PlyHeader:
     order: str  # "<", ">", or "" for text
     elements: list[PlyElement]
     length: int
-    scene: dict[str, Any] = field(default_factory=dict)  # Comments that our exporter adds.
+    scene: JsonObject = field(default_factory=dict)  # Comments that our exporter adds.
 
 
 def ply_header(data: bytes) -> PlyHeader:

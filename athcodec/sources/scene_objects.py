@@ -20,6 +20,7 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.motion.units import METRES_PER_UNIT
 from athcodec.sources import ReadOptions
+from athcodec.untyped import JsonObject
 
 MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
 MAX_METADATA_BYTES = 1 << 24
@@ -223,7 +224,7 @@ def clip_of_objects(
     objects: list[Any],
     frames: Frames,
     time: np.ndarray,
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     kept: Iterable[tuple[ArrayDescriptor, bytes]],
     options: ReadOptions,
     **more: Any,
@@ -338,7 +339,7 @@ def _add_kept(
             domains[name] = domain
 
 
-def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
+def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
     """Metadata: the names, or the paths where names come twice."""
     names = [obj.name for obj in objects]
     unique = len(set(names)) == len(names)
@@ -349,7 +350,7 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
     return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
 
 
-def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> dict[str, Any]:
+def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> JsonObject:
     """Metadata: the frames that show each object, or each of its copies, that some frame does not show. presence:
     (T, 1) or (T, copies) bool for each object."""
     stated = {}
@@ -453,7 +454,7 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
     return np.repeat(static.values, obj.face_counts, axis=0)
 
 
-def scene_of_json(text: str | bytes) -> dict[str, Any]:
+def scene_of_json(text: str | bytes) -> JsonObject:
     """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
         entries = json.loads(text)
@@ -464,7 +465,7 @@ def scene_of_json(text: str | bytes) -> dict[str, Any]:
     return {}
 
 
-def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def scene_fields(entries: JsonObject, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
     """Return (metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where
     they are some."""
     metadata = {key: value for key, value in entries.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
@@ -475,7 +476,7 @@ def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], d
     return metadata | objects, numbers
 
 
-def _object_fields(entries: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def _object_fields(entries: Any, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
     entries = entries if isinstance(entries, dict) else {}
     names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(
@@ -497,11 +498,11 @@ def _are_names(value: Any) -> bool:
 
 def _join_materials(
     objects: list[SceneObject],
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     attributes: dict[str, np.ndarray],
     domains: dict[str, str],
     skip: Collection[str],
-) -> dict[str, Any]:
+) -> JsonObject:
     """Add "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
     Names come in the order that the file was written from, where it says one."""
     if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
@@ -550,7 +551,7 @@ def _edges(objects: list[SceneObject]) -> np.ndarray | None:
     return np.concatenate(edges).astype(np.int32) if edges else None
 
 
-def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
+def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> JsonObject:
     """Take what a MotionClip has members for out of the attributes; others of these names are renamed."""
     fields = {}
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
@@ -572,7 +573,7 @@ def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[
     return fields
 
 
-def own_metadata(text: Any) -> dict[str, Any]:
+def own_metadata(text: Any) -> JsonObject:
     """Return the JSON metadata that our exporter kept besides what the format itself holds; else nothing."""
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}

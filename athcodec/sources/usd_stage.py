@@ -69,6 +69,7 @@ from athcodec.sources.usd_values import (
     value_at,
     visibility,
 )
+from athcodec.untyped import JsonObject
 
 # Types of prims that need no note when they are not read.
 READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))
@@ -446,9 +447,9 @@ def _note(obj: PrimObject, name: str, attribute: Usd.Attribute, usual: str) -> N
 # ---- time ----
 
 
-def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any]:
+def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> JsonObject:
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
-    metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
+    metadata: JsonObject = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         metres = stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)  # float32 in files of Blender 2.8
         if not isinstance(metres, (int, float)) or not 0 < metres < math.inf:

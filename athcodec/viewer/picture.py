@@ -13,13 +13,13 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import MissingExtra
 from athcodec.files.atomic import check_target, new_file
 from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
+from athcodec.untyped import PlaywrightObject
 from athcodec.viewer.view import export_page
 
 INSTALL = 'pip install "athcodec[picture]"'
@@ -140,7 +140,7 @@ def can_draw() -> bool:
     return True
 
 
-def _packages() -> Any:
+def _packages() -> PlaywrightObject:
     """Return Pillow's module of images if all packages that a picture needs are installed."""
     try:
         import playwright.sync_api  # noqa: F401
@@ -155,7 +155,7 @@ def _packages() -> Any:
 
 
 @contextmanager
-def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
+def chromium(flags: Sequence[str] = FLAGS) -> Iterator[PlaywrightObject]:
     """Start a browser, Playwright's. Raises MissingExtra."""
     _packages()
     from playwright.sync_api import sync_playwright

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from athcodec.motion.hierarchy import derived_edges
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.motion.units import METRES_PER_UNIT, stated_scene
+from athcodec.untyped import JsonObject
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
@@ -205,9 +206,7 @@ class FileAssembly:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
-    def _stored(
-        self, of_source: dict[str, Any], of_weights: Callable[[ErrorWeights], dict[str, Any]]
-    ) -> dict[str, Any]:
+    def _stored(self, of_source: JsonObject, of_weights: Callable[[ErrorWeights], JsonObject]) -> JsonObject:
         """Return attributes or metadata of the source with those of weights, if there are some."""
         weights = self.clip.placed.weights
         return of_source if weights is None else of_source | of_weights(weights)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from contextlib import closing
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from athcodec.files.gltf.json import BROKEN, brief, entries, entry, extension, i
 from athcodec.files.gltf.primitives import triangles
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import closing_on_failure, naming
+from athcodec.untyped import JsonObject
 
 EXTENSION = "ATH_motion"
 VERTEX_ATTRIBUTE = "_ATH_VERTEX"
@@ -156,7 +156,7 @@ def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
 
 def _vertices(file: GltfFile, primitive: dict, binding: dict) -> np.ndarray:
     """Return the motion's vertex of each vertex of a primitive, (n,)."""
-    attributes: dict[str, Any] = entry(primitive, "attributes")
+    attributes: JsonObject = entry(primitive, "attributes")
     count = len(file.array(integer(attributes, "POSITION")))  # The file may have bytes for fewer vertices.
     if VERTEX_ATTRIBUTE not in attributes:
         return integer(binding, "firstVertex", 0) + np.arange(count)
