@@ -105,11 +105,11 @@ def find(
         Where an input does not exist.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
+    checked = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
-        item = Item(name, path, target, settings_of((name, path), default, patterns))
+        item = Item(name, path, target, settings_of((name, path), default, checked))
         other = items.setdefault(target, item)
         if other.input != path:
             place = without_secrets(target) if is_url(target) else target
@@ -139,7 +139,7 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
-    for text, called in each_once(map(os.fspath, inputs)):
+    for text, called in each_once(os.fspath(each) for each in inputs):
         pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
         if not pairs:

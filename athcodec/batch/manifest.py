@@ -18,7 +18,7 @@ from athcodec.untyped import JsonObject
 try:
     import fcntl
 except ImportError:  # Windows
-    fcntl = None
+    fcntl = None  # type: ignore[assignment]
     import msvcrt
 
 LINE_START = b'{"output": '

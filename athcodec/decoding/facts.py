@@ -34,7 +34,7 @@ def facts_of(
 ) -> JsonObject:
     """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
     level, where they were measured."""
-    facts = {"file": os.fspath(path)} | decoder.file.info()
+    facts: JsonObject = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]

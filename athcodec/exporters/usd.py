@@ -55,7 +55,9 @@ from athcodec.untyped import JsonObject, UsdObject
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
-TYPES: dict[str, dict[tuple[int, ...], str]] = {  # By a row's shape and kind; the shape None stands for any number of values per row.
+TYPES: dict[
+    str, dict[tuple[int, ...], str]
+] = {  # By a row's shape and kind; the shape None stands for any number of values per row.
     "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
     "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
     "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},

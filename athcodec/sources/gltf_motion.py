@@ -193,7 +193,7 @@ def _returns(motion: NodeMotion, keys: np.ndarray) -> bool:
     return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 
 
-def _stated_rate(extras: dict, keys: np.ndarray) -> float | None:
+def _stated_rate(extras: JsonObject, keys: np.ndarray) -> float | None:
     """Return the frame rate that the file states, if its keys agree."""
     fps = extras.get("fps")
     return float(fps) if is_number(fps) and 0 < fps < 1e6 and not off_grid(keys, fps).any() else None

@@ -14,6 +14,7 @@ from athcodec.files.gltf.json import entries, entry, extension
 from athcodec.files.gltf.motion import EXTENSION
 from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
 from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.sources.gltf_nodes import GltfNode
@@ -117,7 +118,7 @@ def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
                 yield kind, f"{_name('animation', index, animation)}: {pointer}"
 
 
-def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
+def _parts(file: GltfFile) -> Iterator[tuple[str, int, JsonObject]]:
     """Yield (kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
     yield "file", 0, file.json
     yield "asset", 0, entry(file.json, "asset")

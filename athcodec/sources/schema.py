@@ -86,10 +86,14 @@ class Arrays(Protocol):
     counts_from_1  whether the program that wrote it numbers vertices from 1
     """
 
-    stored: Mapping[str, Stored]
-    metadata: JsonObject
-    not_read: dict[str, list[str]]
-    counts_from_1: bool
+    @property
+    def stored(self) -> Mapping[str, Stored]: ...
+    @property
+    def metadata(self) -> JsonObject: ...
+    @property
+    def not_read(self) -> dict[str, list[str]]: ...
+    @property
+    def counts_from_1(self) -> bool: ...
 
     def read(self, name: str) -> np.ndarray:
         """Return the whole array."""

@@ -213,7 +213,7 @@ def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
     head, end = data[: header.length], header.length + vertex.count * dtype.itemsize
     tail = data[end:]
     first = np.frombuffer(data, dtype, vertex.count, len(head))
-    others = [name for name in dtype.names if name not in POSITION_COLUMNS]
+    others = [name for name in dtype.names or () if name not in POSITION_COLUMNS]
 
     def points(data: bytes) -> np.ndarray | None:
         if data[: len(head)] != head or data[end:] != tail:

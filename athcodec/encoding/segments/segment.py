@@ -37,6 +37,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, default_jobs, ranges
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
+from athcodec.untyped import JsonObject
 
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
@@ -730,7 +731,9 @@ def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) ->
     return head
 
 
-def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]) -> tuple[dict, dict]:
+def stem_streams(
+    segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]
+) -> tuple[JsonObject, JsonObject]:
     """Return STEMS of the levels of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 

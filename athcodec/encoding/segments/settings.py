@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,6 +25,8 @@ OF_SAMPLE = (
     "learned_coded"
 ).split()
 OF_BRANCHES = "forms lags details rigid".split()  # Arrays with an entry for each branch.
+
+Key: TypeAlias = tuple[object, ...]  # Distinguishes settings of one search.
 
 
 @dataclass(frozen=True)
@@ -60,16 +63,16 @@ class Settings:
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
 
     @property
-    def key(self) -> tuple:
+    def key(self) -> Key:
         """Return the key that distinguishes these settings from others of the same search."""
         return self.prelude_key + self._values(OF_MOTION)
 
     @property
-    def prelude_key(self) -> tuple:
+    def prelude_key(self) -> Key:
         """The part of the key that decides hierarchy and rest pose."""
         return self._values(OF_PRELUDE)
 
-    def _values(self, names: Sequence[str]) -> tuple:
+    def _values(self, names: Sequence[str]) -> Key:
         values = (getattr(self, name) for name in names)
         return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 

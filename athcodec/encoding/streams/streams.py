@@ -216,7 +216,7 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 
 
 def encode_predicted(
-    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype: np.dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Code predicted motion of a segment; return it and the positions that it decodes to, (T, N, 3) of `dtype`. None:
     steps so large cannot keep the limits. source: (T, N, 3) float64 less the origin; limits: (N,)."""

@@ -35,6 +35,7 @@ from athcodec.decoding.container import (
 )
 from athcodec.errors import ClipError, FormatError
 from athcodec.motion.clip import ClipRange
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.encoding.streams.polygons import Mesh
@@ -271,7 +272,7 @@ def _refusals(subject: str) -> Iterator[None]:
         raise ClipError(f"{subject}: {error}; expected plain data that a file can hold") from None
 
 
-def pack_metadata(metadata: dict) -> bytes:
+def pack_metadata(metadata: JsonObject) -> bytes:
     """Return JSON, compressed if that is shorter. Raises ClipError for what no reader would accept."""
     with _refusals("metadata"):
         text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

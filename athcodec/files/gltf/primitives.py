@@ -7,16 +7,17 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import integer
+from athcodec.untyped import JsonObject
 
 
-def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
+def triangles(file: GltfFile, primitive: JsonObject, count: int) -> np.ndarray:
     """Return a primitive's triangles of its `count` vertices, (F, 3); none if it draws points or lines. Raises
     ClipError."""
     mode = integer(primitive, "mode", 4, stop=7)
     return rows_of(corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
 
 
-def corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarray:
+def corners(file: GltfFile, primitive: JsonObject, count: int, name: str) -> np.ndarray:
     if primitive.get("indices") is None:
         return np.arange(count)
     values = file.array(primitive["indices"])
