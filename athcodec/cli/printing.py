@@ -267,9 +267,9 @@ def progress() -> Iterator[Report | None]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
-        def report(stage: str, fraction: float) -> None:
+        def report(phase: str, fraction: float) -> None:
             if fraction < bar.tasks[task].completed:  # other work, such as measuring what was encoded
                 bar.reset(task, total=1.0)
-            bar.update(task, completed=fraction, description=stage)
+            bar.update(task, completed=fraction, description=phase)
 
         yield report

@@ -209,7 +209,7 @@ def write(
         raise ClipError(f"{wanted.blur[0]}: got {kind.name}, expected one of {', '.join(BLURRED)}")
     if wanted.rig is None:
         _check_clips(motion, kind)
-    report = progress or (lambda stage, fraction: None)
+    report = progress or (lambda phase, fraction: None)
     with keeping(getattr(motion, "inputs", ())):
         if kind.package:
             add_kind(kind.title, kind.suffixes, kind.magic)

@@ -1,4 +1,4 @@
-"""The motion clip: what every source reader makes and every later stage reads.
+"""The motion clip: what every source reader makes and everything after it reads.
 
 A clip is positions over time, a rest pose, the branch of every vertex and any named static arrays. It checks
 its own structure when it is made, and the positions while they are read in blocks of frames, so that a clip

@@ -97,7 +97,7 @@ class SegmentCoder:
         goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
         ends = None
         for (index, _), follows in zip(order, [*goes_on[1:], False]):
-            before, ends = ends, Ends(decided.layers.level_count) if follows else None
+            before, ends = ends, Ends(decided.layers.stage_count) if follows else None
             # The search holds the positions of an only segment.
             block = [decided.source.block(index)] if len(decided.source.segments) > 1 else []
             yield index, block, before, ends

@@ -1,6 +1,6 @@
 """Time bases learned from the tracks of a segment, which take the place of waves.
 
-The principal components over time of a level's tracks (Lengyel 1999) represent it in fewer rows than waves, at the
+The principal components over time of a stage's tracks (Lengyel 1999) represent it in fewer rows than waves, at the
 price of storing them. FORMAT.md, "Temporal basis stream" and "Basis in waves".
 """
 

@@ -1,6 +1,6 @@
 """Chunks as they are written: heads in front of the streams (streams.py), static data, and their order in a file.
 
-Chunks of the prelude come first, those of the motion by (level, segment, kind), other attributes last.
+Chunks of the prelude come first, those of the motion by (stage, segment, kind), other attributes last.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ _IS_DERIVED = 16  # Bit of the first byte of EDGES: they are the sides of the fa
 
 def _order(chunk: Chunk) -> tuple[int, ...]:
     if chunk.is_motion:
-        return (1, chunk.level, chunk.segment, chunk.kind)
+        return (1, chunk.stage, chunk.segment, chunk.kind)
     return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
 
 
@@ -73,10 +73,10 @@ class ChunkStore:
     spool: BinaryIO
     entries: list[tuple[Chunk, int]] = field(default_factory=list)
 
-    def add(self, kind: int, payload: bytes, level: int = NO_LEVEL, segment: int = 0) -> None:
+    def add(self, kind: int, payload: bytes, stage: int = NO_LEVEL, segment: int = 0) -> None:
         place = self.spool.seek(0, 2)
         self.spool.write(payload)
-        self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+        self.entries.append((Chunk(kind, NO_LEVEL, segment, len(payload), crc32c(payload), stage=stage), place))
 
     def leave_out(self, is_needless: Callable[[Chunk], bool]) -> None:
         """Drop the chunks of motion that `is_needless` is true of. All other chunks stay."""
@@ -187,7 +187,7 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS. basis: stream of a learned basis of a rank; base: the level of the stream whose basis it begins
+    """Head of STEMS. basis: stream of a learned basis of a rank; base: the stage of the stream whose basis it begins
     with; turn: half octaves below 1 of the largest step of rigid pieces' rotations (0: there is none)."""
 
     step: float
