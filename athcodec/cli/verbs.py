@@ -456,7 +456,7 @@ def view(args: argparse.Namespace) -> int:
             answer(args, facts, f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
         ready = partial(_say_where, args)
-        view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
+        view.serve(file, args.port, ready, args.clip, args.host_mesh, forest=args.forest, floor=floor)
     return 0
 
 
@@ -476,7 +476,8 @@ def picture(args: argparse.Namespace) -> int:
     out = getattr(args, kind)
     with naming(args.file):
         check_output(out, args.file, args.host_mesh, suffix=f".{kind}")
-        size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
+        how = {"fps": args.fps, "time": args.time, "host_mesh": args.host_mesh}
+        size = picture.save_picture(args.file, out, kind, args.clip, args.size, **how)
     answer(args, {"file": out, "bytes": size}, f"{out}: {size:,} bytes")
     return 0
 

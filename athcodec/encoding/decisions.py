@@ -193,7 +193,7 @@ class FileDecisions:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios=ratios)
         if self._has_usual_ladder and search.stages_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
         with work.trying("segments"):

@@ -242,7 +242,7 @@ def _animate(
         if len(takes) > 1 and np.any(used) and not np.any(moves) and not has_others:
             path = next(path for path, of in enumerate(used) if of.any())
             moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
-        _add_channels(glb, movers.nodes, take, poses, used, moves, samplers, channels)
+        _add_channels(glb, movers.nodes, take, list(zip(poses, used, moves)), samplers, channels)
         _add_animation(glb, take, samplers, channels)
 
 
@@ -320,17 +320,14 @@ def _add_channels(
     glb: Glb,
     nodes: list[int],
     take: Take,
-    poses: list[np.ndarray],
-    used: list[np.ndarray],
-    moves: list[np.ndarray],
+    tracks: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
     samplers: list[JsonObject],
     channels: list[JsonObject],
 ) -> None:
-    """Append samplers and channels. poses, used, moves: one array for each of PATHS, of which the latter two say, (J,),
-    which nodes have a channel and which of those move. A node that moves gets a key per frame, one that is still a
-    single key."""
+    """Append samplers and channels. tracks: for each of PATHS the poses, (n, J, width), and as (J,) bool which nodes
+    have a channel and which of those move. A node that moves gets a key per frame, one that is still a single key."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
-    for path, values, is_used, moving in zip(PATHS, poses, used, moves):
+    for path, (values, is_used, moving) in zip(PATHS, tracks):
         for chosen_nodes, count in ((moving, len(values)), (is_used & ~moving, 1)):
             chosen = np.flatnonzero(chosen_nodes)
             if not len(chosen):

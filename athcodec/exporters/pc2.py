@@ -25,7 +25,8 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
 from athcodec.motion.protocol import Motion
-from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.mesh import Mesh
+from athcodec.sources.mesh_files import read_mesh
 from athcodec.sources.pc2 import HEADER, MAGIC
 from athcodec.untyped import JsonObject
 

@@ -151,7 +151,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
     objects = objects_of(motion)
     looks = looks_of(motion, objects)
     if joints is not None and options.nanite:
-        return _write_assembly(stage, motion, joints, objects, looks, codes, report)
+        return _write_assembly(stage, motion, joints, objects, looks, report)
     instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
     names = distinct(_identifier(obj.name) for obj in objects)
     for number, (obj, name) in enumerate(zip(objects, names)):
@@ -166,7 +166,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
     _own_arrays(root, motion, left)
     _write_presence(objects, codes)
     if joints is not None:
-        return _write_rigged(stage, motion, joints, objects, looks, codes, report) | hidden_copies(objects)
+        return _write_rigged(stage, motion, joints, objects, looks, report) | hidden_copies(objects)
     placed = [(objects[number], copies) for number, copies in instanced.items()]
     _write_places(stage, placed, codes)
     if options.velocities:
@@ -184,16 +184,10 @@ def _time_codes(motion: Motion) -> np.ndarray:
 
 
 def _write_rigged(
-    stage: Usd.Stage,
-    motion: Motion,
-    joints: Joints,
-    objects: list[SceneObject],
-    looks: Looks,
-    codes: np.ndarray,
-    report: Progress,
+    stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
 ) -> JsonObject:
     _set_rest(motion, objects, looks)
-    write_rig(stage, "/clip", motion, joints, objects, codes)
+    write_rig(stage, "/clip", motion, joints, objects, _time_codes(motion))
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     report(1.0)
     return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
@@ -211,13 +205,7 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
 
 
 def _write_assembly(
-    stage: Usd.Stage,
-    motion: Motion,
-    joints: Joints,
-    objects: list[SceneObject],
-    looks: Looks,
-    codes: np.ndarray,
-    report: Progress,
+    stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
 ) -> JsonObject:
     """Return as Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
@@ -237,10 +225,10 @@ def _write_assembly(
     _own_arrays(stage.GetDefaultPrim(), motion, _static_arrays(stage, motion, objects))
     base = [obj for number, obj in enumerate(objects) if number not in parts]
     _set_rest(motion, base, looks)
-    write_rig(stage, nanite.BASE, motion, joints, base, codes)
+    write_rig(stage, nanite.BASE, motion, joints, base, _time_codes(motion))
     for number, part in parts.items():
         nanite.place_part(stage, f"{nanite.ROOT_PRIM}/{names[number]}", names[number], objects[number], part, joints)
-    _write_presence(objects, codes)
+    _write_presence(objects, _time_codes(motion))
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     error = nanite.largest_error(motion, objects, joints, parts)
     report(1.0)

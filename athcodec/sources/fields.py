@@ -62,6 +62,7 @@ def clip_of_steps(
     name: str,
     options: ReadOptions,
     static: dict[str, np.ndarray],
+    *,
     resource: Any = None,
     unchanged: Any = None,
     parts: Sequence[Part] = (),

@@ -24,7 +24,8 @@ from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import FORMATS, ReadOptions, read
-from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.mesh import Mesh
+from athcodec.sources.mesh_files import read_mesh
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
 from athcodec.untyped import JsonObject

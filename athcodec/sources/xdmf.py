@@ -79,7 +79,8 @@ def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
     steps = JoinedSteps(parts, items.budget, fspath(path))
     metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
     steps.left_out += selection.other_fields
-    clip = clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), items, items.unchanged)
+    name, static = Path(path).stem, steps.static()
+    clip = clip_of_steps(steps, time, metadata, name, options, static, resource=items, unchanged=items.unchanged)
     clip.not_read = {**clip.not_read, **{kind: names for kind, names in scene.not_read.items() if names}}
     return clip
 

@@ -68,6 +68,7 @@ def save_picture(
     kind: str = "gif",
     clip: str | None = None,
     size: tuple[int, int] = SIZE,
+    *,
     fps: float = FRAMES_PER_SECOND,
     time: float = 0.0,
     host_mesh: HostMesh | None = None,
@@ -108,7 +109,8 @@ def save_picture(
     check_target(out, f".{kind}")
     image = _packages()
     pictures = [
-        image.open(io.BytesIO(data)).convert("RGB") for data in _drawn(path, kind, clip, size, fps, time, host_mesh)
+        image.open(io.BytesIO(data)).convert("RGB")
+        for data in _drawn(path, kind, size, fps=fps, time=time, clip=clip, host_mesh=host_mesh)
     ]
     data = io.BytesIO()
     moving = {"save_all": True, "append_images": pictures[1:], "duration": round(1000 / fps), "loop": 0}
@@ -125,7 +127,7 @@ def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
     image = _packages()
     with open_ath(path) as decoder:
         time = _STILL_AT * decoder.clip.duration
-    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None)
+    (png,) = _drawn(path, "png", size, time=time)
     data = io.BytesIO()
     image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
     return data.getvalue()
@@ -168,7 +170,16 @@ def chromium(flags: Sequence[str] = FLAGS) -> Iterator[PlaywrightObject]:
             browser.close()
 
 
-def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
+def _drawn(
+    path: FilePath,
+    kind: str,
+    size: tuple[int, int],
+    *,
+    fps: float = FRAMES_PER_SECOND,
+    time: float = 0.0,
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
+) -> Iterator[bytes]:
     """Yield each picture as PNG, with all of the scenery, also without a graphics processor."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip

@@ -324,6 +324,7 @@ class SegmentMotion:
         learned_modes: LearnedModes | None = None,
         before: SegmentMotion | None = None,
         ratio: int = 1,
+        *,
         periodic: bool = False,
     ):
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.stage_count:
@@ -567,6 +568,7 @@ def position_errors(
     pool: ThreadPool,
     shown: np.ndarray | None = None,
     shares: np.ndarray | None = None,
+    *,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
     """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up for files.

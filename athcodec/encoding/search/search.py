@@ -132,6 +132,7 @@ class Search:
         effort: str,
         work: Work,
         jobs: int | None = None,
+        *,
         ratios: Sequence[int] = (1,),
     ) -> Search:
         """Return the search for a whole plant."""

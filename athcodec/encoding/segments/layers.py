@@ -510,7 +510,7 @@ class CodedMotion:
         release_memory()
         bases = self._bases.refined(layer, last, stage)
         segment, decoded = analyse(
-            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before=before, ratio=ratio
         )
         if layer.ratio == 1:
             segment.forget_caches()
@@ -659,8 +659,8 @@ class CodedMotion:
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:
-        shares = self._prelude.shares
-        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, shares, rounding)
+        shown, shares = self._shown_times, self._prelude.shares
+        return position_errors(decoded, self.positions, self._origin, self._pool, shown, shares, rounding=rounding)
 
 
 class _EvenStages:

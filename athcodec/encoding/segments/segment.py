@@ -465,7 +465,9 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh_for(settings)
-        return streams.encode_rest(branches, step, source.rest, None, settings.rest_slack, mesh, settings.shape_of)
+        return streams.encode_rest(
+            branches, step, source.rest, None, settings.rest_slack, mesh=mesh, shape_of=settings.shape_of
+        )
 
     return _within(source.rest_limit(settings.bound), source.rest, encode, settings.rest_step)
 
@@ -704,13 +706,14 @@ def analyse(
     positions: np.ndarray,
     learned_modes: LearnedModes | None,
     bases: dict[int, StreamBasis],
+    *,
     before: SegmentMotion | None = None,
     ratio: int = 1,
 ) -> tuple[SegmentMotion, np.ndarray]:
     """Return the integers of the stems, and the positions at the last stage without corrections; output: origin and
     type of the positions. bases: of the stages that learn theirs; before, ratio: as SegmentMotion has them."""
     stages = stage_streams(settings, plan.stage_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], stages, learned_modes, before, ratio, settings.periodic)
+    segment = SegmentMotion(plan, positions.shape[2], stages, learned_modes, before, ratio, periodic=settings.periodic)
     origin, dtype = output
     decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
@@ -767,10 +770,20 @@ def find_corrections(
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
-            parts, decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, ends.closed
+            parts,
+            decoded,
+            positions,
+            origin,
+            settings.limit,
+            step,
+            pool=plan.pool,
+            narrow=is_narrow,
+            closed=ends.closed,
         )
         met = ends.with_moves(moves)
-        rows = streams.find_corrections(decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, met)
+        rows = streams.find_corrections(
+            decoded, positions, origin, settings.limit, step, plan.pool, narrow=is_narrow, ends=met
+        )
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS

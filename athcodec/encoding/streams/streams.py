@@ -48,6 +48,7 @@ def encode_rest(
     rest: np.ndarray,
     coarse: CodedRest | None = None,
     slack: float = 0.0,
+    *,
     mesh: Mesh | None = None,
     shape_of: np.ndarray | None = None,
 ) -> CodedRest:
@@ -296,6 +297,7 @@ def find_corrections(
     limit: float | np.ndarray,
     step: float,
     pool: ThreadPool = SERIAL,
+    *,
     narrow: np.ndarray | bool = False,
     ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
@@ -355,6 +357,7 @@ def find_rigid_corrections(
     origin: np.ndarray,
     limit: float | np.ndarray,
     step: float,
+    *,
     pool: ThreadPool = SERIAL,
     narrow: bool = False,
     closed: int = 0,
