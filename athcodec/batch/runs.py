@@ -290,7 +290,7 @@ def _cluster(workers: int) -> DaskObject:
 
 @contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[DaskObject]:
-    """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
+    """Yield a client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # The manifest records workers that die.

@@ -110,7 +110,8 @@ def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) ->
 def _done(
     item: Item, source: JsonObject, summary: encoding.Summary, verified: MotionClip | None, start: float
 ) -> Result:
-    """verified: the clip, where the file is to be decoded before it counts as done."""
+    """Return what is recorded of a clip that is done. verified: the clip, where the file is to be decoded before it
+    counts as done."""
     if verified is not None:
         with athcodec.open(summary.path, strict=True, host_mesh=verified) as decoder:
             decoder.file.check()
@@ -141,7 +142,7 @@ def _done(
 
 @contextmanager
 def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]:
-    """The clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
+    """Yield the clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
     is another than `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)

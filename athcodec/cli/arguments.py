@@ -747,7 +747,7 @@ def _demo_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
-    """`parse` for argparse, which shows the message of its own kind of error only."""
+    """Return `parse` for argparse, which shows the message of its own kind of error only."""
 
     def parsed(text: str) -> Any:
         try:

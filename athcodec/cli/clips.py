@@ -325,8 +325,8 @@ def check_output(path: str, *inputs: str | None, suffix: str | None = None) -> N
 
 
 def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
-    """ClipError where an output has another suffix; with the commands that may have been meant where it was the last of
-    several names and is a source like these `inputs`."""
+    """Raise ClipError where an output has another suffix; with the commands that may have been meant where it was the
+    last of several names and is a source like these `inputs`."""
     if output.lower().endswith(suffix):
         return
     is_source = False

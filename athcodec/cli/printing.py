@@ -224,7 +224,8 @@ def print_json(facts: JsonObject) -> None:
 
 
 def _finite(value: Any) -> Any:
-    """`value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown them."""
+    """Return `value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown
+    them."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -259,7 +260,7 @@ def one_line(error: Exception) -> str:
 
 @contextmanager
 def progress() -> Iterator[Report | None]:
-    """A function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
+    """Yield a function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -198,7 +198,7 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """FORMAT.md, "Front stream"."""
+    """Return the front stream (FORMAT.md, "Front stream")."""
     names = (name for name, _ in _native.Header._fields_ if name != "stages" and hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
     first = header.stages[-1] + 1 if header.stages else 0

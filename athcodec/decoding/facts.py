@@ -32,8 +32,8 @@ TICK_RATIO = Column("tick ratio")
 def facts_of(
     path: str | os.PathLike[str], decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
 ) -> JsonObject:
-    """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
-    level, where they were measured."""
+    """Return decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at
+    each level, where they were measured."""
     facts: JsonObject = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12

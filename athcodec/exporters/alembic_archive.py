@@ -175,7 +175,7 @@ def _add_instanced(
 
 
 def _bind_materials(motion: Motion, objects: list[SceneObject]) -> None:
-    """Materials by their names alone: a set of the faces that have one."""
+    """Write materials by their names alone: a set of the faces that have one."""
     labels, names = face_materials(motion) or (np.empty(0), [])
     sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
     for obj in objects if sets else ():
@@ -204,8 +204,8 @@ def _filled(kind: AlembicObject, values: np.ndarray) -> AlembicObject:
 
 
 def _add(obj: SceneObject, values: list[np.ndarray], arrays: Statics | None) -> None:
-    """A sample of the points, and of their velocities where there are any; the first one brings what does not move, the
-    rows of the object."""
+    """Write a sample of the points, and of their velocities where there are any; the first one brings what does not
+    move, the rows of the object."""
     points, *moving = (_filled(imath.V3fArray, each) for each in values)
     schema = obj.target.getSchema()
 
@@ -282,8 +282,8 @@ def _widths(held: dict[str, AlembicObject], arrays: Statics, name: str) -> JsonO
 
 
 def _divide(motion: Motion, objects: list[SceneObject]) -> tuple[Statics, Statics]:
-    """Static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it has those
-    that all copies share."""
+    """Return static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it
+    has those that all copies share."""
     fitting: Statics = {}
     left: Statics = {}
     for name, values in motion.attributes.items():

@@ -107,7 +107,8 @@ class Placed:
         self._before, self._scale = quaternions(axes), np.ones_like(spread)
 
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
+        """Return maps from a part's axes, and values, for mean products (K, 3, 3) of places in a frame and in these
+        axes."""
         rotation, scale = self.nearest(cross)
         turn = quaternions(rotation)
         turn *= np.where((turn * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]

@@ -228,8 +228,8 @@ def _add_animation(glb: Glb, take: Take, samplers: list[JsonObject], channels: l
 def _animate(
     glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[JsonObject], list[JsonObject]]]
 ) -> None:
-    """An animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than at
-    rest in any of them; one key where such a one stands still in one."""
+    """Add an animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than
+    at rest in any of them; one key where such a one stands still in one."""
     if movers is None:
         movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((takes[-1].stop, 0, 3)),) * 3)
     has_others = bool(more[0][1])

@@ -120,8 +120,8 @@ class Glb:
         self._length += len(padding)
 
     def write(self, out: BinaryIO, later: Iterable[bytes] = ()) -> None:
-        """The whole file. `later` are the bytes of the views that were made last, of whole words; accessors' bounds may
-        still be filled in place of UNKNOWN_BOUND while they come."""
+        """Write the whole file. `later` are the bytes of the views that were made last, of whole words; accessors'
+        bounds may still be filled in place of UNKNOWN_BOUND while they come."""
         self.json["buffers"] = [{"byteLength": self._length}]
         room = len(self._text())
         room += -room % 4
@@ -269,7 +269,7 @@ def material_of(look: Look, has_colours: bool) -> JsonObject:
 
 
 def root_transform(motion: Motion) -> JsonObject:
-    """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
+    """Return translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
     metadata = motion.metadata
     metres = metres_of(metadata) or 1.0
     axis = str(metadata.get("up_axis", "y")).lower()
@@ -327,13 +327,13 @@ def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
 
 
 def clock(motion: Motion) -> JsonObject:
-    """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
+    """Return frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
     scene = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
     return scene if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | scene
 
 
 def _clock(metadata: JsonMapping, time: np.ndarray, fps: float) -> JsonObject:
-    """Frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
+    """Return frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
     fps = stated_fps(metadata) or fps
     return {"fps": fps, "start_frame": whole(start_frame_of(metadata) + round(float(time[0]) * fps, 6))}
 
@@ -354,7 +354,7 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 
 def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[JsonObject, JsonObject, list[str]]:
-    """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
+    """Return by semantic (rows, width) values per vertex, and per corner; and the names of the rest."""
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
     arrays = dict(motion.attributes)
@@ -405,7 +405,8 @@ def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
 
 
 def _as_component(values: np.ndarray) -> np.ndarray | None:
-    """In a type that attributes may have and that holds all values; float64 is rounded. None where there is none."""
+    """Return values in a type that attributes may have and that holds all values; float64 is rounded. None where there
+    is none."""
     if values.dtype.kind == "f":
         with np.errstate(over="ignore"):
             rounded = values.astype(np.float32)

@@ -326,7 +326,8 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
 
 
 def _remove_motions(gltf: JsonObject, numbers: set[int]) -> None:
-    """Motions of the file, and with the last of them the extension; primitives that others move name these anew."""
+    """Remove motions of the file, and with the last of them the extension; primitives that others move name these
+    anew."""
     extension = gltf["extensions"][EXTENSION]
     kept = [number for number in range(len(extension["motions"])) if number not in numbers]
     if not kept:
@@ -366,7 +367,8 @@ def _has_normals(primitive: JsonObject) -> bool:
 
 
 def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion: ClipView) -> None:
-    """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
+    """Add a morph target per frame for each primitive that moves, and as many without effect for the others of its
+    mesh."""
     gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
     counts, corners = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     normals, at_rest = MovingNormals(Surface(counts, corners, rest), rest), {}

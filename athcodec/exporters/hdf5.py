@@ -287,7 +287,7 @@ def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarra
 
 
 def _attribute(value: Any) -> Any:
-    """`value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
+    """Return `value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
     text.
     """
     if value is None:

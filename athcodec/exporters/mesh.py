@@ -34,7 +34,8 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def domain_of(motion: Motion, name: str) -> str:
-    """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
+    """Return "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not
+    vertices."""
     domains = motion.metadata.get("domains")
     domain = domains.get(name) if isinstance(domains, dict) else None
     values = motion.attributes[name]

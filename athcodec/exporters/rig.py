@@ -203,8 +203,8 @@ class _Bones:
         return parent
 
     def fitted(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that they
-        leave at each vertex, (N,)."""
+        """Return rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that
+        they leave at each vertex, (N,)."""
         turn = np.tile(np.eye(3), (len(frames), self.count, 1, 1))
         shift = np.zeros((len(frames), self.count, 3))
         for side in range(2):
@@ -222,8 +222,8 @@ class _Bones:
         return placed * self.weight[:, side, None]
 
     def _fit(self, side: int, target: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> None:
-        """The best rotations and translations of joints of even or odd place, whose weighted places are to be `target`,
-        (T, N, 3)."""
+        """Set the best rotations and translations of joints of even or odd place, whose weighted places are to be
+        `target`, (T, N, 3)."""
         rows, starts, bones = self._sides[side]
         if not len(rows):
             return

@@ -395,7 +395,8 @@ def _write_velocities_of_places(motion: Motion, instanced: list[tuple[SceneObjec
 
 
 def _write_presence(objects: list[SceneObject], codes: np.ndarray) -> None:
-    """Visibility of objects, and the copies that an instancer hides, from the frames on in which they change."""
+    """Write the visibility of objects, and the copies that an instancer hides, from the frames on in which they
+    change."""
     for obj in objects:
         if obj.shown is None or obj.shown.shape[1] > 1 and obj.copies == 1:
             continue

@@ -51,8 +51,8 @@ def presence_within(metadata: JsonMapping, frames: range) -> JsonObject:
 def presence_of_parts(
     metadata: JsonMapping, names: Sequence[str], copies: Sequence[int], frame_count: int
 ) -> dict[int, np.ndarray]:
-    """By the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those that
-    show each of its copies, (T, copies)."""
+    """Return, by the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those
+    that show each of its copies, (T, copies)."""
     presence: dict[int, np.ndarray] = {}
     stated = stated_presence(metadata)
     places = {name: number for number, name in enumerate(names)} if stated else {}

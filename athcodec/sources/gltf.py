@@ -378,7 +378,8 @@ def _other_animations(scene: Scene) -> dict[str, list[str]]:
 def _connections(
     file: GltfFile, nodes: list[GltfNode]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
+    """Return faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has
+    one."""
     indices: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials, numbers = [], _material_numbers(file)
     for node in nodes:
@@ -424,8 +425,8 @@ def _material_names(file: GltfFile) -> list[str]:
 def _attributes(
     scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: NodeMotion, keeps_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
-    was written with them."""
+    """Return static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the
+    file was written with them."""
     file = scene.file
     keys = dict.fromkeys(
         key

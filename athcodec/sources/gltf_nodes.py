@@ -192,7 +192,8 @@ def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.nda
 
 
 def _load_influences(node: GltfNode, file: GltfFile) -> None:
-    """Per joint its vertices and their weights, which add up to 1; where a file has none, the first joint counts."""
+    """Load for each joint its vertices and their weights, which add up to 1; where a file has none, the first joint
+    counts."""
     vertex, joint, weight = [], [], []
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"

@@ -314,7 +314,7 @@ def _native(values: np.ndarray) -> np.ndarray:
 
 
 def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
-    """runs: [label, faces] one after the other, for all faces."""
+    """Add the materials of faces. runs: [label, faces] one after the other, for all faces."""
     fits = isinstance(runs, list) and all(
         isinstance(run, list) and len(run) == 2 and all(type(n) is int and abs(n) < 1 << 31 for n in run)
         for run in runs

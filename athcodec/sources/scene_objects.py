@@ -174,7 +174,7 @@ class SceneObject:
                 static.values = static.values[order]
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Transform normals to world space; remove them where they turn in time, or have no direction there."""
+        """Turn normals to world space; remove them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return
@@ -340,7 +340,7 @@ def _add_kept(
 
 
 def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
-    """Metadata: the names, or the paths where names come twice."""
+    """Return metadata: the names, or the paths where names come twice."""
     names = [obj.name for obj in objects]
     unique = len(set(names)) == len(names)
     metadata = {
@@ -351,8 +351,8 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
 
 
 def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> JsonObject:
-    """Metadata: the frames that show each object, or each of its copies, that some frame does not show. presence:
-    (T, 1) or (T, copies) bool for each object."""
+    """Return metadata: the frames that show each object, or each of its copies, that some frame does not show.
+    presence: (T, 1) or (T, copies) bool for each object."""
     stated = {}
     for name, shown in zip(names, presence):
         if (shown == shown[:, :1]).all():
@@ -392,7 +392,8 @@ def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Static arrays of all objects, one after the other, and what their rows stand for where that is no vertex."""
+    """Return static arrays of all objects, one after the other, and what their rows stand for where that is no
+    vertex."""
     attributes, domains = {}, {}
     for name in dict.fromkeys(name for obj in objects for name in obj.statics):
         if name in skip:

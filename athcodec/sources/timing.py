@@ -52,8 +52,8 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
 
 
 def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
-    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which is at
-    `start` seconds (default: at the first key that is not missed, else at 0)."""
+    """Warn with a GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which
+    is at `start` seconds (default: at the first key that is not missed, else at 0)."""
     if not missed.any():
         return
     met = keys[~missed]

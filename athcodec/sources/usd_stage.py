@@ -128,8 +128,8 @@ class _Stage:
 
 
 def _check_layers(path: str, allow_outside: bool) -> None:
-    """ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the folder of
-    the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
+    """Raise ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the
+    folder of the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
     folder, waiting, seen = Path(path).parent, [path], set()
     while waiting:
         name = waiting.pop()
@@ -360,7 +360,7 @@ def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, lis
 
 
 def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[PrimObject, int], np.ndarray]) -> None:
-    """Fills in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
+    """Fill in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
     for obj in objects:
         _follow_ids(obj, codes)

@@ -29,7 +29,7 @@ class _Keys:
 def time_codes(
     stage: Usd.Stage, objects: list[PrimObject], fps: float | None, irregular: bool, not_read: dict[str, list[str]]
 ) -> tuple[np.ndarray, float]:
-    """Time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
+    """Return time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
     codes_per_second = stage.GetTimeCodesPerSecond()
     if not 0 < codes_per_second < math.inf:
         raise ClipError(f"timeCodesPerSecond: got {codes_per_second}, expected a positive number")

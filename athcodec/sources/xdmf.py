@@ -248,8 +248,8 @@ class _Scene:
         return time, information | metadata
 
     def _information(self) -> JsonObject:
-        """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
-        materials that our writer adds as JSON."""
+        """Return fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of
+        objects and materials that our writer adds as JSON."""
         information: JsonObject = {}
         self._name_unknown(self.documents.root, ("Domain", "Information"))
         for domain in (self.documents.root, *self._domains):
