@@ -99,8 +99,7 @@ def encode(
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows.
     progress : callable, optional
-        Called with the phase of the work and the elapsed fraction of the whole time, which never falls and ends with
-        1.0.
+        Called with the phase of the work and the fraction that is done, which never falls and ends with 1.0.
 
     Returns
     -------

@@ -112,6 +112,7 @@ def _done(
 ) -> Result:
     """Return what is recorded of a clip that is done. verified: the clip, where the file is to be decoded before it
     counts as done."""
+    assert summary.path is not None  # It was encoded into a file.
     if verified is not None:
         with athcodec.open(summary.path, strict=True, host_mesh=verified) as decoder:
             decoder.file.check()

@@ -35,9 +35,12 @@ class Steps(Protocol):
     elsewhere      names of the data of the first step that are not per point, and what they are per
     """
 
-    topology: Topology
-    left_out: Sequence[str]
-    elsewhere: Mapping[str, str]
+    @property
+    def topology(self) -> Topology: ...
+    @property
+    def left_out(self) -> Sequence[str]: ...
+    @property
+    def elsewhere(self) -> Mapping[str, str]: ...
 
     def points(self, step: int) -> np.ndarray:
         """Return (N, 2) or (N, 3) points of the mesh."""

@@ -133,9 +133,8 @@ class Series:
                 self._compare(self.numbers, stated, "the name has", "and is not taken")
             kind = next(time.kind for time in stated if time is not None)
             if kind is not Kind.TIME:
-                self._warn(
-                    f"{_place(stated)}, {kind.value}, is taken for the time: {_shown(seconds)} s; {self._advice}"
-                )
+                shown = _shown(seconds.tolist())
+                self._warn(f"{_place(stated)}, {kind.value}, is taken for the time: {shown} s; {self._advice}")
             return self._in_seconds(seconds, rate)
         if self.numbers is None:
             return np.zeros(1), {}

@@ -42,7 +42,7 @@ class Mesh:
         for elements, first, second in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):
             if (first is None) != (second is None):
                 return f"got {'no' if second is None else 'further'} {elements}"
-            if first is not None and not all(map(np.array_equal, first, second)):
+            if first is not None and second is not None and not all(map(np.array_equal, first, second)):
                 return f"got other {elements}"
         return ""
 

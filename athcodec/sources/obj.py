@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy import typing as npt
 
 from athcodec.errors import ClipError
 from athcodec.sources.mesh import Mesh, add_face_rows, checked_indices, with_polygons
@@ -132,7 +133,9 @@ def parse_obj(data: bytes) -> Mesh:
         raise ClipError("got no vertices, expected an OBJ file with lines of v")
     points, colors = obj_points(file.points)
     count = len(points)
-    faces, attributes = with_polygons(file.counts, checked_indices("faces", np.array(file.corners, np.int64), count))
+    faces, attributes = with_polygons(
+        np.array(file.counts, np.int32), checked_indices("faces", np.array(file.corners, np.int64), count)
+    )
     mesh = Mesh(points, faces, attributes=attributes, metadata={"domains": {}})
     if file.edges:
         mesh.edges = checked_indices("lines", np.array(file.edges, np.int64).reshape(-1), count).reshape(-1, 2)
@@ -149,7 +152,9 @@ def parse_obj(data: bytes) -> Mesh:
     return mesh
 
 
-def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[np.ndarray, np.ndarray | None]:
+def obj_points(
+    rows: Sequence[Sequence[bytes]], dtype: npt.DTypeLike | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
     """Return (N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where
     the coordinates have more digits than float32 holds."""
     flat = [word for row in rows for word in row[:3]]
@@ -169,7 +174,7 @@ def obj_points(rows: Sequence[Sequence[bytes]], dtype: object = None) -> tuple[n
     return narrowed(points, dtype), colors.reshape(len(rows), -1)
 
 
-def narrowed(points: np.ndarray, dtype: object) -> np.ndarray:
+def narrowed(points: np.ndarray, dtype: npt.DTypeLike | None) -> np.ndarray:
     with np.errstate(over="ignore"):
         return points.astype(dtype)
 

@@ -88,7 +88,7 @@ class Grid:
         self.cell_data = {name: values[shown] for name, values in self.cell_data.items()}
 
     @property
-    def cells(self) -> tuple[np.ndarray, ...]:
+    def cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What has to be the same in all steps."""
         return self.types, self.starts, self.stops, self.nodes
 

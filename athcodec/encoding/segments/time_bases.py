@@ -54,8 +54,8 @@ class InWaves:
     @cached_property
     def rows(self) -> np.ndarray:
         """The rows with a decoder's bits, (rank, frames) float64."""
-        rows = np.empty(self.integers.shape)
-        rank, frames = rows.shape
+        rank, frames = self.integers.shape
+        rows = np.empty((rank, frames))
         lib.ath_add_basis_rows(
             self.waves.ctypes.data,
             frames,

@@ -62,7 +62,7 @@ _IS_DERIVED = 16  # Bit of the first byte of EDGES: they are the sides of the fa
 
 def _order(chunk: Chunk) -> tuple[int, ...]:
     if chunk.is_motion:
-        return (1, chunk.stage, chunk.segment, chunk.kind)
+        return (1, NO_LEVEL if chunk.stage is None else chunk.stage, chunk.segment, chunk.kind)
     return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
 
 
@@ -141,8 +141,8 @@ def mesh_checksum(mesh: np.ndarray) -> bytes:
 def pack_steady_time(*times: np.ndarray) -> bytes | None:
     """Return TIME by the rule that gives the very same times in seconds, (T,) for each clip; None: none does."""
     for method, code, find in ((BY_RATE, _RATE, _rate_of), (BY_STEP, _STEADY, _step_of)):
-        rules = [find(time) for time in times]
-        if None not in rules:
+        rules = [rule for time in times if (rule := find(time)) is not None]
+        if len(rules) == len(times):
             return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
     return None
 
@@ -177,7 +177,8 @@ def pack_clips(
         flags = clip_range.loop | (clip_range.loop and periodic and segments == 1) << 1
         entries.append(_CLIP.pack(clip_range.frame_count, segments, flags, len(name)) + name)
         if clip_range.loop:
-            entries.append(round_up_singles(errors).astype("<f4").tobytes())
+            assert errors is not None  # A loop has a seam.
+            entries.append(round_up_singles(np.asarray(errors)).astype("<f4").tobytes())
     return b"".join(entries)
 
 

@@ -36,12 +36,11 @@ def rows_of(corners: np.ndarray, mode: int) -> np.ndarray:
     if mode == 4:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     count = max(len(corners) - 2, 0)
-    if mode == 6:
-        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1) if count else None
-    else:
-        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if count else None
-        if count:
-            rows[1::2, 1:] = rows[1::2, :0:-1]
-    if rows is None:
+    if not count:
         return np.zeros((0, 3), np.int64)
+    if mode == 6:
+        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1)
+    else:
+        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+        rows[1::2, 1:] = rows[1::2, :0:-1]
     return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]
