@@ -19,7 +19,7 @@ from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, lev
 from athcodec.errors import AthError
 from athcodec.files.shown import counted, echo, print_parts, print_table, redacted
 from athcodec.options import DEFAULT_REL_ERROR
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
     from athcodec.decoding.clip_view import ClipView
@@ -136,7 +136,7 @@ def print_verdict(result: JsonObject) -> None:
         echo(f"{result['file']}: whole, all checksums match, {decodes}{more}")
 
 
-def _print_errors(levels: Sequence[JsonObject], unit: Any) -> None:
+def _print_errors(levels: Sequence[JsonObject], unit: JsonValue) -> None:
     lengths = [head(name, unit) for name in ("promised", "max", "RMS")]
     rows = [
         [f"{level['level']}", *(f"{level[name]:.4g}" for name in MEASURES), "yes" if level["kept"] else "NO"]
@@ -223,7 +223,7 @@ def print_json(facts: JsonObject) -> None:
     print(json.dumps(_finite(facts), indent=2).replace("\x7f", "\\u007f"))
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: JsonValue) -> JsonValue:
     """Return `value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown
     them."""
     if isinstance(value, dict):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from athcodec.files.shown import Table, counted
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
@@ -148,7 +148,7 @@ def level_rows(facts: JsonObject, cells: Sequence[Sequence[str]]) -> list[list[s
     return [*rows, row("arrays", "", "", behind)] if behind else rows
 
 
-def head(name: str, unit: Any) -> str:
+def head(name: str, unit: JsonValue) -> str:
     return f"{name} ({unit})" if unit else name
 
 

@@ -14,12 +14,12 @@ from athcodec.errors import ClipError
 from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES
 from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.motion import MAGIC, extension_of
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
-Reference = tuple[str, Any, Any]
+Reference = tuple[str, JsonValue, JsonValue]
 
 
 def _references(gltf: JsonObject) -> Iterator[Reference]:

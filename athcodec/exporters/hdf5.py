@@ -22,7 +22,7 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import clip_metadata
-from athcodec.untyped import H5Object, JsonMapping, JsonObject
+from athcodec.untyped import H5Object, JsonMapping, JsonObject, JsonValue
 
 CHUNK_BYTES = 1 << 20
 
@@ -286,7 +286,7 @@ def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarra
     return dict(attributes or {})
 
 
-def _attribute(value: Any) -> Any:
+def _attribute(value: JsonValue) -> JsonValue:
     """Return `value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
     text.
     """

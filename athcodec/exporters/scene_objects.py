@@ -16,7 +16,7 @@ from athcodec.motion.joining import OWN as CLIPS
 from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, SCHEME, ArrayDescriptor
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -113,7 +113,7 @@ def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
     return lost if not presence or is_one_clip and "presence" in kept else lost | {"presence": list(presence)}
 
 
-def is_double_sided(details: Any) -> bool:
+def is_double_sided(details: JsonValue) -> bool:
     """Return whether the faces of an object with such details in "part_usd" are seen from both sides."""
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 

@@ -19,7 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.options import real, set_numbers, whole
-from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject, JsonValue
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
@@ -500,7 +500,7 @@ def is_name(text: str) -> bool:
     return not any(c < " " or c == "\x7f" or "\ud800" <= c <= "\udfff" for c in text)
 
 
-def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
+def check_time(time: ArrayLike, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
     """Return (T,) float64 seconds. Raises ClipError unless they are finite, increase within each clip range, one per
     frame."""
     times: np.ndarray = np.asarray(time)
@@ -525,7 +525,7 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
 def stated_fps(metadata: JsonMapping) -> float | None:
     """Return the frames per second in `metadata["fps"]`; None if it is missing or no positive number."""
     try:
-        fps = real("fps", cast(Any, metadata.get("fps")))
+        fps = real("fps", cast(JsonValue, metadata.get("fps")))
     except TypeError:
         return None
     return fps if 0 < fps < float("inf") else None
@@ -558,7 +558,7 @@ def median_rate(*runs: np.ndarray) -> float:
     return next((number for number in usual if 0 < number and abs(number - rate) <= slack), rate)
 
 
-def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
+def check_indices(name: str, indices: ArrayLike, stop: int, width: int | None = None) -> np.ndarray | None:
     """Return `indices` as an array of its integer dtype. Raises ClipError unless every entry is in 0 .. stop - 1."""
     if indices is None:
         return None
@@ -593,7 +593,9 @@ def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: in
     check_indices("face_vertex_indices", indices[:, None], vertex_count)
 
 
-def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def check_branches(
+    vertex_branch: ArrayLike, branch_parent: ArrayLike, vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return (N,) and (B,) int32 labels and parents. Raises ClipError unless they are a forest of branches with
     vertices."""
     branch_parent = _integers("branch_parent", branch_parent)
@@ -612,7 +614,7 @@ def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) ->
     return vertex_branch, _check_parents(branch_parent)
 
 
-def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray | None:
+def check_stem_index(stem_index: ArrayLike, vertex_branch: np.ndarray) -> np.ndarray | None:
     """Return (N,) int32, or None if it only repeats the order of the vertex numbers.
 
     Raises ClipError unless every branch with n vertices has the places 0 .. n - 1 once each.
@@ -681,7 +683,7 @@ def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield from _columns(f"{name}.{field_name}", array[field_name])
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: JsonValue) -> JsonValue:
     """Return a value of metadata with Python's numbers in place of NumPy's and those of other libraries."""
     if type(value) in PLAIN_TYPES:
         return value
@@ -728,7 +730,7 @@ def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
     return int(ancestor[cyclic[0]]) if cyclic.size else None
 
 
-def _integers(name: str, values: Any) -> np.ndarray:
+def _integers(name: str, values: ArrayLike) -> np.ndarray:
     array: np.ndarray = np.asarray(values)
     if array.ndim != 1:
         raise ClipError(f"{name}: got shape {array.shape}, expected one dimension")

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -61,7 +60,7 @@ def parse_order(axes: str | Sequence[str]) -> Order:
     return order
 
 
-def order_of_labels(labels: Sequence[Any]) -> Order | None:
+def order_of_labels(labels: Sequence[ArrayLike]) -> Order | None:
     """Return the order that the names of an array's dimensions state; None where they state none."""
     names = [_NAMES.get(str(label).strip().lower().rpartition("/")[2]) for label in labels]
     return tuple((name,) for name in names if name) if sorted(map(str, names)) == sorted(_text(USUAL)) else None
@@ -134,7 +133,7 @@ def is_possible(shape: Sequence[int], order: Order | None = None) -> bool:
         return False
 
 
-def ordered(array: ArrayLike, order: Order) -> Any:
+def ordered(array: ArrayLike, order: Order) -> ArrayLike:
     """Return an array of positions as (frames, vertices, 3), which reads frames of `array` when they are sliced.
 
     Parameters
@@ -170,7 +169,7 @@ def ordered(array: ArrayLike, order: Order) -> Any:
     return Frames(read, frame_count, lengths[VERTICES], dtype.newbyteorder("="), keeps=axis != 0)
 
 
-def in_floats(positions: ArrayLike) -> tuple[Any, str]:
+def in_floats(positions: ArrayLike) -> tuple[ArrayLike, str]:
     """Return positions (frames, vertices, 3) in float32 or float64, whichever holds them, and a sentence if that is
     another type."""
     before = np.dtype(positions.dtype)

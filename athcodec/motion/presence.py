@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from athcodec.untyped import JsonMapping, JsonObject
+from athcodec.untyped import JsonMapping, JsonObject, JsonValue
 
 PRESENCE = "presence"
 FAR = 1.1  # Ratio of the diagonals with and without a hidden part above which the part is named.
@@ -30,7 +30,7 @@ def stated_presence(metadata: JsonMapping) -> dict[str, list[list[int]]]:
     return {name: runs for name, runs in stated.items() if _are_runs(runs)} if isinstance(stated, dict) else {}
 
 
-def _are_runs(runs: Any) -> bool:
+def _are_runs(runs: JsonValue) -> bool:
     pairs = isinstance(runs, list) and all(isinstance(run, list) and len(run) == 2 for run in runs)
     return pairs and all(type(frame) is int and 0 <= frame < 1 << 31 for run in runs for frame in run)
 

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 from athcodec.errors import BoundError, ClipError
 from athcodec.options import real, set_numbers
-from athcodec.untyped import JsonMapping
+from athcodec.untyped import JsonMapping, JsonValue
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
 AXES = ("x", "y", "z")
@@ -221,7 +221,7 @@ def unit_symbol(unit: object) -> str:
     return _LONG_NAMES.get(name.lower().removesuffix("s"), name if name in METRES else name.lower())
 
 
-def scene_unit(metadata: JsonMapping) -> Any:
+def scene_unit(metadata: JsonMapping) -> JsonValue:
     """Return the unit of a clip for `Length.in_scene_units`: its name, its length in metres, or None."""
     return metadata.get("unit") or metres_of(metadata)
 
@@ -234,7 +234,7 @@ def metres_of(metadata: JsonMapping) -> float | None:
     return None
 
 
-def checked_unit(unit: Any, name: str = "unit") -> str:
+def checked_unit(unit: JsonValue, name: str = "unit") -> str:
     """Return a unit that an option names, a symbol of METRES.
 
     Parameters
@@ -260,7 +260,7 @@ def checked_unit(unit: Any, name: str = "unit") -> str:
     raise ClipError(f"{name}: got {unit!r:.80}, expected one of {', '.join(METRES)}{hint}")
 
 
-def checked_axis(axis: Any, name: str = "up_axis") -> str:
+def checked_axis(axis: JsonValue, name: str = "up_axis") -> str:
     """Return an axis that an option names.
 
     Parameters

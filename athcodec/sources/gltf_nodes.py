@@ -13,7 +13,7 @@ from athcodec.files.gltf.json import brief, entries, entry, extension, integer
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources.gltf_scene import Scene
 from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 INSTANCE_BYTES = 256  # Bytes that an instance takes.
 INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
@@ -231,7 +231,7 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
     node.strongest[vertex[order]] = joint[order]
 
 
-def is_number(value: Any) -> bool:
+def is_number(value: JsonValue) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e15
 
 

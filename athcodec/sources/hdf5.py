@@ -31,7 +31,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from os import fspath
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -47,7 +46,7 @@ from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import POSITIONS, Stored, clip_of_arrays
-from athcodec.untyped import ArrayLike, H5Object, JsonMapping, JsonObject
+from athcodec.untyped import ArrayLike, H5Object, JsonMapping, JsonObject, JsonValue
 
 CHUNK_CACHE_BYTES = 16 << 20
 CACHE_SLOTS = 8191  # Chunks that the cache of a small dataset has places for.
@@ -379,14 +378,14 @@ def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
         raise ClipError(f"{name}: the dataset cannot be read: {error}") from error
 
 
-def _parsed(name: str, text: str) -> Any:
+def _parsed(name: str, text: str) -> JsonValue:
     try:
         return json.loads(text)
     except ValueError as error:
         raise ClipError(f"{name}: got {text[:40]!r}, expected JSON: {error}") from None
 
 
-def _to_python(value: Any) -> Any:
+def _to_python(value: JsonValue) -> JsonValue:
     """Return an HDF5 attribute as str, int, float, bool, None or nested lists of them."""
     if isinstance(value, h5py.Empty):
         return None

@@ -20,7 +20,7 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.motion.units import METRES_PER_UNIT
 from athcodec.sources import ReadOptions
-from athcodec.untyped import JsonObject
+from athcodec.untyped import JsonObject, JsonValue
 
 MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
 MAX_METADATA_BYTES = 1 << 24
@@ -493,7 +493,7 @@ def _object_fields(entries: Any, count: int) -> tuple[JsonObject, dict[str, np.n
     return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
 
 
-def _are_names(value: Any) -> bool:
+def _are_names(value: JsonValue) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 

@@ -13,7 +13,7 @@ import json
 import os
 import struct
 from os import fspath
-from typing import Any, BinaryIO
+from typing import BinaryIO
 from urllib.parse import unquote
 
 import numpy as np
@@ -25,7 +25,7 @@ from athcodec.files.kinds import HEAD_BYTES, TEXT, kind_of_bytes
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure
 from athcodec.options import MAX_MEMORY
-from athcodec.untyped import JsonMapping, JsonObject
+from athcodec.untyped import JsonMapping, JsonObject, JsonValue
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -133,7 +133,7 @@ class GltfFile:
                     + how
                 )
 
-    def item(self, kind: str, index: Any) -> JsonObject:
+    def item(self, kind: str, index: JsonValue) -> JsonObject:
         """Return entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
         every = self.json.get(kind)
         count = len(every) if isinstance(every, list) else 0
@@ -148,11 +148,11 @@ class GltfFile:
 
     # ---- accessors ----
 
-    def count(self, index: Any) -> int:
+    def count(self, index: JsonValue) -> int:
         """Return the number of elements of accessor `index`."""
         return integer(self.item("accessors", index), "count", low=1)
 
-    def array(self, index: Any) -> np.ndarray:
+    def array(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` as (count, width) in its component type. Raises ClipError."""
         accessor, where = self.item("accessors", index), f"accessor {index}"
         dtype = looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
@@ -169,7 +169,7 @@ class GltfFile:
             values = self._sparse(entry(accessor, "sparse"), values, where)
         return values
 
-    def floats(self, index: Any) -> np.ndarray:
+    def floats(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` as numbers: float32 unchanged, normalized integers between -1 and 1 (float64)."""
         values = self.array(index)
         if values.dtype.kind == "f":
@@ -178,7 +178,7 @@ class GltfFile:
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
-    def attribute(self, index: Any) -> np.ndarray:
+    def attribute(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` in the type that it is stored in, normalized integers as float32."""
         is_normalized = self.item("accessors", index).get("normalized")
         return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
@@ -224,7 +224,7 @@ class GltfFile:
             raise ClipError(f"bufferView {index}: got one that is compressed or cut off, expected {size} plain bytes")
         return buffer, offset, size
 
-    def _view(self, index: Any, view: JsonMapping, offset: int, size: int) -> bytes:
+    def _view(self, index: JsonValue, view: JsonMapping, offset: int, size: int) -> bytes:
         """Return bytes of the buffer view `view`, of number `index`, unpacked if it is compressed. Raises ClipError."""
         extensions = view.get("extensions") or {}
         for name in MESHOPT:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -65,13 +64,13 @@ def vector(holder: JsonMapping, key: str, default: list[float]) -> np.ndarray:
     return np.array([float(number) for number in value])
 
 
-def brief(value: Any) -> str:
+def brief(value: JsonValue) -> str:
     """Return a value for a message, cut off if it is long."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def looked_up(table: JsonMapping, key: Any, subject: str) -> Any:
+def looked_up(table: JsonMapping, key: JsonValue, subject: str) -> JsonValue:
     """Return the entry `key` of a table of what glTF allows. Raises ClipError."""
     if not isinstance(key, (int, str)) or key not in table:
         raise ClipError(f"{subject}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
