@@ -22,13 +22,16 @@ from ctypes import (
     c_uint64,
     c_void_p,
 )
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy import typing as npt
 
 from athcodec._library import load_library, misfit
 from athcodec.errors import BoundError
 from athcodec.options import MAX_SEGMENT
+
+BytesLike: TypeAlias = bytes | bytearray | memoryview | np.ndarray
 
 PIECE_VERTICES = 64
 SEGMENT_FRAMES = MAX_SEGMENT
@@ -338,7 +341,7 @@ MIRRORS: dict[str, type[ctypes.Structure] | np.dtype] = {
 check_layouts(MIRRORS)
 
 
-def address(array: np.ndarray | None, dtype, size: int) -> int | None:
+def address(array: np.ndarray | None, dtype: npt.DTypeLike, size: int) -> int | None:
     """Return a pointer to a contiguous array of at least `size` items of `dtype`.
 
     Raises TypeError if the array is anything else: a mistake of the caller that would corrupt memory.
@@ -358,18 +361,18 @@ def new_model() -> np.ndarray:
     return np.empty(lib.ath_model_size() // 8 + 1, np.uint64)
 
 
-def as_bytes(data) -> np.ndarray:
+def as_bytes(data: BytesLike) -> np.ndarray:
     """Return bytes-like data as an array that can be handed to the core."""
     return np.frombuffer(data, np.uint8) if len(data) else np.zeros(1, np.uint8)[:0]
 
 
-def crc32c(data, crc: int = 0) -> int:
+def crc32c(data: BytesLike, crc: int = 0) -> int:
     """Return the CRC-32C of bytes-like data, continuing from `crc`."""
     array = as_bytes(data)
     return lib.ath_crc32c(crc, array.ctypes.data, array.size)
 
 
-def encode_stream(function_name: str, capacity: int, *arguments, model: np.ndarray | None = None) -> bytes:
+def encode_stream(function_name: str, capacity: int, *arguments: object, model: np.ndarray | None = None) -> bytes:
     """Run one of the core's writers, with more room until its stream fits. `model` is its scratch memory, by default
     that of `new_model`."""
     model = new_model() if model is None else model

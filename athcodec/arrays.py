@@ -29,6 +29,7 @@ from athcodec.motion.positions import (
     turned_advice,
 )
 from athcodec.motion.units import checked_axis, checked_unit
+from athcodec.untyped import JsonObject, Keywords
 
 Source: TypeAlias = Any
 """An array (frames, vertices, 3), a MotionClip, a Decoder or ClipView, or a path."""
@@ -65,7 +66,7 @@ def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
             yield opened
 
 
-def _clip_of_array(source: Source, options: dict[str, Any]) -> tuple[MotionClip, str]:
+def _clip_of_array(source: Source, options: Keywords) -> tuple[MotionClip, str]:
     if isinstance(source, np.ma.MaskedArray) and np.ma.is_masked(source):
         raise ClipError("positions: got an array with masked items, expected a number for each; fill them first")
     if hasattr(source, "keys") and not hasattr(source, "shape"):
@@ -82,7 +83,7 @@ def _clip_of_array(source: Source, options: dict[str, Any]) -> tuple[MotionClip,
     time = _seconds(source, order, positions.shape[0]) if "fps" not in options else None
     options = stated | options
     rate = frame_rate({"fps": options.pop("fps", DEFAULT_FPS)})
-    metadata: dict[str, Any] = {name: options.pop(name) for name in OF_FILES if name in options}
+    metadata: JsonObject = {name: options.pop(name) for name in OF_FILES if name in options}
     for name, checked in (("unit", checked_unit), ("up_axis", checked_axis)):
         if name in metadata:
             metadata[name] = checked(metadata[name])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from inspect import Parameter, Signature, signature
 from os import PathLike
-from typing import Any, BinaryIO, TypedDict, Unpack, overload
+from typing import BinaryIO, TypedDict, Unpack, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from athcodec.encoding.search.progress import Progress
 from athcodec.exporters import check_ath_name
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike
+from athcodec.untyped import Keywords
 
 
 class EncodeOptions(TypedDict, total=False):
@@ -98,7 +99,7 @@ def encode(
     tam : Thresholds, optional
         Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows.
     progress : callable, optional
-        Called with the stage and the elapsed fraction of the whole time, which never falls and ends with 1.0.
+        Called with the phase of the work and the fraction that is done, which never falls and ends with 1.0.
 
     Returns
     -------
@@ -124,7 +125,7 @@ def encode(
         raise TypeError(f"encode: got the option {min(unknown)!r}; expected {', '.join(EncodeOptions.__annotations__)}")
     if isinstance(target, (str, PathLike)):
         check_ath_name(target)
-    settings: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    settings: Keywords = {name: value for name, value in options.items() if value is not None}
     of_source = {name: settings.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in settings}
     out = io.BytesIO() if target is None else target
     with clip_of(source, **of_source) as (clip, converted):

@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     names: list[str] = []
     for name, depends, clip in _clips(args):
         names.append(name)
-        for knowledge, without in _given(clip).items():
+        for knowledge, without in _without_branches(clip).items():
             key = {"clip": name, "given": knowledge, "bound": args.rel_error}
             if store.find("sizes", key, depends) is None:
                 store.add("sizes", key | _figures(clip, without, args.rel_error) | {"depends": depends})
@@ -79,7 +79,7 @@ def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], Moti
                 yield case.name, codec | {"clip": digest(case.path)}, clip
 
 
-def _given(clip: MotionClip) -> dict[str, MotionClip]:
+def _without_branches(clip: MotionClip) -> dict[str, MotionClip]:
     """Return the clip without branches, by what else it gives."""
     if clip.polygons is not None:
         return {"faces": bare(clip).replace(edges=None)}

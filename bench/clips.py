@@ -115,7 +115,7 @@ def measure(
 
 
 def beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
-    """The first frames of a clip, in memory, with its structure and faces alone."""
+    """Return the first frames of a clip, in memory, with its structure and faces alone."""
     return athcodec.MotionClip(
         clip.block(0, min(frames, clip.frame_count)),
         clip.time[:frames],

@@ -308,7 +308,7 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
 
 
 def totals_text(suites: Iterable[Mapping[str, Any]]) -> str:
-    """A sentence on all sizes of the suites: how many athcodec wins and loses, and by how much."""
+    """Return a sentence on all sizes of the suites: how many athcodec wins and loses, and by how much."""
     clips, ratios = set(), []
     for contents in suites:
         for clip in contents["clips"]:
@@ -333,8 +333,8 @@ def totals_text(suites: Iterable[Mapping[str, Any]]) -> str:
 
 
 def overview_text(suites: Sequence[Mapping[str, Any]]) -> str:
-    """The totals of all suites but the first, which has the sample alone, and a table of a few clips at 1e-4, below its
-    options, for readers who want one table."""
+    """Return the totals of all suites but the first, which has the sample alone, and a table of a few clips at 1e-4,
+    below its options, for readers who want one table."""
     shown, points = [], ([], [])
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]

@@ -55,7 +55,7 @@ NONE = ""  # The name of the run in which nothing is changed.
 FIXED: Mapping[str, Sequence[str]] = {
     "progress": (
         *("READING", "POSES", "SURVEY", "MOTION", "ANALYSIS", "PREDICTION", "MAPS", "TURNS", "TRIAL", "BYTE"),
-        *("FILE_BYTE", "CORRECTION", "LEVEL", "LEVEL_MOTION", "START", "POSE", "REST", "PIECE", "BASIS", "COMPONENT"),
+        *("FILE_BYTE", "CORRECTION", "MAP_FIT", "STAGE_MOTION", "START", "POSE", "REST", "PIECE", "BASIS", "COMPONENT"),
         *("EIGENVECTOR", "FINDING", "LEARNT", "LEARNING", "LEAST_WORK", "WORK", "SMALL_TRIALS", "BRANCHES", "SIZES"),
     ),
     "assembly": ("SPOOL_BYTES",),

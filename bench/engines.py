@@ -76,10 +76,10 @@ def table_text(contents: Mapping[str, Any]) -> str:
     """Return the table of a document, in the order of EXAMPLES."""
     rows: Results = contents["engines"]
     text = "| engine | version | example | lines | ms a frame, near | ms a frame, far |\n|---|---|---|--:|--:|--:|\n"
-    for engine, (path, what) in EXAMPLES.items():
+    for engine, (path, form) in EXAMPLES.items():
         for row in rows:
             if row["engine"] == engine:
-                link = f"[{Path(path).name}](../athcodec/{path}), {what}"
+                link = f"[{Path(path).name}](../athcodec/{path}), {form}"
                 times = f"{row['near']:.0f} | {row['far']:.0f}"
                 text += f"| {engine} | {row['version']} | {link} | {row['lines']} | {times} |\n"
     return text

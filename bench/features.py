@@ -305,9 +305,9 @@ def decisions(contents: Mapping[str, Iterable[Mapping[str, Any]]]) -> list[dict[
 def _best_of_makers(sizes: Iterable[Mapping[str, Any]], feature: str) -> list[tuple[float, str]]:
     """Return the per cent that a feature saves at most, and the file, of those makers whose clips it serves most."""
     best: dict[str, tuple[float, str]] = {}
-    for own in sizes:
-        if own["feature"] == feature and own["with"] >= LEAST_BYTES:
-            maker, each = _maker(own["clip"]), (_growth(own), _file_name(own))
+    for saving in sizes:
+        if saving["feature"] == feature and saving["with"] >= LEAST_BYTES:
+            maker, each = _maker(saving["clip"]), (_growth(saving), _file_name(saving))
             best[maker] = max(best.get(maker, each), each)
     return sorted(best.values(), reverse=True)[:MAKERS]
 
@@ -340,15 +340,17 @@ def table_text(contents: Mapping[str, Any]) -> str:
         ("sizes", "Left out of files that have all others", (NOTE, NOT_JUDGED)),
         ("alone", "Added to files that have no other", (NOTE_ALONE,)),
     ):
-        sizes = [own for own in contents.get(name, []) if own["with"] >= LEAST_BYTES]
+        sizes = [saving for saving in contents.get(name, []) if saving["with"] >= LEAST_BYTES]
         files: dict[str, list[str]] = {}
-        for own in sizes:
-            bounds = files.setdefault(own["clip"], [])
-            bound = _bound_name(own)
+        for saving in sizes:
+            bounds = files.setdefault(saving["clip"], [])
+            bound = _bound_name(saving)
             if bound not in bounds:
                 bounds.append(bound)
         clips = "; ".join(f"`{clip}` at {', '.join(bounds)}" for clip, bounds in sorted(files.items()))
-        lengths = ", ".join(str(frames) for frames in sorted({own["frames"] for own in sizes if "frames" in own}))
+        lengths = ", ".join(
+            str(frames) for frames in sorted({saving["frames"] for saving in sizes if "frames" in saving})
+        )
         clips += f"; the first {lengths} frames of each" if lengths else ""
         made_by = f"Commits that measured them, {IN_BRACKETS}: {commits(sizes)}."
         parts += [

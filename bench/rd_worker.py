@@ -71,7 +71,8 @@ def _with_branches(clip: athcodec.MotionClip, codec: Codec, rel_bound: float) ->
 
 
 def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:
-    """Wall time, processor time with all threads and child processes, and the result of a step of at most `limit` s."""
+    """Return wall time, processor time with all threads and child processes, and the result of a step of at most
+    `limit` s."""
     start, used = time.perf_counter(), processor_seconds()
     allowed = int(time.process_time() + limit) + 1
     resource.setrlimit(resource.RLIMIT_CPU, (allowed, resource.getrlimit(resource.RLIMIT_CPU)[1]))

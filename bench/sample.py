@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
-    """The table of the tree that grows."""
+    """Return the table of the tree that grows."""
     clip = data.RECIPES["sapling"].make()
     positions = (np.round(np.asarray(clip.positions) / GRID) * GRID).astype(np.float32)
     out = folder / athcodec.sample_path(GROWTH).name

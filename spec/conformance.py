@@ -533,8 +533,8 @@ def main(words: list[str] | None = None) -> int:
         parser.error("expected a DECODER-COMMAND or --own")
     decoder, without = command(options.command), tuple(options.without)
     if options.own:
-        own = (OWN | OWN_APPROXIMATE)[options.own]
-        decoder, without = own.small if options.profile == "small" else own.decoder, without + own.without
+        ours = (OWN | OWN_APPROXIMATE)[options.own]
+        decoder, without = ours.small if options.profile == "small" else ours.decoder, without + ours.without
     chosen = [vector for vector in vectors() if fnmatch(vector.name, options.only)]
     if options.profile != "full":
         chosen = [of_profile(vector, options.profile) for vector in chosen]

@@ -35,7 +35,7 @@ KEPT = {"crc32c": 256, "waves_over_time": 64, "node_waves_over_time": 64, "canti
 
 
 def section(title: str) -> str:
-    """The text under a heading, up to the next of the same or a higher rank."""
+    """Return the text under a heading, up to the next of the same or a higher rank."""
     heading = re.search(rf"^(#+) {re.escape(title)}\n", TEXT, re.M)
     assert heading, title
     rest = TEXT[heading.end() :]
@@ -44,7 +44,7 @@ def section(title: str) -> str:
 
 
 def table(title: str, first_column: str) -> list[dict[str, str]]:
-    """Rows of the first table of a section whose first column has this name."""
+    """Return the rows of the first table of a section whose first column has this name."""
     lines = section(title).splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
     rows = []
@@ -56,7 +56,7 @@ def table(title: str, first_column: str) -> list[dict[str, str]]:
 
 
 def limits_of(profile: str) -> dict[str, int]:
-    """The limits of a profile, "full" or "small"."""
+    """Return the limits of a profile, "full" or "small"."""
     return {row["Limit"]: int(row[profile.capitalize()]) for row in table("Limits", "Limit")}
 
 
@@ -88,7 +88,7 @@ def single(x: float) -> float:
 
 
 def is_json_object(text: bytes) -> bool:
-    """Whether it is a JSON object as of FORMAT.md, "JSON"."""
+    """Return whether it is a JSON object as of FORMAT.md, "JSON"."""
 
     def unique(pairs: list) -> dict:
         if len(dict(pairs)) < len(pairs):
@@ -206,7 +206,7 @@ REMAINDERS = [rules.crc32c(bytes([255 ^ byte])) ^ 0xFF000000 for byte in range(2
 
 
 def crc32c(data: bytes) -> int:
-    """FORMAT.md, "Checksums", a byte at a time instead of a bit at a time."""
+    """Return the checksum of FORMAT.md, "Checksums", a byte at a time instead of a bit at a time."""
     crc = 0xFFFFFFFF
     for byte in data:
         crc = (crc >> 8) ^ REMAINDERS[(crc ^ byte) & 255]
@@ -238,22 +238,22 @@ class File:
         return deepest
 
     def positions(self, level: int | None = None) -> np.ndarray:
-        """(frames, vertices, 3) in source order, the frames of all clips."""
+        """Return (frames, vertices, 3) in source order, the frames of all clips."""
         level = self.deepest if level is None else level
         if not 0 <= level < self.header.level_count:
             raise ValueError(f"level {level}: the file has 0 to {self.header.level_count - 1}")
         return np.array(self.rules.decode_level(self.file, level), "<f8" if self.header.is_float64 else "<f4")
 
     def rest(self, level: int = 0) -> np.ndarray:
-        """(vertices, 3) of Rest_Type in source order: the rest pose, as a level's reference pose gives it."""
+        """Return (vertices, 3) of Rest_Type in source order: the rest pose, as a level's reference pose gives it."""
         return np.array(self.rules.rest_pose(self.file, level), "<f8" if self.file.rest_is_float64 else "<f4")
 
     def arrays(self) -> list[bytes]:
-        """Elements of FACES, of EDGES and of all attributes."""
+        """Return elements of FACES, of EDGES and of all attributes."""
         return self.rules.read_static(self.file)[1]
 
     def answer(self, item: str) -> bytes:
-        """The answer to an item of conformance.py."""
+        """Return the answer to an item of conformance.py."""
         if item in ("strict", "open"):
             return b""
         if item == "time":
@@ -267,7 +267,7 @@ class File:
 
 
 def clip_entry(clip) -> bytes:
-    """What CLIPS says of a clip; Periodic, which is how it is coded, is left at 0."""
+    """Return what CLIPS says of a clip; Periodic, which is how it is coded, is left at 0."""
     name, seams = clip.name.encode(), clip.seams or ()
     head = struct.pack("<IIBB", clip.frames, clip.segments, clip.seams is not None, len(name))
     return head + name + struct.pack(f"<{len(seams)}f", *seams)

@@ -138,7 +138,7 @@ def scripted_exact(original: Callable, coder, model, n, expected, before):
 
 
 def scripted_corner(original: Callable, coder, model, bound, corners, first, j, previous):
-    """The script has the vertex. It is coded as the first thing that says it."""
+    """Code a corner whose vertex the script has. It is coded as the first thing that says it."""
     vertex, script = coder.script.answer("corner", bound - 1), coder.script
     seen = copy(model)
     seen.ways = [dict(table) for table in model.ways]
@@ -196,7 +196,7 @@ SCRIPTED = {
 
 @contextmanager
 def scripted(script: Script, decisions: bool = False) -> Iterator[list[ScriptedCoder]]:
-    """FORMAT.md's code as a writer; the coder that it makes is put into the list. decisions: see `write`."""
+    """Return FORMAT.md's code as a writer; the coder that it makes is put into the list. decisions: see `write`."""
     made: list[ScriptedCoder] = []
 
     def coder(_: bytes) -> ScriptedCoder:
@@ -329,7 +329,7 @@ class FrontScript:
         self.place = place
 
     def add_errors(self, errors: Sequence[int]) -> None:
-        """Stored numbers, three of each level and segment."""
+        """Add stored numbers, three of each level and segment."""
         first = min(rules.to_bits(rules.single(self.counts["max_error"]), 32) >> 18, rules.SHORT_FLOATS - 1)
         row, above = 3 * self.counts["segment_count"], [first] * 3
         for start in range(0, len(errors), row):
@@ -341,7 +341,7 @@ class FrontScript:
             above = errors[start : start + 3]
 
     def add_joins(self, joins: Sequence[Join]) -> None:
-        """One of each level and segment; a sloped one of width 0 is said, and not valid."""
+        """Add one join of each level and segment; a sloped one of width 0 is said, and not valid."""
         last = 16
         for join in joins if self.counts["segment_count"] > 1 else ():
             is_said = join.width != 0 or join.is_sloped
@@ -351,12 +351,12 @@ class FrontScript:
                 last = join.width
 
     def add_repeats(self, repeats: Sequence[int]) -> None:
-        """One of each frame; none: no frame is a repeat."""
+        """Say of each frame whether it is a repeat; none: no frame is a repeat."""
         self.values += [int(any(repeats)), *(repeats[1:] if any(repeats) else ())]
 
 
 def _bits(value: int, count: int) -> list[int]:
-    """From the top."""
+    """Return the bits of a number from the top."""
     return [value >> k & 1 for k in reversed(range(count))]
 
 
@@ -535,7 +535,7 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
 
 
 def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
-    """Integer positions of stems that are random walks."""
+    """Return integer positions of stems that are random walks."""
     random, points, first = np.random.default_rng(seed), [], []
     for stem in stems:
         first.append(len(points))
@@ -549,7 +549,7 @@ def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
 def rest_chunk(
     stream: bytes, *, exact: int = 0, rest_type: int = 0, origin=(0.0, 0.0, 0.0), step: float = 0.25, reserved: int = 0
 ) -> bytes:
-    """reserved: further bits of Method."""
+    """Return REST. reserved: further bits of Method."""
     return struct.pack("<B3ff", exact | rest_type << 1 | reserved << 2, *origin, step) + stream
 
 
@@ -646,7 +646,7 @@ def mesh_of(faces: bytes, place_of: list, places: list | None = None):
 
 
 def places_chunk(places: list, place_count: int, columns: int = 3) -> bytes:
-    """PLACES, by the place of each vertex."""
+    """Return PLACES, by the place of each vertex."""
     stream = write(
         lambda data, *counts: rules.decode_places(bytes([columns]) + data, *counts), places, len(places), place_count
     )
@@ -777,7 +777,7 @@ class Plant:
         return rules.Record(rest=[[x[k] - origin[k] for k in range(3)] for x in points], rows=None)
 
     def _shapes(self, level: int) -> bytes:
-        """SHAPES by its script; its values are used by the streams of STEMS."""
+        """Return SHAPES by its script; its values are used by the streams of STEMS."""
         return self._write(rules.decode_shapes, (rules.SHAPES, level, 0), self.plan, self.shapes[0], level)
 
     def _layer(self, branches: list, q: int, rests: list) -> list[Entry]:
@@ -833,13 +833,13 @@ class Plant:
         rules.decode_predicted(chunk, self.branches, rest, self.origin, frames, self.is_float64)
 
     def _head(self, level: int, s: int, motion) -> bytes:
-        """Of STEMS; the motion gets its steps and waves."""
+        """Return the head of STEMS; the motion gets its steps and waves."""
         head = self.heads.get((level, s), self.heads.get(level, self.default_head))
         rules.read_stems_head(head, motion, level)
         return head
 
     def _refinements(self, s: int, motion, periodic: bool) -> list[Entry]:
-        """STEMS of further layers, from the motion of the first."""
+        """Return STEMS of further layers, from the motion of the first."""
         placed, _, kept = rules.pose(self.plan, motion, self.plan.height + 1)
         entries, layers = [], [rules.Record(plan=self.plan, motion=motion, placed=placed, kept=kept)]
 

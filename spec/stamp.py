@@ -32,14 +32,14 @@ def write_version(version: tuple[int, int]) -> None:
     for path, patterns in PLACES.items():
         text = path.read_text("utf-8")
         for pattern in patterns:
-            (found,) = re.finditer(pattern, text, re.M)
+            (match,) = re.finditer(pattern, text, re.M)
             for group in (2, 1):
-                text = f"{text[: found.start(group)]}{version[group - 1]}{text[found.end(group) :]}"
+                text = f"{text[: match.start(group)]}{version[group - 1]}{text[match.end(group) :]}"
         path.write_text(text, "utf-8")
 
 
 def stamped(data: bytes, old: tuple[int, int], new: tuple[int, int]) -> bytes | None:
-    """The file in another version; None if its front is not a valid one of the old version."""
+    """Return the file in another version; None if its front is not a valid one of the old version."""
     from spec.document import crc32c
 
     length = struct.unpack_from("<I", data, 16)[0] if len(data) >= 24 else 0
@@ -52,7 +52,7 @@ def stamped(data: bytes, old: tuple[int, int], new: tuple[int, int]) -> bytes | 
 
 
 def stamp_files(old: tuple[int, int]) -> None:
-    """With FORMAT.md in its new version."""
+    """Stamp the files with FORMAT.md in its new version."""
     from spec import conformance, dump, make
     from spec.document import crc32c, rules
 

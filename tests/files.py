@@ -18,7 +18,7 @@ import athcodec
 from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
-from athcodec.encoding.model.motion import LevelStream, Plan, SegmentMotion
+from athcodec.encoding.model.motion import Plan, SegmentMotion, StageStream
 from athcodec.encoding.segments.segmentation import balanced_segments
 from athcodec.encoding.segments.time_bases import MOST_SAMPLE
 from athcodec.encoding.streams import streams, writing
@@ -130,7 +130,7 @@ def still_file(
     time: bytes | None = None,
     stems: bytes | None = None,
 ) -> bytes:
-    """One vertex, or `branches`, at the origin, one frame a second; or other payloads, `stems` at level 0."""
+    """One vertex, or `branches`, at the origin, one frame a second; or other payloads, `stems` at stage 0."""
     branches = roots(1) if branches is None else branches
     plan = Plan(branches, int(branches["count"].sum()))
     plan.set_rest(np.zeros((plan.vertex_count, 3)))
@@ -138,12 +138,12 @@ def still_file(
     store.add(ct.HIERARCHY, still_hierarchy(plan) if hierarchy is None else hierarchy)
     store.add(ct.REST, still_rest(plan) if rest is None else rest)
     store.add(ct.TIME, writing.pack_steady_time(np.arange(frames, dtype=float)) if time is None else time)
-    levels, segments = plan.level_count, balanced_segments(frames, -(-frames // SEGMENT_FRAMES))
+    stages, segments = plan.stage_count, balanced_segments(frames, -(-frames // SEGMENT_FRAMES))
     for index, (start, stop) in enumerate(segments):
         add_still_segment(store, plan, index, stop - start, stems)
-    header = ct.Header(plan.vertex_count, plan.vertex_count, len(branches), frames, len(segments), levels, levels, 1.0)
+    header = ct.Header(plan.vertex_count, plan.vertex_count, len(branches), frames, len(segments), stages, stages, 1.0)
     out = BytesIO()
-    store.write(out, header, np.zeros((levels, len(segments), 3)))
+    store.write(out, header, np.zeros((stages, len(segments), 3)))
     return out.getvalue()
 
 
@@ -158,13 +158,13 @@ def still_rest(plan: Plan) -> bytes:
 
 
 def add_still_segment(store: writing.ChunkStore, plan: Plan, index: int, frames: int, stems: bytes | None) -> None:
-    motion = SegmentMotion(plan, frames, [LevelStream(1.0)] * plan.level_count)
-    for level in range(plan.level_count):
-        if plan.has_stems(level):
-            payload = writing.pack_stems(writing.StemsHead(1.0, 0), streams.encode_stems(motion, level))
-            store.add(ct.STEMS, payload if stems is None or level > 0 else stems, level, index)
-        if plan.has_affines(level):
-            store.add(ct.AFFINES, streams.encode_affines(motion, level), level, index)
+    motion = SegmentMotion(plan, frames, [StageStream(1.0)] * plan.stage_count)
+    for stage in range(plan.stage_count):
+        if plan.has_stems(stage):
+            payload = writing.pack_stems(writing.StemsHead(1.0, 0), streams.encode_stems(motion, stage))
+            store.add(ct.STEMS, payload if stems is None or stage > 0 else stems, stage, index)
+        if plan.has_affines(stage):
+            store.add(ct.AFFINES, streams.encode_affines(motion, stage), stage, index)
 
 
 def exact_rest_chunk(stream: bytes, dtype) -> bytes:
@@ -173,11 +173,11 @@ def exact_rest_chunk(stream: bytes, dtype) -> bytes:
 
 
 def basis_chunk(stream: bytes, frames: int) -> bytes:
-    """STEMS of level 0 of the one vertex, which makes the integers of a learned basis of rank 1 its x."""
+    """STEMS of stage 0 of the one vertex, which makes the integers of a learned basis of rank 1 its x."""
     plan = Plan(roots(1), 1)
     plan.set_rest(np.zeros((1, 3)))
-    learned = LevelStream(1.0, temporal=np.ones((1, frames)))
-    motion = SegmentMotion(plan, frames, [learned, LevelStream(1.0)])
+    learned = StageStream(1.0, temporal=np.ones((1, frames)))
+    motion = SegmentMotion(plan, frames, [learned, StageStream(1.0)])
     motion.tracks[0, 1, 0, 0] = MOST_SAMPLE
     head = writing.StemsHead(1.0, 0, ct.BASIS_AS_SAMPLES, 1, stream)
     return writing.pack_stems(head, streams.encode_stems(motion, 0))

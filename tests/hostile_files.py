@@ -87,7 +87,7 @@ def segments_of_one_frame(count: int) -> bytes:
         if chunk.kind == ct.TIME:
             payload = writing.pack_steady_time(np.arange(count, dtype=float))
         for segment in range(count if chunk.is_motion else 1):
-            store.add(chunk.kind, payload, chunk.level, segment)
+            store.add(chunk.kind, payload, chunk.stage, segment)
     out = BytesIO()
     store.write(out, ct.Header(1, 1, 1, count, count, 2, 2, 1.0), np.zeros((2, count, 3)))
     return out.getvalue()

@@ -815,7 +815,7 @@ def distant_clip():
 
 
 def all_learned(settings: Settings, trials: Trials) -> Settings:
-    return replace(settings, learned_bases=(True,) * settings.levels)
+    return replace(settings, learned_bases=(True,) * settings.stages)
 
 
 @pytest.fixture(scope="module", params=REFINED)

@@ -15,7 +15,7 @@ from athcodec import cli
 from athcodec.errors import ClipError, GuessWarning, SourceWarning
 from athcodec.files.reading import Budget
 from athcodec.motion.clip import MotionClip
-from athcodec.sources.mesh import parse_mesh
+from athcodec.sources.mesh_files import parse_mesh
 
 pytestmark = pytest.mark.formats
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 import sys
@@ -138,6 +139,53 @@ assert athcodec.truncate is athcodec.truncate and callable(athcodec.truncate)
 print([name for name in athcodec.__all__ if getattr(athcodec, name, None) is None])
 """
     assert printed(sys.executable, "-c", program).strip() == "[]"
+
+
+LARGEST = {"module": (600,), "class": (300, 25), "function": (60, 6)}
+"""Lines, and then methods of a class or arguments of a function that may be passed without a name."""
+
+
+def large_parts(tree: ast.Module, module: str) -> set[str]:
+    """Return the names of a module and of what is in it that are larger than `LARGEST`."""
+    large = {module} if tree.body and tree.body[-1].end_lineno > LARGEST["module"][0] else set()
+
+    def look(node: ast.AST, place: str) -> None:
+        for part in ast.iter_child_nodes(node):
+            name = f"{place}.{getattr(part, 'name', '')}"
+            if isinstance(part, ast.ClassDef):
+                sizes = part.end_lineno - part.lineno + 1, sum(isinstance(one, ast.FunctionDef) for one in part.body)
+                large.update({name} if sizes[0] > LARGEST["class"][0] or sizes[1] > LARGEST["class"][1] else ())
+            elif isinstance(part, ast.FunctionDef):
+                text = (ast.get_docstring(part, clean=False) or "").count("\n") + 1
+                named = [one.arg for one in part.args.args if one.arg not in ("self", "cls")]
+                sizes = part.end_lineno - part.lineno + 1 - text, len(named)
+                large.update({name} if sizes[0] > LARGEST["function"][0] or sizes[1] > LARGEST["function"][1] else ())
+            look(part, name if hasattr(part, "name") else place)
+
+    look(tree, module)
+    return large
+
+
+def test_each_large_part_has_a_sentence_that_says_why_it_is_one():
+    """And docs/large-parts.md, which holds these sentences, names no part that is not large, and the limits."""
+    package, large = ROOT / "athcodec", set()
+    for path in sorted(package.rglob("*.py")):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        large |= large_parts(ast.parse(path.read_text("utf-8")), module)
+    text = (ROOT / "docs" / "large-parts.md").read_text("utf-8")
+    rows = re.findall(r"^\| `([\w.]+)` \| (.+\.) \|$", text, re.M)
+    assert {name for name, _ in rows} == large and len(rows) == len(large)
+    limits = re.findall(r"^\| (module|class|function) \|(.*)\|$", text, re.M)
+    assert {name: tuple(map(int, re.findall(r"\d+", row))) for name, row in limits} == LARGEST
+
+
+def test_a_part_that_grows_beyond_its_size_is_large():
+    lines = "\n".join(f"    {number}" for number in range(60))
+    assert large_parts(ast.parse(f"def short(a, b, c, d, e, f, *, g):\n{lines[:-7]}"), "m") == set()
+    assert large_parts(ast.parse(f"class A:\n def long(self):\n{lines}\n    60"), "m") == {"m.A.long"}
+    assert large_parts(ast.parse("def many(a, b, c, d, e, f, g): ..."), "m") == {"m.many"}
+    assert large_parts(ast.parse("class A:\n" + " def f(self): ...\n" * 26), "m") == {"m.A"}
+    assert large_parts(ast.parse("0\n" * 601), "m") == {"m"}
 
 
 def test_the_benchmark_imports_nothing_that_a_wheel_leaves_out():

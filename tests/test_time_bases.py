@@ -124,7 +124,7 @@ def test_branches_whose_bending_turns_nothing_make_a_sum_of_shapes_smaller(tmp_p
 @pytest.fixture
 def learned_everywhere(monkeypatch):
     def learned(settings, trials):
-        return replace(settings, learned_bases=(True,) * settings.levels)
+        return replace(settings, learned_bases=(True,) * settings.stages)
 
     monkeypatch.setitem(search.BY_NAME, "best_bases", learned)
     monkeypatch.setitem(search.CHOICES, learned, "time bases")

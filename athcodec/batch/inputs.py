@@ -27,6 +27,7 @@ from athcodec.files.remote import _one_line, guarded
 from athcodec.files.shown import without_secrets
 from athcodec.sources import FRAME_SUFFIXES, NUMBER_PATTERN, SERIES, formats, is_pattern
 from athcodec.sources.numbering import each_once, numbered_files
+from athcodec.untyped import JsonMapping, JsonObject
 
 TAGS = (
     "ETag",
@@ -75,8 +76,8 @@ def find(
     inputs: Iterable[FilePath],
     output: FilePath,
     *,
-    settings: Mapping[str, Any] | None = None,
-    patterns: Mapping[str, Mapping[str, Any]] | None = None,
+    settings: JsonMapping | None = None,
+    patterns: Mapping[str, JsonMapping] | None = None,
 ) -> list[Item]:
     """List the clips of a batch.
 
@@ -104,11 +105,11 @@ def find(
         Where an input does not exist.
     """
     default = check_settings(settings or {})
-    patterns = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
+    checked = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
     items: dict[str, Item] = {}
     for name, path in _named(inputs):
         target = _target(os.fspath(output), _stem(name, path) + ".ath")
-        item = Item(name, path, target, settings_of((name, path), default, patterns))
+        item = Item(name, path, target, settings_of((name, path), default, checked))
         other = items.setdefault(target, item)
         if other.input != path:
             place = without_secrets(target) if is_url(target) else target
@@ -138,7 +139,7 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
-    for text, called in each_once(map(os.fspath, inputs)):
+    for text, called in each_once(os.fspath(each) for each in inputs):
         pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
         if not pairs:
@@ -241,7 +242,7 @@ def download(url: str, path: str) -> str:
     return sha256(path)
 
 
-def upload(path: str, url: str) -> dict[str, Any]:
+def upload(path: str, url: str) -> JsonObject:
     """Store an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
     system, target = file_system(url)
     try:
@@ -261,7 +262,7 @@ def upload(path: str, url: str) -> dict[str, Any]:
 # ---- what a file is known again by ----
 
 
-def identity(item: Item) -> dict[str, Any]:
+def identity(item: Item) -> JsonObject:
     """Return size and time of an input, and of files that its settings name; of a URL, what its server says. Of formats
     that spread over several files, others than numbered series, only the named file counts. Raises OSError."""
     if is_url(item.input):
@@ -272,7 +273,7 @@ def identity(item: Item) -> dict[str, Any]:
     return known | ({"with": [_files_identity([path]) for path in others]} if others else {})
 
 
-def is_telling(known: dict[str, Any]) -> bool:
+def is_telling(known: JsonObject) -> bool:
     """Return whether an identity would show that a file has changed, though not its size."""
     return any(name in known for name in ("mtime_ns", *TAGS))
 
@@ -283,13 +284,13 @@ def _frames(path: str) -> list[str]:
     return [path]
 
 
-def _files_identity(paths: list[str]) -> dict[str, Any]:
+def _files_identity(paths: list[str]) -> JsonObject:
     stats = [os.stat(path) for path in paths]
     known = {"size": sum(stat.st_size for stat in stats), "mtime_ns": max(stat.st_mtime_ns for stat in stats)}
     return known | ({"files": len(stats)} if len(stats) > 1 else {})
 
 
-def remote_identity(url: str) -> dict[str, Any]:
+def remote_identity(url: str) -> JsonObject:
     """Return present facts of a file: listings may be old, or tell times more exactly. Raises RemoteError."""
     system, path = file_system(url)
     system.invalidate_cache()

@@ -9,22 +9,22 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any
 
 from athcodec.errors import AthError
 from athcodec.files.atomic import PLAIN_OPEN
 from athcodec.files.plain import FilePath
+from athcodec.untyped import JsonObject
 
 try:
     import fcntl
 except ImportError:  # Windows
-    fcntl = None
+    fcntl = None  # type: ignore[assignment]
     import msvcrt
 
 LINE_START = b'{"output": '
 FAR = 1 << 40  # where Windows locks a byte: beyond what anybody reads
 
-Record = dict[str, Any]
+Record = JsonObject
 
 
 class ManifestError(AthError):

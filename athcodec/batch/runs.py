@@ -33,6 +33,7 @@ from athcodec.errors import AthError, MissingExtra
 from athcodec.files.atomic import is_url, remove_leftovers_of, scratch_folder
 from athcodec.files.plain import FilePath
 from athcodec.files.shown import without_secrets
+from athcodec.untyped import DaskObject
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
@@ -264,7 +265,7 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 # ---- workers ----
 
 
-def _cluster(workers: int) -> Any:
+def _cluster(workers: int) -> DaskObject:
     """Start processes on this machine, with one thread each. Raises SchedulerError."""
     import dask
     import distributed
@@ -288,8 +289,8 @@ def _cluster(workers: int) -> Any:
 
 
 @contextmanager
-def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """A client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
+def _client(workers: int | None, scheduler: str | None) -> Iterator[DaskObject]:
+    """Yield a client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
     import distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # The manifest records workers that die.
@@ -327,13 +328,15 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _results(client: Any, todo: Sequence[Todo], folder: str, split: int, verify: bool) -> Iterator[tuple[Item, Result]]:
+def _results(
+    client: DaskObject, todo: Sequence[Todo], folder: str, split: int, verify: bool
+) -> Iterator[tuple[Item, Result]]:
     """Encode clips and yield the result of each one as soon as it is there. Raises SchedulerError."""
     import distributed
 
     items: dict[str, Item] = {}  # by key of a future
 
-    def submit(task: Callable[..., Result], item: Item, *arguments: Any, **options: Any) -> Any:
+    def submit(task: Callable[..., Result], item: Item, *arguments: Any, **options: Any) -> DaskObject:
         """Let the remaining steps of clips that were begun go before the others."""
         place, first = _folder(folder, item), task is not tasks.begin
         future = client.submit(task, item, place, *arguments, **options, pure=False, priority=first)
@@ -364,7 +367,7 @@ def _folder(folder: str, item: Item) -> str:
     return os.path.join(folder, item.fingerprint)
 
 
-def _result(future: Any, item: Item) -> Result:
+def _result(future: DaskObject, item: Item) -> Result:
     import distributed
 
     try:

@@ -19,7 +19,6 @@ from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from athcodec.encoding.options.shape import RestPrecision
 from athcodec.errors import ClipError
@@ -30,6 +29,7 @@ from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import AXES, METRES, parse_length, parse_size
 from athcodec.options import EFFORTS, HOST, MAX_SEGMENT, METHODS, MIN_SEGMENT, SMOOTHNESS, ladder_of
 from athcodec.sources import format_named, formats
+from athcodec.untyped import JsonMapping, JsonObject, JsonValue, Keywords
 
 BOUNDS = ("max_error", "rel_error", "target_size")  # A clip is encoded with exactly one of these.
 READING = (
@@ -50,7 +50,7 @@ READING = (
 # These settings change a clip before it is encoded.
 SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
 
-Settings = dict[str, Any]
+Settings = JsonObject
 
 
 def load_settings(path: FilePath) -> dict[str, Settings]:
@@ -87,7 +87,7 @@ def load_settings(path: FilePath) -> dict[str, Settings]:
     return content
 
 
-def check_settings(settings: Mapping[str, Any], where: str = "settings", folder: FilePath = ".") -> Settings:
+def check_settings(settings: JsonMapping, where: str = "settings", folder: FilePath = ".") -> Settings:
     """Check the settings of clips, and bring them to the form in which the manifest has them.
 
     Parameters
@@ -144,7 +144,7 @@ def loop_frames(settings: Settings) -> int | None:
     return blend if settings.get("loop", blend > 0) else None
 
 
-def reading_options(settings: Settings) -> dict[str, Any]:
+def reading_options(settings: Settings) -> Keywords:
     """Return keywords of athcodec.read."""
     options = {name: settings[name] for name in READING if name in settings}
     if options.get("rest") == HOST:  # how it is stored
@@ -154,7 +154,7 @@ def reading_options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def coding_options(settings: Settings) -> dict[str, Any]:
+def coding_options(settings: Settings) -> Keywords:
     """Return keywords of athcodec.encode."""
     options = {name: value for name, value in settings.items() if name not in READING + SHAPING}
     if settings.get("rest") == HOST:
@@ -164,39 +164,39 @@ def coding_options(settings: Settings) -> dict[str, Any]:
     return options
 
 
-def _positive_length(value: Any) -> float | str:
+def _positive_length(value: JsonValue) -> float | str:
     if isinstance(value, bool) or not parse_length(str(value)).value > 0:
         raise ValueError("expected a length above 0")
     return value
 
 
-def _rest_error(value: Any) -> float | str:
+def _rest_error(value: JsonValue) -> float | str:
     if isinstance(value, bool):
         raise ValueError("expected a fraction, a length or 'bound'")
     RestPrecision.of(value)
     return value
 
 
-def _fraction(value: Any) -> float:
+def _fraction(value: JsonValue) -> float:
     if isinstance(value, bool) or not 0 < float(value) < 1:
         raise ValueError("expected a number between 0 and 1")
     return float(value)
 
 
-def _finite(value: Any) -> float:
+def _finite(value: JsonValue) -> float:
     if isinstance(value, bool) or not math.isfinite(float(value)):
         raise ValueError("expected a number")
     return float(value)
 
 
-def _size(value: Any) -> int:
+def _size(value: JsonValue) -> int:
     if isinstance(value, bool):
         raise ValueError("expected a size in bytes")
     return parse_size(str(value))
 
 
-def _whole(low: int, high: int) -> Callable[[Any], int]:
-    def check(value: Any) -> int:
+def _whole(low: int, high: int) -> Callable[[JsonValue], int]:
+    def check(value: JsonValue) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f"expected a whole number, {low} to {high}")
         return value
@@ -204,7 +204,7 @@ def _whole(low: int, high: int) -> Callable[[Any], int]:
     return check
 
 
-def _tam(value: Any) -> list[Any]:
+def _tam(value: JsonValue) -> list[JsonValue]:
     parts = value.split(",") if isinstance(value, str) else list(value)
     if len(parts) != 4:
         raise ValueError("expected four values: EPS, ETA, XI, LAMBDA")
@@ -217,19 +217,19 @@ def _tam(value: Any) -> list[Any]:
     return [epsilon, eta, xi, lam]
 
 
-def _rate(value: Any) -> float:
+def _rate(value: JsonValue) -> float:
     rate = float(Fraction(value)) if isinstance(value, str) else float(value)
     if isinstance(value, bool) or not 0 < rate < math.inf:
         raise ValueError("expected a number above 0 or a fraction such as 24000/1001")
     return rate
 
 
-def _format(value: Any) -> str:
+def _format(value: JsonValue) -> str:
     return format_named(value, formats()).name
 
 
-def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:
-    def check(value: Any) -> Any:
+def _of_kind(kind: type, words: str) -> Callable[[JsonValue], JsonValue]:
+    def check(value: JsonValue) -> JsonValue:
         if not isinstance(value, kind):
             raise ValueError(f"expected {words}")
         return value
@@ -237,8 +237,8 @@ def _of_kind(kind: type, words: str) -> Callable[[Any], Any]:
     return check
 
 
-def _one_of(*names: str) -> Callable[[Any], str]:
-    def check(value: Any) -> str:
+def _one_of(*names: str) -> Callable[[JsonValue], str]:
+    def check(value: JsonValue) -> str:
         if value not in names:
             raise ValueError(f"expected one of {', '.join(names)}")
         return value
@@ -246,21 +246,21 @@ def _one_of(*names: str) -> Callable[[Any], str]:
     return check
 
 
-def _patterns(value: Any) -> list[str]:
+def _patterns(value: JsonValue) -> list[str]:
     patterns = [value] if isinstance(value, str) else list(value)
     if not all(isinstance(pattern, str) for pattern in patterns):
         raise ValueError("expected a pattern or a list of them")
     return patterns
 
 
-def _path(value: Any) -> str:
+def _path(value: JsonValue) -> str:
     if not isinstance(value, (str, os.PathLike)) or is_url(value):
         raise ValueError("expected a local file")
     return os.fspath(value)
 
 
 _BOOL, _TEXT = _of_kind(bool, "true or false"), _of_kind(str, "text")
-_CHECKS: dict[str, Callable[[Any], Any]] = {
+_CHECKS: dict[str, Callable[[JsonValue], JsonValue]] = {
     "max_error": _positive_length,
     "rel_error": _fraction,
     "target_size": _size,

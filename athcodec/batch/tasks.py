@@ -33,8 +33,9 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
 from athcodec.sources import listed
 from athcodec.sources.branches import find_or_load
+from athcodec.untyped import JsonObject, Keywords
 
-Result = dict[str, Any]
+Result = JsonObject
 """Of a task: "failed" with a reason, or "done" with figures, "draft" with the number of segments, "kept", "part"."""
 
 
@@ -56,7 +57,7 @@ def _task(work: Callable[..., Result]) -> Callable[..., Result]:
 
 @_task
 def begin(
-    item: Item, folder: str, *, split: int, verify: bool, version: str, known: dict[str, Any] | None = None
+    item: Item, folder: str, *, split: int, verify: bool, version: str, known: JsonObject | None = None
 ) -> Result:
     """Return a clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the
     scratch folder. known: the record of an output that is up to date unless the content of its input has changed."""
@@ -107,9 +108,11 @@ def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) ->
 
 
 def _done(
-    item: Item, source: dict[str, Any], summary: encoding.Summary, verified: MotionClip | None, start: float
+    item: Item, source: JsonObject, summary: encoding.Summary, verified: MotionClip | None, start: float
 ) -> Result:
-    """verified: the clip, where the file is to be decoded before it counts as done."""
+    """Return what is recorded of a clip that is done. verified: the clip, where the file is to be decoded before it
+    counts as done."""
+    assert summary.path is not None  # It was encoded into a file.
     if verified is not None:
         with athcodec.open(summary.path, strict=True, host_mesh=verified) as decoder:
             decoder.file.check()
@@ -139,8 +142,8 @@ def _done(
 
 
 @contextmanager
-def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionClip]:
-    """The clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
+def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]:
+    """Yield the clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
     is another than `source` was, at the beginning or at the end."""
     _check_source(item, source)
     path = _local_path(item, folder)
@@ -161,7 +164,7 @@ def _opened(item: Item, folder: str, source: dict[str, Any]) -> Iterator[MotionC
     _check_source(item, source)
 
 
-def _source(item: Item, folder: str) -> dict[str, Any]:
+def _source(item: Item, folder: str) -> JsonObject:
     """Return the input's identity; of a URL, which is fetched, with its SHA-256."""
     source = identity(item)
     if is_url(item.input):
@@ -169,7 +172,7 @@ def _source(item: Item, folder: str) -> dict[str, Any]:
     return source
 
 
-def _check_source(item: Item, source: dict[str, Any]) -> None:
+def _check_source(item: Item, source: JsonObject) -> None:
     if is_url(item.input) and not is_telling(source):
         return
     if identity(item) != {name: value for name, value in source.items() if name != "sha256"}:
@@ -185,7 +188,7 @@ def _target(item: Item, folder: str) -> str:
     return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
 
 
-def _segment_count(clip: MotionClip, options: dict[str, Any]) -> int:
+def _segment_count(clip: MotionClip, options: Keywords) -> int:
     longest = options.get("segment_frames")
     return len(split_segments(clip.frame_count, clip.vertex_count, longest, ct.Limits.memory_bytes))
 
@@ -202,7 +205,7 @@ def _pickle(path: str, objects: Sequence[Any] | Iterator[CodedSegment]) -> None:
     os.replace(temporary, path)
 
 
-def _unpickled(path: str) -> tuple[Draft, dict[str, Any], float]:
+def _unpickled(path: str) -> tuple[Draft, JsonObject, float]:
     with open(path, "rb") as file:
         return pickle.load(file)
 

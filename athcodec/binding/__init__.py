@@ -40,6 +40,7 @@ from athcodec.motion.frames import Frames
 from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH
 from athcodec.motion.scene import in_scene
 from athcodec.motion.units import METRES_PER_UNIT, checked_axis, checked_unit, stated_scene
+from athcodec.untyped import JsonObject, Keywords
 
 FAR = 0.1  # Distance from the plant, as a share of its diagonal, beyond which a vertex is named as far.
 COARSE_REST = 2.0  # Error of the plant's rest pose over that of its motion, above which a mesh lies on it badly.
@@ -208,7 +209,7 @@ class OntoMesh(ArrayLike):
     def _block(self, start: int, stop: int) -> np.ndarray:
         return self._moving.move(self._view.block(start, stop)).astype(self.dtype, copy=False)
 
-    def write_bound(self, path: FilePath) -> dict[str, Any]:
+    def write_bound(self, path: FilePath) -> JsonObject:
         """Write the mesh as a GLB with a skin whose bones stand in the rest pose, for ATHBones of three.js.
 
         Bones are the vertices of the plant's stems, or slices of stems that are surfaces. ATHBones moves them by
@@ -250,7 +251,7 @@ class OntoMesh(ArrayLike):
         frames to compare them."""
         of_vertex = self._points.of_vertex
         distance = self._binding.distance[of_vertex]
-        known: dict[str, Any] = {
+        known: JsonObject = {
             "vertex_count": self._mesh.vertex_count,
             "far_count": int((distance > self._limit).sum()),
             "far_limit": self._limit,
@@ -261,7 +262,7 @@ class OntoMesh(ArrayLike):
         }
         return OntoReport(**known, **self._errors())
 
-    def _errors(self) -> dict[str, Any]:
+    def _errors(self) -> JsonObject:
         """Return the figures against the mesh's own motion, as far as it has any in the plant's frames."""
         mesh, view = self._mesh, self._view
         if mesh.frame_count == 1 or stands_still(mesh):
@@ -400,7 +401,7 @@ def onto(
         raise
 
 
-def _opened_mesh(mesh: Source, opened: ExitStack, options: dict[str, Any]) -> MotionClip:
+def _opened_mesh(mesh: Source, opened: ExitStack, options: Keywords) -> MotionClip:
     """Return a mesh as a clip; a file is closed with `opened`."""
     if isinstance(mesh, (str, os.PathLike)):
         from athcodec.sources import read  # The sources take long to import.
@@ -462,7 +463,7 @@ def _refuse_far_mesh(
     fit = Fit(marks, rest, limit)
     if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
         return
-    fitting: dict[str, Any] = fit.better_scene(plant, assumed)
+    fitting: Keywords = fit.better_scene(plant, assumed)
     text = f"onto: {fit.mesh_far:.0%} of the mesh is further from the plant than {limit:.3g}, a tenth of its diagonal"
     if fit.mesh_far > MOST_FAR and _is_in_last_frame(view, rest):
         fitting = {"frame": -1}

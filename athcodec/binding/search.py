@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from athcodec.binding.chains import Chains
 from athcodec.binding.surface import MeshPoints
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.seen import moments_of_each, sums_of_each
+from athcodec.untyped import ScipyObject
 
 NEAREST = 8  # Marks looked at around each point; they tell the branches that it may be on.
 FINENESS = 300  # Marks on an element over its length, where that is the plant's diagonal.
@@ -262,7 +262,7 @@ class _Search:
         pairs = _Pairs(self.chains, self.mesh.place[points[weights.row]], weights.col.astype(np.int64))
         return points[weights.row], pairs.element, pairs.share, weights.data
 
-    def _spread(self, points: np.ndarray, branch: np.ndarray) -> Any:
+    def _spread(self, points: np.ndarray, branch: np.ndarray) -> ScipyObject:
         """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most.
 
         They are 1 and 0 but around links between points of different branches. There, as far as REACH says, they change
@@ -297,7 +297,7 @@ class _Search:
         return _largest(_membrane(near, weights, np.flatnonzero(np.isfinite(away)), most)).tocoo()
 
 
-def _membrane(near: Any, weights: Any, free: np.ndarray, reach: float) -> Any:
+def _membrane(near: ScipyObject, weights: ScipyObject, free: np.ndarray, reach: float) -> ScipyObject:
     """Return weights, a sparse matrix, whose rows `free` are those of a membrane between the others. near: (n, n) how
     much neighbours pull; reach: how far a membrane goes from its middle at most."""
     sparse, linalg = scipy_module("sparse"), scipy_module("sparse.linalg")
@@ -323,7 +323,7 @@ def _membrane(near: Any, weights: Any, free: np.ndarray, reach: float) -> Any:
     return sparse.coo_matrix((np.append(kept.data[rest], of_free.data), (row, column)), weights.shape)
 
 
-def _largest(weights: Any) -> Any:
+def _largest(weights: ScipyObject) -> ScipyObject:
     """Return the SHARES largest of each row of a sparse matrix, and no small ones, adding up to 1."""
     entries = weights.tocoo()
     order = np.lexsort((-entries.data, entries.row))

@@ -20,6 +20,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from typing import TextIO
 
 from athcodec.cli.arguments import make_parser
 from athcodec.files.shown import shown
@@ -67,7 +68,7 @@ def _messages_escaped() -> Iterator[None]:
         print(f"athcodec: warning: {shown(str(message))}".replace("\n", " "), file=sys.stderr)
 
     before, logged = warnings.showwarning, logging.lastResort
-    warnings.showwarning, logging.lastResort = warned, _Escaping(sys.stderr)
+    warnings.showwarning, logging.lastResort = warned, _Escaping(sys.stderr)  # type: ignore[assignment]
     logging.lastResort.setLevel(logging.WARNING)
     try:
         yield
@@ -75,7 +76,7 @@ def _messages_escaped() -> Iterator[None]:
         warnings.showwarning, logging.lastResort = before, logged
 
 
-class _Escaping(logging.StreamHandler):
+class _Escaping(logging.StreamHandler[TextIO]):
     def format(self, record: logging.LogRecord) -> str:
         return shown(super().format(record))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import athcodec
@@ -45,7 +45,9 @@ READ_OR_PIPED = f"{READ}, or - for standard input"
 class _Parser(argparse.ArgumentParser):
     """Whose messages are shown as all others are: they quote arguments, such as names of files."""
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[argparse.Namespace, list[str]]:
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
         """Return the arguments; of those that a verb does not know, it is the verb whose usage is shown."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
@@ -69,7 +71,7 @@ class _Completion(argparse.Action):
         [verbs] = (action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
         for action in (action for verb in verbs.values() for action in verb._actions):
             if re.search(r"IN\b|OUT|FILE|DIR|SOURCE", str(action.metavar)):
-                action.complete = shtab.FILE  # type: ignore[attr-defined]
+                action.complete = shtab.FILE
         print(shtab.complete(parser, shell))
         parser.exit()
 
@@ -747,7 +749,7 @@ def _demo_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
-    """`parse` for argparse, which shows the message of its own kind of error only."""
+    """Return `parse` for argparse, which shows the message of its own kind of error only."""
 
     def parsed(text: str) -> Any:
         try:

@@ -29,6 +29,7 @@ from athcodec.options import HOST, MAX_MEMORY
 from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
 from athcodec.sources.numbering import each_once
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.binding import OntoMesh
@@ -257,7 +258,7 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
     return range(start, stop)
 
 
-def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[dict[str, Any]]:
+def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[JsonObject]:
     """Return one entry per level: what it promises, and how far off the source it is."""
     with naming(source), clip.watched(), progress() as report:
         if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
@@ -299,12 +300,12 @@ def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
     return ratios
 
 
-def _measured(level: Level, meter: MotionMeter) -> dict[str, Any]:
+def _measured(level: Level, meter: MotionMeter) -> JsonObject:
     kept = meter.error.max_error <= level.max_error * (1 + ROUNDING)
     return {"level": level.level, "promised_max_error": level.max_error} | meter.figures() | {"kept": kept}
 
 
-def refuse_broken_promises(result: dict[str, Any], measured: dict[str, Any]) -> None:
+def refuse_broken_promises(result: JsonObject, measured: JsonObject) -> None:
     levels = measured["levels"]
     broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
     if levels[-1]["max_error"] > result["max_error_bound"]:
@@ -324,8 +325,8 @@ def check_output(path: str, *inputs: str | None, suffix: str | None = None) -> N
 
 
 def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
-    """ClipError where an output has another suffix; with the commands that may have been meant where it was the last of
-    several names and is a source like these `inputs`."""
+    """Raise ClipError where an output has another suffix; with the commands that may have been meant where it was the
+    last of several names and is a source like these `inputs`."""
     if output.lower().endswith(suffix):
         return
     is_source = False

@@ -20,6 +20,7 @@ from athcodec.decoding.facts import LEVEL_COLUMNS, TICK_RATIO, Column, head, lev
 from athcodec.errors import AthError
 from athcodec.files.shown import counted, echo, print_parts, print_table, redacted
 from athcodec.options import DEFAULT_REL_ERROR
+from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
     from athcodec.decoding.clip_view import ClipView
@@ -60,7 +61,7 @@ LOOKS = {
 """What is shown of a level beside its errors, by the names of MotionMeter.figures."""
 
 
-def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
+def print_files(facts: list[JsonObject], as_json: bool) -> None:
     """Print the facts of a file, or of each motion of a GLB."""
     if as_json:
         print_motions(facts)
@@ -69,12 +70,12 @@ def print_files(facts: list[dict[str, Any]], as_json: bool) -> None:
         print_parts(parts_of(each))
 
 
-def print_motions(results: list[dict[str, Any]]) -> None:
+def print_motions(results: list[JsonObject]) -> None:
     """Print the result of the only motion, or those of all of them, as JSON."""
     print_json(results[0] if len(results) == 1 else {"motions": results})
 
 
-def answer(args: argparse.Namespace, facts: dict[str, Any], text: str) -> None:
+def answer(args: argparse.Namespace, facts: JsonObject, text: str) -> None:
     """Print a result as JSON, or in words if that was not asked for."""
     if args.json:
         print_json(facts)
@@ -82,7 +83,7 @@ def answer(args: argparse.Namespace, facts: dict[str, Any], text: str) -> None:
         echo(text)
 
 
-def print_demo(facts: dict[str, Any], diagonal: float) -> None:
+def print_demo(facts: JsonObject, diagonal: float) -> None:
     seconds = facts["frames"] / facts["fps"]
     columns = [*(head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
     cells = []
@@ -98,7 +99,7 @@ def print_demo(facts: dict[str, Any], diagonal: float) -> None:
     echo(size_of(facts))
 
 
-def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> dict[str, Any]:
+def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> JsonObject:
     """Return the files that are there now, and what their format costs."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
     facts = {
@@ -110,7 +111,7 @@ def written_facts(written: Written, motion: ClipView | MotionClip, level: Level)
     return {"files": [os.fspath(path) for path in written.files]} | counts | named | facts
 
 
-def print_written(facts: dict[str, Any]) -> None:
+def print_written(facts: JsonObject) -> None:
     names, instances, how = facts["files"], facts.get("instances"), facts.get("animation", "textures")
     samples = f" in {counted(facts['samples'], 'sample')}" if "samples" in facts else ""
     echo(
@@ -123,7 +124,7 @@ def print_written(facts: dict[str, Any]) -> None:
         echo(f"As {how} that is off the level by up to {facts['max_error']:.3g}{unit}.")
 
 
-def print_verdict(result: dict[str, Any]) -> None:
+def print_verdict(result: JsonObject) -> None:
     for clip in result["clips"]:
         if clip["name"]:
             echo(f"{clip['name']}, against {clip['against']}:")
@@ -136,7 +137,7 @@ def print_verdict(result: dict[str, Any]) -> None:
         echo(f"{result['file']}: whole, all checksums match, {decodes}{more}")
 
 
-def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
+def _print_errors(levels: Sequence[JsonObject], unit: JsonValue) -> None:
     lengths = [head(name, unit) for name in ("promised", "max", "RMS")]
     rows = [
         [f"{level['level']}", *(f"{level[name]:.4g}" for name in MEASURES), "yes" if level["kept"] else "NO"]
@@ -145,7 +146,7 @@ def _print_errors(levels: Sequence[dict[str, Any]], unit: Any) -> None:
     print_table(["level", *lengths, "KG (%)", "RMS/motion", "kept"], rows)
 
 
-def _print_looks(levels: Sequence[dict[str, Any]]) -> None:
+def _print_looks(levels: Sequence[JsonObject]) -> None:
     """Print smoothness and shape, with the columns for which the clip has values."""
     shape = levels[0]["shape"]
     captions = {
@@ -219,12 +220,13 @@ def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
         say("failed", f"{record['output']}: {record['reason']}")
 
 
-def print_json(facts: dict[str, Any]) -> None:
+def print_json(facts: JsonObject) -> None:
     print(json.dumps(_finite(facts), indent=2).replace("\x7f", "\\u007f"))
 
 
-def _finite(value: Any) -> Any:
-    """`value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown them."""
+def _finite(value: JsonValue) -> JsonValue:
+    """Return `value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown
+    them."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -259,7 +261,7 @@ def one_line(error: Exception) -> str:
 
 @contextmanager
 def progress() -> Iterator[Report | None]:
-    """A function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
+    """Yield a function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -267,9 +269,9 @@ def progress() -> Iterator[Report | None]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=1.0)
 
-        def report(stage: str, fraction: float) -> None:
+        def report(phase: str, fraction: float) -> None:
             if fraction < bar.tasks[task].completed:  # other work, such as measuring what was encoded
                 bar.reset(task, total=1.0)
-            bar.update(task, completed=fraction, description=stage)
+            bar.update(task, completed=fraction, description=phase)
 
         yield report

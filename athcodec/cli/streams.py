@@ -5,12 +5,14 @@ Most formats are read from many places and written back and forth, so the bytes 
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import cast
 
 from athcodec.errors import ClipError
 from athcodec.exporters import formats as written_formats
@@ -41,7 +43,7 @@ class Streams:
             return path
         if format is not None or self._input:
             return self._read(format_named(format, formats()).suffixes[0] if format else "")
-        head = sys.stdin.buffer.peek(HEAD_BYTES)
+        head = cast(io.BufferedReader, sys.stdin.buffer).peek(HEAD_BYTES)
         kind = next((kind for kind in formats() if kind.begins(head)), None)
         if kind is None:
             raise ClipError(f"{STREAM}: got a format that its first bytes do not tell, expected --source-format")

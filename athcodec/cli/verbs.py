@@ -64,6 +64,7 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import DEFAULT_LADDER, DEFAULT_REL_ERROR, HOST, ladder_of
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.binding import OntoMesh
@@ -172,7 +173,7 @@ def _listed(path: str) -> list[str]:
         return [line.rstrip("\r\n") for line in file if line.strip()]
 
 
-def _batch_settings(args: argparse.Namespace) -> dict[str, Any]:
+def _batch_settings(args: argparse.Namespace) -> JsonObject:
     """Return the settings of a clip that options of the command line give."""
     from athcodec.batch.settings import BOUNDS, READING
 
@@ -361,8 +362,8 @@ def verify(args: argparse.Namespace) -> int:
     return 0 if all(result["ok"] for result in results) else 1
 
 
-def _verified(args: argparse.Namespace, name: str | None) -> dict[str, Any]:
-    result: dict[str, Any] = {"file": _called(args.file, name), "ok": False, "clips": []}
+def _verified(args: argparse.Namespace, name: str | None) -> JsonObject:
+    result: JsonObject = {"file": _called(args.file, name), "ok": False, "clips": []}
     try:
         how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh, "gltf_motion": name}
         with open_file(args.file, args.stats, **how) as decoder, ExitStack() as opened:
@@ -434,7 +435,7 @@ def _suffixes(kind: Any) -> list[str]:
     return list(kind.suffixes) if kind else []
 
 
-def _needs(row: dict[str, Any]) -> str:
+def _needs(row: JsonObject) -> str:
     if not row["extra"]:
         return "" if row["package"] == "athcodec" else row["package"]
     return f"{row['package']}[{row['extra']}]" + (", installed" if row["installed"] else "")
@@ -455,7 +456,7 @@ def view(args: argparse.Namespace) -> int:
             answer(args, facts, f"{args.export}: {size:,} bytes, opens in any browser")
             return 0
         ready = partial(_say_where, args)
-        view.serve(file, args.port, ready, args.clip, args.host_mesh, args.forest, floor)
+        view.serve(file, args.port, ready, args.clip, args.host_mesh, forest=args.forest, floor=floor)
     return 0
 
 
@@ -475,7 +476,8 @@ def picture(args: argparse.Namespace) -> int:
     out = getattr(args, kind)
     with naming(args.file):
         check_output(out, args.file, args.host_mesh, suffix=f".{kind}")
-        size = picture.save_picture(args.file, out, kind, args.clip, args.size, args.fps, args.time, args.host_mesh)
+        how = {"fps": args.fps, "time": args.time, "host_mesh": args.host_mesh}
+        size = picture.save_picture(args.file, out, kind, args.clip, args.size, **how)
     answer(args, {"file": out, "bytes": size}, f"{out}: {size:,} bytes")
     return 0
 

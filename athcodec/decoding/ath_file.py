@@ -33,6 +33,7 @@ from athcodec.motion.joining import HEADING, STRENGTH, metadata_of, wind_of
 from athcodec.motion.presence import stated_presence
 from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike, length_of, scene_unit
+from athcodec.untyped import JsonObject, Keywords
 
 
 class AthFile:
@@ -310,7 +311,7 @@ class AthFile:
     # ---- static data ----
 
     @property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> JsonObject:
         """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
         return self.static.metadata
 
@@ -422,7 +423,7 @@ class AthFile:
             **(asdict(thresholds) if thresholds else {}),
         }
 
-    def info(self) -> dict[str, Any]:
+    def info(self) -> JsonObject:
         """Return what `athcodec info --json` prints, of the whole file with all its clips."""
         return {
             "vertices": self.vertex_count,
@@ -452,7 +453,7 @@ class AthFile:
             return None
         return self.levels[1].max_error / self.max_error_bound
 
-    def _clip_info(self, clip: Clip) -> dict[str, Any]:
+    def _clip_info(self, clip: Clip) -> JsonObject:
         metadata = metadata_of(self.metadata, clip.name)
         strength, heading = wind_of(metadata)
         return {
@@ -498,7 +499,7 @@ def _place_of(path: Openable) -> str | None:
     return str(path) if is_url(path) else os.path.abspath(os.fspath(path))
 
 
-def _reopened(kind: type[AthFile], place: str | bytes, options: dict[str, Any], fingerprint: str) -> AthFile:
+def _reopened(kind: type[AthFile], place: str | bytes, options: Keywords, fingerprint: str) -> AthFile:
     """Open the file of a pickled AthFile. Raises BadChecksum if another is in its place, and the errors of opening."""
     file = kind(place, **options)
     if file._fingerprint != fingerprint:

@@ -17,6 +17,7 @@ from athcodec.motion.clip import DEFAULT_FPS, ClipRange, clip_range_frames, poly
 from athcodec.motion.frames import Frames
 from athcodec.motion.presence import presence_within
 from athcodec.options import whole
+from athcodec.untyped import JsonObject
 
 
 def _of_file(name: str, text: str) -> Any:
@@ -132,7 +133,7 @@ class ClipView:
         return stated_fps(self.metadata) or self.decoder.fps or DEFAULT_FPS
 
     @cached_property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> JsonObject:
         """Unit, up axis and whatever else the source states for the clip, or for all clips."""
         if len(self._runs) > 1:
             return dict(self.decoder.file.metadata)

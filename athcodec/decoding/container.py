@@ -12,7 +12,7 @@ import math
 import struct
 from collections.abc import Container
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import zstandard
@@ -21,6 +21,7 @@ from athcodec import _native
 from athcodec._native import MEASURES, SHORT_FLOATS, SHORT_SHIFT, address, crc32c, lib
 from athcodec.errors import BadChunk, LimitExceeded
 from athcodec.options import set_numbers
+from athcodec.untyped import JsonObject, JsonValue
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
 MAJOR, MINOR, FEATURES = 0, 16, 0
@@ -197,7 +198,7 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """FORMAT.md, "Front stream"."""
+    """Return the front stream (FORMAT.md, "Front stream")."""
     names = (name for name, _ in _native.Header._fields_ if name != "stages" and hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
     first = header.stages[-1] + 1 if header.stages else 0
@@ -338,7 +339,7 @@ def _array_name(text: bytes, subject: str, limits: Limits) -> str:
     return name
 
 
-def parse_metadata(data: bytes, limits: Limits) -> dict:
+def parse_metadata(data: bytes, limits: Limits) -> JsonObject:
     if not data or data[0] > 1:
         raise BadChunk("METADATA: got an unknown method; expected 0 or 1")
     text = data[1:]
@@ -358,7 +359,7 @@ def parse_metadata(data: bytes, limits: Limits) -> dict:
     return _parse_json(text, "METADATA")
 
 
-def _parse_json(text: bytes, subject: str) -> dict:
+def _parse_json(text: bytes, subject: str) -> JsonObject:
     try:
         value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
         json.dumps(value, ensure_ascii=False).encode()  # Raises for lone surrogates.
@@ -369,13 +370,13 @@ def _parse_json(text: bytes, subject: str) -> dict:
     return value
 
 
-def _unique(pairs: list) -> dict:
+def _unique(pairs: list[tuple[str, JsonValue]]) -> JsonObject:
     if len(dict(pairs)) < len(pairs):
         raise ValueError("a key twice")
     return dict(pairs)
 
 
-def _refuse(constant: str):
+def _refuse(constant: str) -> NoReturn:
     raise ValueError(constant)
 
 

@@ -426,6 +426,7 @@ class File:
         into: Segment,
         before: Segment | None = None,
         joined_to: Segment | None = None,
+        *,
         to: np.ndarray | None = None,
     ) -> None:
         """Decode a segment at a refined level, from the beginning or from a segment of which goes_on() is true.

@@ -30,6 +30,7 @@ from athcodec.motion.clip import median_rate
 from athcodec.motion.joining import metadata_of, wind_of
 from athcodec.motion.units import LengthLike, length_of, scene_unit
 from athcodec.options import real
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec import Frame
@@ -240,7 +241,7 @@ class Decoder(ArrayLike):
         return list(zip(starts, starts[1:]))
 
     @property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> JsonObject:
         """Unit, up axis and whatever else the source states, with this clip's values in place of the file's."""
         metadata = self.file.metadata
         return metadata_of(metadata, self.clip.name) if len(self.file.clips) > 1 else metadata

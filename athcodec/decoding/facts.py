@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from athcodec.files.shown import Table, counted
+from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
@@ -30,10 +31,10 @@ TICK_RATIO = Column("tick ratio")
 
 def facts_of(
     path: str | os.PathLike[str], decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
-) -> dict[str, Any]:
-    """decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at each
-    level, where they were measured."""
-    facts = {"file": os.fspath(path)} | decoder.file.info()
+) -> JsonObject:
+    """Return decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at
+    each level, where they were measured."""
+    facts: JsonObject = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
     facts["ratio"] = facts["raw_bytes"] / facts["bytes"]
@@ -49,7 +50,7 @@ def facts_of(
     return facts
 
 
-def parts_of(facts: dict[str, Any]) -> Iterator[str | Table]:
+def parts_of(facts: JsonObject) -> Iterator[str | Table]:
     """Yield the lines and tables that `athcodec info` prints of the facts of a file."""
     ath = facts["ath"]
     rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
@@ -79,7 +80,7 @@ def parts_of(facts: dict[str, Any]) -> Iterator[str | Table]:
     yield _levels(facts)
 
 
-def _presence(clip: dict[str, Any]) -> str:
+def _presence(clip: JsonObject) -> str:
     """Return the objects that some frame does not show, the first `NAMED_OBJECTS` of them, and the frames that do."""
     named = [
         f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
@@ -92,7 +93,7 @@ def _presence(clip: dict[str, Any]) -> str:
     return f"Shown in some frames{of_clip} only: {'; '.join(named)}{f'; and {more:,} more' if more else ''}."
 
 
-def _rest(facts: dict[str, Any]) -> str:
+def _rest(facts: JsonObject) -> str:
     """Return where it is, and what it takes."""
     if facts["host_mesh"]:
         vertices = counted(facts["vertices"], "vertex", "vertices")
@@ -100,7 +101,7 @@ def _rest(facts: dict[str, Any]) -> str:
     return f"{facts['rest_bytes']:,} bytes of these"
 
 
-def _clips(facts: dict[str, Any]) -> Table:
+def _clips(facts: JsonObject) -> Table:
     """Return errors at the seam are those of the deepest stored level."""
     rows = [
         [
@@ -119,7 +120,7 @@ def _clips(facts: dict[str, Any]) -> Table:
     return Table(["clip", "frames", "seconds", "segments", "wind", seam, *levels], rows)
 
 
-def _levels(facts: dict[str, Any]) -> Table:
+def _levels(facts: JsonObject) -> Table:
     measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
     columns = ["bytes so far", *(head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [
@@ -132,7 +133,7 @@ def _levels(facts: dict[str, Any]) -> Table:
     return Table([*LEVEL_COLUMNS, *columns], level_rows(facts, cells))
 
 
-def level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[list[str]]:
+def level_rows(facts: JsonObject, cells: Sequence[Sequence[str]]) -> list[list[str]]:
     """Return one row per level, ending in its `cells`, between what the file holds before and behind them."""
     levels, total = facts["levels"], facts["bytes"]
 
@@ -147,10 +148,10 @@ def level_rows(facts: dict[str, Any], cells: Sequence[Sequence[str]]) -> list[li
     return [*rows, row("arrays", "", "", behind)] if behind else rows
 
 
-def head(name: str, unit: Any) -> str:
+def head(name: str, unit: JsonValue) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def size_of(facts: dict[str, Any]) -> str:
+def size_of(facts: JsonObject) -> str:
     """Return a sentence on the size of the file beside that of its positions as float32."""
     return f"{facts['bytes']:,} bytes; the positions as float32 take {facts['raw_bytes']:,}: {facts['ratio']:.1f} to 1."

@@ -26,8 +26,8 @@ def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
         If a frame is not a whole number.
     """
     keys = list(index) if isinstance(index, tuple) else [index]
-    place = next((place for place, key in enumerate(keys) if key is not None), None)
-    chosen = Ellipsis if place is None else keys[place]
+    place = next((place for place, key in enumerate(keys) if key is not None), len(keys))
+    chosen = Ellipsis if place == len(keys) else keys[place]
     if isinstance(chosen, slice):
         try:
             frames = np.arange(*chosen.indices(frame_count))

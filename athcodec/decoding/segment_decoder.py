@@ -78,7 +78,7 @@ class SegmentDecoder:
         ready = spare if spare and is_free else core_file.Segment(size)
         with self._bytes.lock, self._bytes.fed(self._missing(segment, level, before, joined_to), subject):
             self._refine(level)
-            self._core.prepare(self._work, segment, level, ready, before, joined_to, to)
+            self._core.prepare(self._work, segment, level, ready, before, joined_to, to=to)
         return ready
 
     def show_all(self, segments: range, level: int, show: Show, room: Room) -> None:

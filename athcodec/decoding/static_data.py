@@ -6,7 +6,6 @@ import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from athcodec.motion.clip import ERROR_WEIGHTS, check_stem_index
 from athcodec.motion.hierarchy import Hierarchy, derived_edges
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import Polygons
+from athcodec.untyped import JsonObject
 
 CUBE_CORNER = 3**0.5 / 2  # Largest distance of a point from the nearest one of a cubic lattice, in its steps.
 _SOURCE_REST = struct.Struct("<Bf")  # Is_Exact and Rest_Step of FORMAT.md.
@@ -37,7 +37,7 @@ class StaticData:
         self.host_files: frozenset[tuple[int, int]] = frozenset()  # The files that the host's mesh was read from.
 
     @cached_property
-    def metadata(self) -> dict[str, Any]:
+    def metadata(self) -> JsonObject:
         """Unit, up axis and whatever else the sources of all clips state, as `join` puts it together."""
         chunk = self._chunks.find(ct.METADATA)
         return ct.parse_metadata(self._chunks.payload(chunk), self._bytes.limits) if chunk else {}

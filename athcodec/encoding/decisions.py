@@ -24,10 +24,10 @@ from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.search.choices.prediction import FoundPrediction, best_prediction, one_map_each
 from athcodec.encoding.search.progress import (
     FILE_BYTE,
-    LEVEL_MOTION,
     MOTION,
     POSES,
     READING,
+    STAGE_MOTION,
     SURVEY,
     Progress,
     Work,
@@ -193,8 +193,8 @@ class FileDecisions:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios)
-        if self._has_usual_ladder and search.levels_need_own_bases():
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios=ratios)
+        if self._has_usual_ladder and search.stages_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
         with work.trying("segments"):
             best = self._searched(search, share, work)
@@ -229,7 +229,7 @@ class FileDecisions:
                 return self._predicted(prediction.choice)
             best = self._best_of(search, choices, prelude)
             if self._is_short(best) and work.fits(work.done):
-                best = min(best, self._without_levels(bound, work), key=self._estimated_bytes)
+                best = min(best, self._without_stages(bound, work), key=self._estimated_bytes)
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
                 return best
         except BoundError:
@@ -238,7 +238,7 @@ class FileDecisions:
         return self._predicted(prediction.choice)
 
     def _with_one_layer(self) -> FileDecisions:
-        """Return the decisions about a clip whose levels move by series of their own, which prediction hardly suits."""
+        """Return the decisions about a clip whose stages move by series of their own, which prediction hardly suits."""
         return dataclasses.replace(self, options=dataclasses.replace(self.options, ladder=()), predicts_as_usual=True)
 
     def _in_segments(self, frames: int) -> FileDecisions:
@@ -255,8 +255,8 @@ class FileDecisions:
     def _coding_work(self, bound: float, frames: int) -> float:
         """Return the work of coding the motion of so many frames."""
         layers = len(layer_ratios(self.options.ladder, bound, self.seen.diagonal))
-        levels = int(self.source.hierarchy.branch_depth.max())
-        return (MOTION * (1 + layers) / 2 + LEVEL_MOTION * levels) * self.clip.vertex_count * frames
+        stages = int(self.source.hierarchy.branch_depth.max())
+        return (MOTION * (1 + layers) / 2 + STAGE_MOTION * stages) * self.clip.vertex_count * frames
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> Decided:
         """Return the best of what a search has found: the first of it, and others for which there is work left."""
@@ -278,7 +278,7 @@ class FileDecisions:
         small = is_small(self.clip.vertex_count, self.source.segments, options.effort)
         return small and self._estimated_bytes(decided) <= FEW_BYTES
 
-    def _without_levels(self, bound: float, work: Work) -> Decided:
+    def _without_stages(self, bound: float, work: Work) -> Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
@@ -317,7 +317,7 @@ class FileDecisions:
         return total
 
     def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
-        """Return the ratios of as many of the last layers as there is room for behind the levels of the hierarchy. A
+        """Return the ratios of as many of the last layers as there is room for behind the stages of the hierarchy. A
         still clip has one layer: a rest pose in layers takes up to two thirds more."""
         if self.source.still:
             return [1]

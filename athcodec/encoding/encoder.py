@@ -26,7 +26,7 @@ from athcodec.encoding.decisions import FileDecisions
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.preparation.bounds import BoundOption
 from athcodec.encoding.preparation.preparation import placed_clip, prepared, resumed
-from athcodec.encoding.search.progress import Progress, WeightedProgress, stage_weights
+from athcodec.encoding.search.progress import Progress, WeightedProgress, phase_weights
 from athcodec.encoding.search.segment_samples import SAMPLES
 from athcodec.encoding.segments.layers import layer_ratios
 from athcodec.encoding.segments.segmentation import split_segments
@@ -38,7 +38,7 @@ from athcodec.motion.thresholds import Thresholds
 from athcodec.motion.units import LengthLike, length_of, scene_unit, size_of, stated_scene
 from athcodec.options import DEFAULT_REL_ERROR
 
-USUAL = "usual effort"  # The stage of progress in which effort "best" decides as "default" does.
+USUAL = "usual effort"  # The phase of progress in which effort "best" decides as "default" does.
 
 
 def encode_clip(
@@ -209,8 +209,8 @@ def _decided(
     usual = None
     if _is_compared(option, options):
         as_usual = dataclasses.replace(options, effort="default")
-        weights = _stage_weights(clip, option, as_usual, motion=False)
-        part = WeightedProgress(lambda stage, fraction: report(f"{USUAL}: {stage}", fraction), weights)
+        weights = _phase_weights(clip, option, as_usual, motion=False)
+        part = WeightedProgress(lambda phase, fraction: report(f"{USUAL}: {phase}", fraction), weights)
         usual = _decided(clip, option, as_usual, part, known)
     with warnings.catch_warnings():
         if usual is not None:
@@ -255,16 +255,16 @@ def _object(decided: Decided, option: BoundOption, bound: float) -> None:
 def _weighted_progress(
     clip: MotionClip, progress: Progress | None, option: BoundOption, options: EncodingOptions, draft: bool = False
 ) -> WeightedProgress:
-    weights = _stage_weights(clip, option, options, not draft)
+    weights = _phase_weights(clip, option, options, not draft)
     if _is_compared(option, options):
         as_usual = dataclasses.replace(options, effort="default")
-        weights = {USUAL: sum(_stage_weights(clip, option, as_usual, motion=False).values())} | weights
+        weights = {USUAL: sum(_phase_weights(clip, option, as_usual, motion=False).values())} | weights
     return WeightedProgress(progress, weights)
 
 
-def _stage_weights(clip: MotionClip, option: BoundOption, options: EncodingOptions, motion: bool) -> dict[str, float]:
+def _phase_weights(clip: MotionClip, option: BoundOption, options: EncodingOptions, motion: bool) -> dict[str, float]:
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
-    return stage_weights(
+    return phase_weights(
         clip.vertex_count,
         segments,
         options.effort,

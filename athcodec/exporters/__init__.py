@@ -29,6 +29,7 @@ from athcodec.motion.protocol import Motion
 from athcodec.options import COARSE_SHARE, set_numbers
 from athcodec.sources import ATH, Format, format_by_suffix, format_named
 from athcodec.sources.registry import registered
+from athcodec.untyped import JsonObject
 
 Report = Callable[[str, float], None]
 Progress = Callable[[float], None]
@@ -137,7 +138,7 @@ class Written:
     """
 
     files: tuple[Path, ...]
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: JsonObject = field(default_factory=dict)
 
     def __repr__(self) -> str:
         first, *others = map(os.fspath, self.files)
@@ -208,7 +209,7 @@ def write(
         raise ClipError(f"{wanted.blur[0]}: got {kind.name}, expected one of {', '.join(BLURRED)}")
     if wanted.rig is None:
         _check_clips(motion, kind)
-    report = progress or (lambda stage, fraction: None)
+    report = progress or (lambda phase, fraction: None)
     with keeping(getattr(motion, "inputs", ())):
         if kind.package:
             add_kind(kind.title, kind.suffixes, kind.magic)
@@ -228,7 +229,7 @@ def write(
     return Written(tuple(Path(path).with_name(name) for name in names), facts)
 
 
-def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: dict[str, Any]) -> None:
+def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: JsonObject) -> None:
     """Warn the caller of `write` of a skeleton that is far off the motion."""
     diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
     if not error > COARSE_SHARE * diagonal > 0:

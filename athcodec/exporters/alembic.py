@@ -22,6 +22,7 @@ from athcodec.exporters.scene_objects import hidden_copies, objects_of
 from athcodec.files.atomic import new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 STATIC = (
     "frame_count vertex_count branch_count time fps metadata rest vertex_branch branch_parent stem_index edges".split()
@@ -30,7 +31,7 @@ STATIC += ["faces", "attributes", "polygons"]
 WRITER = "athcodec.exporters.alembic_archive"
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write a MotionClip or a ClipView as .abc; returns what instances cost. Raises ClipError, OSError."""
     path = os.fspath(path)
     objects = objects_of(motion)

@@ -16,13 +16,14 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any, BinaryIO
+from typing import BinaryIO, Protocol
 
 import imath
 import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 from athcodec.exporters.copies import Copies, one_copy, rows_of_one
+from athcodec.exporters.samples import Sample
 from athcodec.exporters.scene_objects import (
     DOMAINS,
     KNOWN_ATTRIBUTES,
@@ -41,6 +42,7 @@ from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources.alembic_archive import BASES
 from athcodec.sources.scene_objects import DESCRIPTOR, FACE_MATERIAL, OWN, turned_corners
+from athcodec.untyped import AlembicObject, JsonObject
 
 SCOPES = {
     "vertex": AbcGeom.GeometryScope.kVertexScope,
@@ -61,6 +63,14 @@ TYPES = {
 KINDS = {"mesh": AbcGeom.OPolyMesh, "curves": AbcGeom.OCurves, "points": AbcGeom.OPoints}
 Z_UP = ((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1))  # row vectors
 
+Statics = dict[str, tuple[np.ndarray, str]]  # Arrays that do not move, with their domains.
+
+
+class Placed(Motion, Protocol):
+    """A motion that stands about `place` (3,); None: about the origin."""
+
+    place: list[float] | None
+
 
 def main() -> None:
     """Take a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
@@ -75,14 +85,14 @@ def main() -> None:
     print(answer, end="")
 
 
-def _samples(pipe: BinaryIO) -> Iterator[tuple[Any, ...]]:
+def _samples(pipe: BinaryIO) -> Iterator[Sample]:
     """Yield frames as exporters.samples gives them."""
     with suppress(EOFError):
         while True:
             yield pickle.load(pipe)
 
 
-def _write(motion: Motion, samples: Iterator[tuple[Any, ...]], instanced: dict[int, Copies], name: str) -> None:
+def _write(motion: Placed, samples: Iterator[Sample], instanced: dict[int, Copies], name: str) -> None:
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     index = archive.addTimeSampling(_sampling(numbers, rate))
@@ -116,7 +126,7 @@ def _write(motion: Motion, samples: Iterator[tuple[Any, ...]], instanced: dict[i
                 _add(obj, [each[obj.vertices] for each in values], _rows(statics, obj) if frame == 0 else None)
 
 
-def _sampling(numbers: np.ndarray, rate: float) -> Any:
+def _sampling(numbers: np.ndarray, rate: float) -> AlembicObject:
     steps = np.diff(numbers)
     if np.allclose(steps, 1.0, rtol=0, atol=1e-5):
         return AbcCoreAbstract.TimeSampling(1.0 / rate, float(numbers[0]) / rate)
@@ -126,7 +136,7 @@ def _sampling(numbers: np.ndarray, rate: float) -> Any:
     return AbcCoreAbstract.TimeSampling(acyclic, times)
 
 
-def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
+def _hide(places: list[AlembicObject], obj: SceneObject, sampling: int) -> None:
     """Write the visibility of an object, or of each of its copies, to the transforms above them."""
     if obj.shown is None or obj.shown.shape[1] > len(places):
         return
@@ -138,8 +148,8 @@ def _hide(places: list[Any], obj: SceneObject, sampling: int) -> None:
 
 
 def _add_instanced(
-    root: Any, name: str, obj: SceneObject, copies: Copies, statics: dict[str, tuple[np.ndarray, str]], sampling: Any
-) -> list[Any]:
+    root: AlembicObject, name: str, obj: SceneObject, copies: Copies, statics: Statics, sampling: AlembicObject
+) -> list[AlembicObject]:
     """Write the shape below the transform of the first copy, and an instance of it below that of each other one.
     Returns these transforms."""
     matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # Matrices act on row vectors.
@@ -153,10 +163,11 @@ def _add_instanced(
             place.getSchema().set(sample)
     one = one_copy(obj)
     obj.target = one.target = KINDS[obj.kind](places[0], name)
-    arrays = {
-        key: (values if domain == "constant" else rows_of_one(values, obj), domain)
-        for key, (values, domain) in _rows(statics, obj).items()
-    }
+    arrays = {}
+    for key, (values, domain) in _rows(statics, obj).items():
+        rows = values if domain == "constant" else rows_of_one(values, obj)
+        assert rows is not None  # `_divide` leaves out what copies do not share.
+        arrays[key] = rows, domain
     _add(one, [copies.shape], arrays)
     for place in places[1:]:
         place.addChildInstance(one.target, name)
@@ -164,22 +175,25 @@ def _add_instanced(
 
 
 def _bind_materials(motion: Motion, objects: list[SceneObject]) -> None:
-    """Materials by their names alone: a set of the faces that have one."""
+    """Write materials by their names alone: a set of the faces that have one."""
     labels, names = face_materials(motion) or (np.empty(0), [])
     sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
     for obj in objects if sets else ():
+        if obj.kind != "mesh":
+            continue
         face_labels = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
-        for label, faces in material_runs(face_labels, names) if obj.kind == "mesh" else ():
+        assert face_labels is not None  # The copies of an instanced object have the same materials.
+        for label, faces in material_runs(face_labels, names):
             held = _filled(imath.IntArray, faces)
             face_set = obj.target.getSchema().createFaceSet(sets[label])
             face_set.getSchema().set(AbcGeom.OFaceSetSchemaSample(held))
 
 
-def _rows(statics: dict[str, tuple[np.ndarray, str]], obj: SceneObject) -> dict[str, tuple[np.ndarray, str]]:
+def _rows(statics: Statics, obj: SceneObject) -> Statics:
     return {name: (rows_of(values, domain, obj), domain) for name, (values, domain) in statics.items()}
 
 
-def _filled(kind: Any, values: np.ndarray) -> Any:
+def _filled(kind: AlembicObject, values: np.ndarray) -> AlembicObject:
     array = kind(len(values))
     if len(values):
         np.asarray(memoryview(array))[...] = values
@@ -189,13 +203,13 @@ def _filled(kind: Any, values: np.ndarray) -> Any:
 # ---- samples ----
 
 
-def _add(obj: SceneObject, values: list[np.ndarray], arrays: dict[str, tuple[np.ndarray, str]] | None) -> None:
-    """A sample of the points, and of their velocities where there are any; the first one brings what does not move, the
-    rows of the object."""
+def _add(obj: SceneObject, values: list[np.ndarray], arrays: Statics | None) -> None:
+    """Write a sample of the points, and of their velocities where there are any; the first one brings what does not
+    move, the rows of the object."""
     points, *moving = (_filled(imath.V3fArray, each) for each in values)
     schema = obj.target.getSchema()
 
-    def set_sample(sample: Any) -> None:
+    def set_sample(sample: AlembicObject) -> None:
         for velocities in moving:
             sample.setVelocities(velocities)
         schema.set(sample)
@@ -209,9 +223,7 @@ def _add(obj: SceneObject, values: list[np.ndarray], arrays: dict[str, tuple[np.
         set_sample(kinds[obj.kind](points))
         return
     order = turned_corners(obj.faces[0])
-    arrays = {
-        name: (values[order] if domain == "corner" else values, domain) for name, (values, domain) in arrays.items()
-    }
+    arrays = {name: (rows[order] if domain == "corner" else rows, domain) for name, (rows, domain) in arrays.items()}
     # samples refer to arrays that somebody has to keep until they are written
     held = {
         "points": points,
@@ -221,12 +233,12 @@ def _add(obj: SceneObject, values: list[np.ndarray], arrays: dict[str, tuple[np.
         "indices": _filled(imath.IntArray, obj.faces[1][order]),
     }
     set_sample({"mesh": _mesh_sample, "curves": _curve_sample, "points": _point_sample}[obj.kind](obj, held, arrays))
-    for name, (values, domain) in arrays.items():
-        if len(values) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
-            _write_param(schema.getArbGeomParams(), name, values, domain)
+    for name, (rows, domain) in arrays.items():
+        if len(rows) and (domain in ("vertex", "constant") or obj.kind == "mesh"):
+            _write_param(schema.getArbGeomParams(), name, rows, domain)
 
 
-def _mesh_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
+def _mesh_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
     further = {}
     for name, row, array, keyword, kind in (
         ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
@@ -240,11 +252,11 @@ def _mesh_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any])
     return AbcGeom.OPolyMeshSchemaSample(held["points"], held["indices"], held["counts"], **further)
 
 
-def _curve_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
+def _curve_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
     is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
     bases = {name: each for each, name in BASES.items()}
-    basis = bases.get(obj.details.get("basis"), AbcGeom.BasisType.kBsplineBasis)
+    basis = bases.get(obj.details.get("basis", ""), AbcGeom.BasisType.kBsplineBasis)
     basis = basis if is_cubic else AbcGeom.BasisType.kNoBasis
     is_closed = obj.details.get("wrap") == "periodic"
     wrap = AbcGeom.CurvePeriodicity.kPeriodic if is_closed else AbcGeom.CurvePeriodicity.kNonPeriodic
@@ -253,11 +265,11 @@ def _curve_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]
     )
 
 
-def _point_sample(obj: SceneObject, held: dict[str, Any], arrays: dict[str, Any]) -> Any:
+def _point_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
     return AbcGeom.OPointsSchemaSample(held["points"], held["ids"], **_widths(held, arrays, "iWidths"))
 
 
-def _widths(held: dict[str, Any], arrays: dict[str, Any], name: str) -> dict[str, Any]:
+def _widths(held: dict[str, AlembicObject], arrays: Statics, name: str) -> JsonObject:
     radius, domain = arrays.get("radius", (None, ""))
     if radius is None or radius.dtype != np.float32 or radius.ndim != 1:
         return {}
@@ -269,12 +281,11 @@ def _widths(held: dict[str, Any], arrays: dict[str, Any], name: str) -> dict[str
 # ---- static arrays ----
 
 
-def _divide(
-    motion: Motion, objects: list[SceneObject]
-) -> tuple[dict[str, tuple[np.ndarray, str]], dict[str, tuple[np.ndarray, str]]]:
-    """Static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it has those
-    that all copies share."""
-    fitting, left = {}, {}
+def _divide(motion: Motion, objects: list[SceneObject]) -> tuple[Statics, Statics]:
+    """Return static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it
+    has those that all copies share."""
+    fitting: Statics = {}
+    left: Statics = {}
     for name, values in motion.attributes.items():
         if name in KNOWN_ATTRIBUTES or name == FACE_MATERIAL and face_materials(motion):
             continue
@@ -289,7 +300,7 @@ def _divide(
     return fitting, left
 
 
-def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> None:
+def _write_param(params: AlembicObject, name: str, values: np.ndarray, domain: str) -> None:
     array, kind = TYPES[values.dtype.str[1:], values.shape[1:]]
     scope = SCOPES[domain]
     param = getattr(AbcGeom, f"O{kind}GeomParam")(params, name, False, scope, 1)
@@ -297,7 +308,7 @@ def _write_param(params: Any, name: str, values: np.ndarray, domain: str) -> Non
     param.set(getattr(AbcGeom, f"O{kind}GeomParamSample")(held, scope))
 
 
-def _keep_own(properties: Any, motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> None:
+def _keep_own(properties: AlembicObject, motion: Motion, left: Statics) -> None:
     kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
     Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
     for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):

@@ -8,14 +8,13 @@ knows no file format.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from athcodec.exporters.fitting import Parts, Placed, allowed_error, portions
 from athcodec.exporters.scene_objects import SceneObject, face_materials
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 
 @dataclass(eq=False)
@@ -51,7 +50,7 @@ def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None
     return {number: fit.copies for number, fit in fits.items() if fit.copies.max_error <= allowed}
 
 
-def cost_of(instanced: dict[int, Copies]) -> dict[str, Any]:
+def cost_of(instanced: dict[int, Copies]) -> JsonObject:
     """Return the sentence about a writer's instances."""
     if not instanced:
         return {}
@@ -86,7 +85,7 @@ class _Fit:
         shape = ((rest[:count] - part.middle[0]) @ part.axes[0]).astype(np.float32)
         self._local = shape.astype(np.float64)
         spread = np.tile((self._local**2).mean(axis=0), (obj.copies, 1))
-        self._solver = Placed(SimpleNamespace(spread=spread, axes=np.tile(part.axes[0], (obj.copies, 1, 1))))
+        self._solver = Placed(spread, np.tile(part.axes[0], (obj.copies, 1, 1)))
         room = (motion.frame_count, obj.copies)
         places, turns, scales = (np.empty((*room, width), np.float32) for width in (3, 4, 3))
         (place, turn, scale), _ = self._placed(rest.reshape(obj.copies, count, 3))

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,6 +34,9 @@ WORK_BYTES = 32 << 20
 FINEST = 1e-5  # Smallest tolerance of a fit, over the clip's size.
 OF_LEVEL = 1.0  # Error that a transform may add to the level's, over the level's error.
 OF_CLIP = 1e-4  # Tolerance over the clip's size, for clips without levels.
+
+# Ranges of the vertices that parts hold (first, count), the places of the parts, and what the solver gave.
+Batch = tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]
 
 
 def allowed_error(motion: Motion) -> float:
@@ -96,15 +98,17 @@ class Placed:
 
     widths = (4, 3)
 
-    def __init__(self, parts: Parts):
-        self._spread, self._axes = parts.spread, parts.axes
-        largest = parts.spread.max(axis=1)
-        self._flat = parts.spread <= HELD * largest[:, None]
+    def __init__(self, spread: np.ndarray, axes: np.ndarray):
+        """Take the mean squares (K, 3) of parts along their axes (K, 3, 3)."""
+        self._spread, self._axes = spread, axes
+        largest = spread.max(axis=1)
+        self._flat = spread <= HELD * largest[:, None]
         self._held = np.where(largest > 0, HELD * largest, 1.0)[:, None, None]
-        self._before, self._scale = quaternions(parts.axes), np.ones_like(parts.spread)
+        self._before, self._scale = quaternions(axes), np.ones_like(spread)
 
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """From mean products (K, 3, 3) of places in a frame and in a part's axes: maps from those axes, and values."""
+        """Return maps from a part's axes, and values, for mean products (K, 3, 3) of places in a frame and in these
+        axes."""
         rotation, scale = self.nearest(cross)
         turn = quaternions(rotation)
         turn *= np.where((turn * self._before).sum(axis=1) < 0, -1.0, 1.0)[:, None]
@@ -131,10 +135,11 @@ class Mapped:
 
     widths = (9,)
 
-    def __init__(self, parts: Parts):
-        self._placed, self._axes = Placed(parts), parts.axes
-        self._flat = parts.spread <= 1e-6 * parts.spread.max(axis=1)[:, None]
-        self._spread = np.where(self._flat, 1.0, parts.spread)
+    def __init__(self, spread: np.ndarray, axes: np.ndarray):
+        """Take the mean squares (K, 3) of parts along their axes (K, 3, 3)."""
+        self._placed, self._axes = Placed(spread, axes), axes
+        self._flat = spread <= 1e-6 * spread.max(axis=1)[:, None]
+        self._spread = np.where(self._flat, 1.0, spread)
 
     def __call__(self, cross: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray]]:
         rotation, _ = self._placed.nearest(cross)
@@ -143,7 +148,12 @@ class Mapped:
 
 
 def fit(
-    motion: Motion, solver: type, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
+    motion: Motion,
+    solver: type[Placed] | type[Mapped],
+    allowed: float,
+    most: int,
+    report: Progress,
+    chosen: np.ndarray | None = None,
 ) -> Moving | None:
     """Return the parts of a motion, cut until none is further off than `allowed`; None where that takes more than
     `most`. chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
@@ -152,17 +162,19 @@ def fit(
     if chosen is not None:
         wanted = np.array([chosen[order[a : a + n]].any() for a, n in zip(first, count)])
         first, count = first[wanted], count[wanted]
-    done: list[tuple[np.ndarray, np.ndarray, np.ndarray, list[np.ndarray]]] = []
+    done: list[Batch] = []
     number = 0
     while len(first):
         if len(first) + number > most:
             return None
         parts = Parts.over(order, first, count, rest)
-        error = _fitted(motion, parts, solver(parts), rest, ROUGHLY)[2]  # most that fail do so in one of a few frames
+        error = _fitted(motion, parts, solver(parts.spread, parts.axes), rest, ROUGHLY)[
+            2
+        ]  # most that fail do so in one of a few frames
         good = (error <= allowed) | (count == 1)
         if good.any():
             kept = Parts.over(order, first[good], count[good], rest)
-            places, values, error[good] = _fitted(motion, kept, solver(kept), rest)
+            places, values, error[good] = _fitted(motion, kept, solver(kept.spread, kept.axes), rest)
             held = (error[good] <= allowed) | (kept.count == 1)
             done.append((kept.first[held], kept.count[held], places[:, held], [value[:, held] for value in values]))
             good[good] = held
@@ -201,7 +213,7 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 
 
 def _fitted(
-    motion: Motion, parts: Parts, solver: Any, rest: np.ndarray, step: int = 1
+    motion: Motion, parts: Parts, solver: Placed | Mapped, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Return places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest
     distance that each part leaves (K,)."""
@@ -241,7 +253,7 @@ def portions(motion: Motion, vertex_count: int) -> Iterator[tuple[int, np.ndarra
             yield start + first, frames[first : first + step]
 
 
-def _joined(done: list, order: np.ndarray, rest: np.ndarray) -> Moving:
+def _joined(done: list[Batch], order: np.ndarray, rest: np.ndarray) -> Moving:
     first, count = (np.concatenate([batch[i] for batch in done]) for i in range(2))
     by_place = np.argsort(first)
     places = np.concatenate([batch[2] for batch in done], axis=1)[:, by_place]

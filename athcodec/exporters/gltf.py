@@ -56,6 +56,7 @@ from athcodec.files.atomic import new_file
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import GUESSED
+from athcodec.untyped import JsonMapping, JsonObject
 
 MOST_JOINTS = 65536
 SHORT_FRAMES, SHORT_BYTES = 300, 256 << 20
@@ -63,7 +64,7 @@ MORPH_FRAMES, MORPH_BYTES = 4096, 2 << 30
 BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
 
     Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
@@ -78,13 +79,13 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
     return facts
 
 
-def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     looks = looks_of(motion, objects_of(motion))
     meshes = meshes_of(motion, looks, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
     shapes, lost_copies = with_copies(motion, meshes.meshes) if has_copies else (list(meshes.meshes), {})
     write = _writer(motion, options, looks.surface, shapes, lambda done: report(0.95 * done))
-    facts = {
+    facts: JsonObject = {
         "animation": write.name if options.rig is None else "a rig",
         "unit": str(motion.metadata.get("unit") or ""),
     }
@@ -95,11 +96,11 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
     if copied:
         facts["instances"] = sum(len(shape.copies.rest[0]) for shape in copied)
         write.max_error = max(write.max_error, *(shape.copies.max_error for shape in copied))
-    lost = copied[0].lost if copied else []
-    left_out = meshes.left_out + [key[1:] for key in lost]
+    lost_keys = copied[0].lost if copied else []
+    left_out = meshes.left_out + [key[1:] for key in lost_keys]
     facts |= {"left_out": left_out} if left_out else {}
     facts |= {GUESSED: ["normals"]} if meshes.has_made_normals else {}
-    facts |= branch_extras(motion) if "_vertex_branch" not in lost else {}
+    facts |= branch_extras(motion) if "_vertex_branch" not in lost_keys else {}
     glb = Glb(clock(motion) | {"athcodec": facts})
     add_materials(glb, meshes)
     transform = root_transform(motion)
@@ -139,7 +140,7 @@ def _writer(
     return _Morphed(motion, surface)
 
 
-def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: Mapping[str, Any]) -> None:
+def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: JsonMapping) -> None:
     """Write the rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
@@ -154,7 +155,7 @@ def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarr
         glb.write(out)
 
 
-def write_bound(motion: Motion, path: FilePath, bones: Any, facts: Mapping[str, Any]) -> dict[str, Any]:
+def write_bound(motion: Motion, path: FilePath, bones: Any, facts: JsonMapping) -> JsonObject:
     """Write the rest pose with a skin, whose bones (binding.bones.Bones) stand in it and have no keys; returns what is
     not written, as `write_clip` does.
 
@@ -163,8 +164,8 @@ def write_bound(motion: Motion, path: FilePath, bones: Any, facts: Mapping[str, 
     the slices of surfaces (binding.bones.Bones, slices).
     """
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), Path(fspath(path)).stem)
-    lost = {"left_out": meshes.left_out} if meshes.left_out else {}
-    glb = Glb({"athcodec": {**facts, "animation": "none", **lost}})
+    left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
+    glb = Glb({"athcodec": {**facts, "animation": "none", **left_out}})
     add_materials(glb, meshes)
     lists = {name: getattr(bones, name).tolist() for name in ("vertex", "before", "after")}
     lists["first"] = np.flatnonzero(bones.side).tolist()
@@ -175,7 +176,11 @@ def write_bound(motion: Motion, path: FilePath, bones: Any, facts: Mapping[str, 
     count = len(bones.rest)
     bind = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
     bind[:, :3, 3] = -bones.rest
-    still = (bones.rest.astype(np.float32), np.tile(np.float32([0, 0, 0, 1]), (count, 1)), np.ones((count, 3)))
+    still = (
+        bones.rest.astype(np.float32),
+        np.tile(np.array([0, 0, 0, 1], np.float32), (count, 1)),
+        np.ones((count, 3)),
+    )
     names = tuple(f"bone_{number}" for number in range(count))
     joined = _Joined(motion, Joints(bones.joint, bind, still, still, weights=bones.weight, names=names))
     joined.add_still(glb, root, meshes.meshes)
@@ -213,7 +218,7 @@ def check_morphs(motion: Motion, offset_count: int) -> None:
         )
 
 
-def _add_animation(glb: Glb, take: Take, samplers: list[dict[str, Any]], channels: list[dict[str, Any]]) -> None:
+def _add_animation(glb: Glb, take: Take, samplers: list[JsonObject], channels: list[JsonObject]) -> None:
     if channels:
         animation = {"name": take.name, "samplers": samplers, "channels": channels}
         extras = {"extras": take.extras} if take.extras else {}
@@ -221,10 +226,10 @@ def _add_animation(glb: Glb, take: Take, samplers: list[dict[str, Any]], channel
 
 
 def _animate(
-    glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[dict[str, Any]], list[dict[str, Any]]]]
+    glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[JsonObject], list[JsonObject]]]
 ) -> None:
-    """An animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than at
-    rest in any of them; one key where such a one stands still in one."""
+    """Add an animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than
+    at rest in any of them; one key where such a one stands still in one."""
     if movers is None:
         movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((takes[-1].stop, 0, 3)),) * 3)
     has_others = bool(more[0][1])
@@ -237,7 +242,7 @@ def _animate(
         if len(takes) > 1 and np.any(used) and not np.any(moves) and not has_others:
             path = next(path for path, of in enumerate(used) if of.any())
             moves[path][used[path].argmax()] = True  # one that stands still lasts as long as it does
-        _add_channels(glb, movers.nodes, take, poses, used, moves, samplers, channels)
+        _add_channels(glb, movers.nodes, take, list(zip(poses, used, moves)), samplers, channels)
         _add_animation(glb, take, samplers, channels)
 
 
@@ -251,13 +256,13 @@ class _Joined:
         self.facts = {} if joints is None else {"joints": len(joints.bind)}
 
     def add(
-        self, glb: Glb, root: int, transform: dict[str, Any], shapes: list[GltfMesh | GltfCopies], report: Progress
+        self, glb: Glb, root: int, transform: JsonObject, shapes: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         joints, movers = self._joints, []
         if joints is not None:
             movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
         # meshes with a skin are beside the root, as nothing but joints places them, and copies beside those
-        place: tuple[int | None, dict[str, Any]] = (root, {}) if joints is None else (None, transform)
+        place: tuple[int | None, JsonObject] = (root, {}) if joints is None else (None, transform)
         for shape in shapes:
             if isinstance(shape, GltfCopies):
                 movers += shape.add(glb, *place)
@@ -269,6 +274,7 @@ class _Joined:
 
     def add_still(self, glb: Glb, root: int, shapes: Iterable[GltfMesh]) -> None:
         """Add joints without keys, and meshes that hang on them."""
+        assert self._joints is not None
         self._add_skin(glb, root, self._joints)
         for shape in shapes:
             self._add_mesh(glb, shape, self._joints)
@@ -289,7 +295,7 @@ class _Joined:
         glb.node(name=shape.name, mesh=mesh, skin=0)
 
 
-def _influences(joints: Joints, source: np.ndarray, dtype: type) -> tuple[np.ndarray, np.ndarray]:
+def _influences(joints: Joints, source: np.ndarray, dtype: type[np.unsignedinteger]) -> tuple[np.ndarray, np.ndarray]:
     """Return (n, 4) joints and their weights."""
     vertex_joints = np.zeros((len(source), 4), dtype)
     if joints.weights is None:
@@ -314,17 +320,14 @@ def _add_channels(
     glb: Glb,
     nodes: list[int],
     take: Take,
-    poses: list[np.ndarray],
-    used: list[np.ndarray],
-    moves: list[np.ndarray],
-    samplers: list[dict[str, Any]],
-    channels: list[dict[str, Any]],
+    tracks: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
+    samplers: list[JsonObject],
+    channels: list[JsonObject],
 ) -> None:
-    """Append samplers and channels. poses, used, moves: one array for each of PATHS, of which the latter two say, (J,),
-    which nodes have a channel and which of those move. A node that moves gets a key per frame, one that is still a
-    single key."""
+    """Append samplers and channels. tracks: for each of PATHS the poses, (n, J, width), and as (J,) bool which nodes
+    have a channel and which of those move. A node that moves gets a key per frame, one that is still a single key."""
     inputs: dict[int, int] = {}  # accessors of times, by their number
-    for path, values, is_used, moving in zip(PATHS, poses, used, moves):
+    for path, (values, is_used, moving) in zip(PATHS, tracks):
         for chosen_nodes, count in ((moving, len(values)), (is_used & ~moving, 1)):
             chosen = np.flatnonzero(chosen_nodes)
             if not len(chosen):
@@ -342,14 +345,15 @@ def _add_channels(
 class _Morphed:
     """Adds meshes with a morph target per frame; the targets are written last, frame by frame."""
 
-    name, facts = "morphs", {}
+    name = "morphs"
+    facts: JsonMapping = {}
 
     def __init__(self, motion: Motion, surface: Surface):
         self._motion, self._surface = motion, surface
         self.max_error = 0.0
 
     def add(
-        self, glb: Glb, root: int, transform: dict[str, Any], parts: list[GltfMesh | GltfCopies], report: Progress
+        self, glb: Glb, root: int, transform: JsonObject, parts: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
         shapes, meshes, channels, movers = [], [], [], []
         for shape in parts:
@@ -371,29 +375,26 @@ class _Morphed:
         least, self.max_error = self.max_error, UNKNOWN_BOUND
         return self._targets(glb, shapes, bounds, least, report)
 
-    def _add_targets(
-        self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int
-    ) -> list[list[dict[str, Any]]]:
+    def _add_targets(self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int) -> list[list[JsonObject]]:
         """Return the accessors of positions, by frame and mesh, whose bounds are not known yet."""
-        accessors, place = [], 0
+        accessors: list[list[JsonObject]] = []
+        place = 0
         for _ in range(self._motion.frame_count):
             accessors.append([])
             for mesh, shape in zip(meshes, shapes):
-                bounds = {"min": [UNKNOWN_BOUND] * 3, "max": [UNKNOWN_BOUND] * 3}
                 target = {}
-                for key, more in (("POSITION", bounds), (NORMAL, {})):
-                    if key == NORMAL and NORMAL not in shape.attributes:
-                        continue
-                    kind = np.dtype(np.float32), len(shape.source), 3
-                    target[key] = glb.accessor(view, *kind, byteOffset=place, **more)
+                for key in ("POSITION", *((NORMAL,) if NORMAL in shape.attributes else ())):
+                    target[key] = glb.accessor(view, np.dtype(np.float32), len(shape.source), 3, byteOffset=place)
                     place += 12 * len(shape.source)
+                bounds = {"min": [UNKNOWN_BOUND] * 3, "max": [UNKNOWN_BOUND] * 3}
+                glb.json["accessors"][target["POSITION"]] |= bounds
                 accessors[-1].append(glb.json["accessors"][target["POSITION"]])
                 for primitive in glb.json["meshes"][mesh]["primitives"]:
                     primitive.setdefault("targets", []).append(target)
         return accessors
 
     def _targets(
-        self, glb: Glb, shapes: list[GltfMesh], accessors: list[list[dict]], least: float, report: Progress
+        self, glb: Glb, shapes: list[GltfMesh], accessors: list[list[JsonObject]], least: float, report: Progress
     ) -> Iterator[bytes]:
         rest = np.asarray(self._motion.rest).astype(np.float32)
         normals = MovingNormals(self._surface, rest)

@@ -31,6 +31,7 @@ from athcodec.motion.protocol import Motion
 from athcodec.motion.units import metres_of
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN
 from athcodec.sources.timing import whole
+from athcodec.untyped import JsonMapping, JsonObject
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -50,8 +51,8 @@ SEMANTICS = {"uv": ("TEXCOORD_0", (2,)), "normals": (NORMAL, (3,)), "colors": (C
 class Glb:
     """A file that is being made: `json` is its structure, arrays are added to its binary chunk."""
 
-    def __init__(self, extras: Mapping[str, Any]):
-        self.json: dict[str, Any] = {
+    def __init__(self, extras: JsonMapping):
+        self.json: JsonObject = {
             "asset": {"version": "2.0", "generator": f"athcodec {__version__}", "extras": dict(extras)},
             "scene": 0,
             "scenes": [{"nodes": []}],
@@ -92,7 +93,7 @@ class Glb:
     def array(self, values: np.ndarray, bounds: bool = False, normalized: bool = False, **view: Any) -> int:
         """Return an accessor of its own for (count, width) values; those of vertices are padded to whole words."""
         values = np.ascontiguousarray(values.reshape(len(values), -1))
-        more: dict[str, Any] = {"normalized": True} if normalized else {}
+        more: JsonObject = {"normalized": True} if normalized else {}
         if bounds:
             more |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         count, width = values.shape
@@ -119,8 +120,8 @@ class Glb:
         self._length += len(padding)
 
     def write(self, out: BinaryIO, later: Iterable[bytes] = ()) -> None:
-        """The whole file. `later` are the bytes of the views that were made last, of whole words; accessors' bounds may
-        still be filled in place of UNKNOWN_BOUND while they come."""
+        """Write the whole file. `later` are the bytes of the views that were made last, of whole words; accessors'
+        bounds may still be filled in place of UNKNOWN_BOUND while they come."""
         self.json["buffers"] = [{"byteLength": self._length}]
         room = len(self._text())
         room += -room % 4
@@ -187,7 +188,8 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
     values = {key: array[source] for key, array in per_vertex.items()}
     values |= {key: _from_corners(array, corner_place, len(source)) for key, array in per_corner.items()}
     edges = np.asarray(motion.edges, np.int64) if motion.edges is not None else np.zeros((0, 2), np.int64)
-    labels = np.repeat(looks.labels, np.maximum(np.asarray(faces[0], np.int64) - 2, 0)) if faces is not None else None
+    fans = np.maximum(np.asarray(faces[0], np.int64) - 2, 0) if faces is not None else np.zeros(0, np.int64)
+    labels = np.repeat(looks.labels, fans)
     made, materials = [], list(looks.materials)
     for part_name, start, stop in _objects(motion, name, corner_vertex[triangles], edges):
         rows = np.flatnonzero((source >= start) & (source < stop))
@@ -256,18 +258,18 @@ def add_materials(glb: Glb, meshes: GltfMeshes) -> None:
         glb.json.setdefault("extensionsUsed", []).append(UNLIT)
 
 
-def material_of(look: Look, has_colours: bool) -> dict[str, Any]:
+def material_of(look: Look, has_colours: bool) -> JsonObject:
     """Return the material of glTF; has_colours: of vertices that have colours."""
     colour = [1.0, 1.0, 1.0, 1.0] if has_colours else [*look.colour, 1.0]
     surface = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": ROUGHNESS}
-    material: dict[str, Any] = {"name": look.name, "pbrMetallicRoughness": surface}
+    material: JsonObject = {"name": look.name, "pbrMetallicRoughness": surface}
     material |= {"doubleSided": True} if look.is_two_sided else {}
     material |= {} if look.is_lit else {"extensions": {UNLIT: {}}}
     return material | {"extras": {OWN: {GUESSED: [MEMBERS[field] for field in look.guessed]}}}
 
 
-def root_transform(motion: Motion) -> dict[str, Any]:
-    """Translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
+def root_transform(motion: Motion) -> JsonObject:
+    """Return translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
     metadata = motion.metadata
     metres = metres_of(metadata) or 1.0
     axis = str(metadata.get("up_axis", "y")).lower()
@@ -290,7 +292,7 @@ class Take:
     stop: int
     is_loop: bool
     times: np.ndarray
-    extras: dict[str, Any]
+    extras: JsonObject
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """Return the keys of values (T, ...), one per frame of the motion."""
@@ -324,19 +326,19 @@ def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
     return Take(clip_range.name or "motion", start, stop, is_loop, times, extras)
 
 
-def clock(motion: Motion) -> dict[str, Any]:
-    """Frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
+def clock(motion: Motion) -> JsonObject:
+    """Return frame rate and first frame of a motion that is a single clip; unit and axis of the vertices."""
     scene = {key: str(motion.metadata[key]) for key in ("unit", "up_axis") if motion.metadata.get(key)}
     return scene if len(motion.clip_ranges) > 1 else _clock(motion.metadata, motion.time, motion.fps) | scene
 
 
-def _clock(metadata: Mapping[str, Any], time: np.ndarray, fps: float) -> dict[str, Any]:
-    """Frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
+def _clock(metadata: JsonMapping, time: np.ndarray, fps: float) -> JsonObject:
+    """Return frame rate, `fps` where nothing is said, and number of the first frame in the tool that made the clip."""
     fps = stated_fps(metadata) or fps
     return {"fps": fps, "start_frame": whole(start_frame_of(metadata) + round(float(time[0]) * fps, 6))}
 
 
-def branch_extras(motion: Motion) -> dict[str, Any]:
+def branch_extras(motion: Motion) -> JsonObject:
     """Return the extras that describe the branches of a motion."""
     parent = getattr(motion, "branch_parent", None)
     return {} if parent is None else {"branch_parent": np.asarray(parent).tolist()}
@@ -351,8 +353,8 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
     return np.stack([first, second, second + 1], axis=1)
 
 
-def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[dict[str, Any], dict[str, Any], list[str]]:
-    """By semantic: (rows, width) values per vertex, and per corner; and the names of the rest."""
+def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[JsonObject, JsonObject, list[str]]:
+    """Return by semantic (rows, width) values per vertex, and per corner; and the names of the rest."""
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
     arrays = dict(motion.attributes)
@@ -403,7 +405,8 @@ def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
 
 
 def _as_component(values: np.ndarray) -> np.ndarray | None:
-    """In a type that attributes may have and that holds all values; float64 is rounded. None where there is none."""
+    """Return values in a type that attributes may have and that holds all values; float64 is rounded. None where there
+    is none."""
     if values.dtype.kind == "f":
         with np.errstate(over="ignore"):
             rounded = values.astype(np.float32)

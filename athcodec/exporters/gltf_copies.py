@@ -21,6 +21,7 @@ from athcodec.exporters.gltf_build import NORMAL, Glb, GltfMesh, add_mesh
 from athcodec.exporters.gltf_joints import SLACK, hold
 from athcodec.exporters.scene_objects import SceneObject, lost_copies, objects_of
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 INSTANCING = "EXT_mesh_gpu_instancing"
 PATHS = ("translation", "rotation", "scale")
@@ -60,7 +61,7 @@ class GltfCopies:
     lost: list[str]
     names: list[str] | None = None
 
-    def add(self, glb: Glb, parent: int | None, transform: dict[str, Any]) -> list[Movers]:
+    def add(self, glb: Glb, parent: int | None, transform: JsonObject) -> list[Movers]:
         """Return the mesh and its nodes, below one with a transform; those that move."""
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
@@ -78,7 +79,7 @@ class GltfCopies:
             nodes.append(glb.node(above, name=name, mesh=mesh, **at, **({"extras": extras} if extras else {})))
         return [] if is_still else [Movers(nodes, self.copies.rest, poses)]
 
-    def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: dict[str, Any]) -> None:
+    def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: JsonObject) -> None:
         poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
         parts = {path.upper(): glb.array(pose) for path, pose in zip(PATHS, poses)}
         parts |= {key: glb.array(values) for key, values in self.copy_attributes.items()}

@@ -14,14 +14,15 @@ from athcodec.errors import ClipError
 from athcodec.exporters.gltf_build import COMPONENTS, TYPES, VERTICES
 from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.motion import MAGIC, extension_of
+from athcodec.untyped import JsonObject, JsonValue
 
 ALIGNMENT = 8  # Bytes to which the parts of the remaining buffer are aligned.
 INSTANCES = "EXT_mesh_gpu_instancing"
 DRACO = "KHR_draco_mesh_compression"
-Reference = tuple[str, Any, Any]
+Reference = tuple[str, JsonValue, JsonValue]
 
 
-def _references(gltf: dict[str, Any]) -> Iterator[Reference]:
+def _references(gltf: JsonObject) -> Iterator[Reference]:
     """Yield every index of the file's arrays into each other, but those of meshes, animations and what these do not
     need."""
     for scene in gltf.get("scenes", ()):
@@ -58,23 +59,23 @@ def _references(gltf: dict[str, Any]) -> Iterator[Reference]:
         yield from _entry("bufferViews", motion, "bufferView")
 
 
-def _entry(kind: str, holder: dict[str, Any], key: str) -> Iterator[Reference]:
+def _entry(kind: str, holder: JsonObject, key: str) -> Iterator[Reference]:
     """Yield the reference that an object holds under a key, if it has one."""
     if key in holder:
         yield kind, holder, key
 
 
-def _all(kind: str, holder: dict[str, Any], keys: Any = None) -> Iterator[Reference]:
+def _all(kind: str, holder: JsonObject, keys: Any = None) -> Iterator[Reference]:
     for key in list(holder) if keys is None else keys:
         yield from _entry(kind, holder, key)
 
 
-def _each(kind: str, holder: dict[str, Any], key: str) -> Iterator[Reference]:
+def _each(kind: str, holder: JsonObject, key: str) -> Iterator[Reference]:
     for place in range(len(holder.get(key, ()))):
         yield kind, holder[key], place
 
 
-def used_numbers(gltf: dict[str, Any]) -> dict[str, set[int]]:
+def used_numbers(gltf: JsonObject) -> dict[str, set[int]]:
     """Return which entries of each array are referred to."""
     numbers: dict[str, set[int]] = {kind: set() for kind in ("nodes", "skins", "accessors", "bufferViews")}
     for kind, holder, key in _references(gltf):
@@ -82,7 +83,7 @@ def used_numbers(gltf: dict[str, Any]) -> dict[str, set[int]]:
     return numbers
 
 
-def prune(gltf: dict[str, Any], before: dict[str, set[int]], needless: set[int]) -> None:
+def prune(gltf: JsonObject, before: dict[str, set[int]], needless: set[int]) -> None:
     """Remove these nodes, and what was referred to before and is no more."""
     _remove(gltf, "skins", before["skins"] - used_numbers(gltf)["skins"])
     for holder, key in [(scene, "nodes") for scene in gltf.get("scenes", ())] + [
@@ -97,7 +98,7 @@ def prune(gltf: dict[str, Any], before: dict[str, set[int]], needless: set[int])
         _remove(gltf, kind, before[kind] - used_numbers(gltf)[kind])
 
 
-def _remove(gltf: dict[str, Any], kind: str, dead: set[int]) -> None:
+def _remove(gltf: JsonObject, kind: str, dead: set[int]) -> None:
     """Remove entries of an array to which nothing that remains refers; the others get new numbers."""
     if not dead:
         return
@@ -156,7 +157,7 @@ class Binary:
         view |= {} if target is None else {"target": target}
         return index
 
-    def packed(self, gltf: dict[str, Any]) -> bytes:
+    def packed(self, gltf: JsonObject) -> bytes:
         """Return the bytes without those that only views had which are gone; the views' offsets become those in it."""
         data = bytes(self._old).ljust(self._start, b"\0") + bytes(self._added)
         needless = np.zeros(len(data) + 1, bool)
@@ -177,7 +178,7 @@ class Binary:
         return b"".join(data[start:stop] for start, stop in pieces)
 
 
-def _byte_ranges(views: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def _byte_ranges(views: list[JsonObject]) -> Iterator[JsonObject]:
     """Return the entries with byteOffset and byteLength in the binary chunk: views, and what decompresses to them."""
     for view in views:
         for holder in (view, *((view.get("extensions") or {}).get(name) for name in MESHOPT)):
@@ -185,7 +186,7 @@ def _byte_ranges(views: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
                 yield holder
 
 
-def glb_bytes(gltf: dict[str, Any], data: bytes) -> bytes:
+def glb_bytes(gltf: JsonObject, data: bytes) -> bytes:
     gltf.setdefault("buffers", [{}])[0]["byteLength"] = len(data)
     data = data + bytes(-len(data) % 4)
     text = json.dumps(gltf, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()

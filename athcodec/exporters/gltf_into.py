@@ -14,7 +14,6 @@ import os
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -48,6 +47,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.gltf import read_moving
 from athcodec.sources.gltf_nodes import GltfNode
 from athcodec.sources.gltf_scene import POINTER, Target, target_of
+from athcodec.untyped import JsonObject
 
 # Share of duplicate vertices from which the motion stores each once and meshes refer to it by index.
 SHARE_OF_TWINS = 1 / 8
@@ -129,7 +129,7 @@ class Into:
         if not self._file.unchanged():
             raise ClipError("got another file than when it was opened, expected the same")
 
-    def _motion(self, view: int, ath: bytes, animations: list[dict[str, Any]]) -> dict[str, Any]:
+    def _motion(self, view: int, ath: bytes, animations: list[JsonObject]) -> JsonObject:
         """Return clips begin when their animations' first keys do, and keep what these say in extras."""
         extras = {animation.get("name"): animation.get("extras") for animation in animations}
         clips = []
@@ -172,7 +172,7 @@ class Into:
         self._needless = _needless_nodes(gltf, freed)
         _drop_channels(gltf, moving, meshes, self._needless)
 
-    def _replace_part(self, part: GltfNode, mesh: dict[str, Any] | None, binary: Binary) -> None:
+    def _replace_part(self, part: GltfNode, mesh: JsonObject | None, binary: Binary) -> None:
         primitives = part.primitives
         if mesh is not None:
             originals = self._json["meshes"][part.mesh]["primitives"]
@@ -207,13 +207,13 @@ class Into:
         shown = self._json["meshes"][part.mesh] if mesh is None else mesh
         self._dress(part, shown["primitives"], list(zip(primitives, faces)), binary)
 
-    def _faces(self, part: GltfNode, primitive: dict[str, Any]) -> np.ndarray:
+    def _faces(self, part: GltfNode, primitive: JsonObject) -> np.ndarray:
         """Return the triangles of a primitive, (F, 3), as they are to face in the motion's space."""
         rows = triangles(self._file, primitive, part.count)
         return rows[:, ::-1] if part.mirrored.any() and not self._keep else rows
 
     def _dress(
-        self, part: GltfNode, siblings: list[dict], drawn: list[tuple[dict, np.ndarray]], binary: Binary
+        self, part: GltfNode, siblings: list[JsonObject], drawn: list[tuple[JsonObject, np.ndarray]], binary: Binary
     ) -> None:
         """Give primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
         if all("material" in primitive for primitive, _ in drawn):
@@ -325,8 +325,9 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
         written.write(glb_bytes(gltf, data))
 
 
-def _remove_motions(gltf: dict[str, Any], numbers: set[int]) -> None:
-    """Motions of the file, and with the last of them the extension; primitives that others move name these anew."""
+def _remove_motions(gltf: JsonObject, numbers: set[int]) -> None:
+    """Remove motions of the file, and with the last of them the extension; primitives that others move name these
+    anew."""
     extension = gltf["extensions"][EXTENSION]
     kept = [number for number in range(len(extension["motions"])) if number not in numbers]
     if not kept:
@@ -361,14 +362,16 @@ def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
         return written.tell()
 
 
-def _has_normals(primitive: dict[str, Any]) -> bool:
+def _has_normals(primitive: JsonObject) -> bool:
     return NORMAL in primitive["attributes"]
 
 
 def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion: ClipView) -> None:
-    """A morph target per frame for each primitive that moves, and as many without effect for the others of its mesh."""
+    """Add a morph target per frame for each primitive that moves, and as many without effect for the others of its
+    mesh."""
     gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
-    normals, at_rest = MovingNormals(Surface(*(motion.polygons or ((), ())), rest), rest), {}
+    counts, corners = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
+    normals, at_rest = MovingNormals(Surface(counts, corners, rest), rest), {}
     for primitive, _ in places:
         primitive["targets"] = []
         primitive["attributes"].pop(VERTEX_ATTRIBUTE, None)
@@ -397,7 +400,7 @@ def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion
 
 
 def _morph_nodes(
-    gltf: dict[str, Any], binary: Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, dict]
+    gltf: JsonObject, binary: Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, JsonObject]
 ) -> set[int]:
     """Animate the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
     them before goes. Returns the nodes that nothing needs any more."""
@@ -421,20 +424,20 @@ def _morph_nodes(
     return needless
 
 
-def _animate(
-    gltf: dict[str, Any], name: str, extras: dict[str, Any], sampler: dict[str, int], nodes: list[int]
-) -> None:
+def _animate(gltf: JsonObject, name: str, extras: JsonObject, sampler: dict[str, int], nodes: list[int]) -> None:
     every = gltf.setdefault("animations", [])
     animation = next((one for one in every if one.get("name") == name), None)
     if animation is None:
-        animation = {"name": name, "samplers": [], "channels": []} | ({"extras": extras} if extras else {})
+        animation = {"name": name, "samplers": [], "channels": []}
+        if extras:
+            animation["extras"] = extras
         every.append(animation)
     animation["samplers"].append(sampler)
     number = len(animation["samplers"]) - 1
     animation["channels"] += [{"sampler": number, "target": {"node": node, "path": "weights"}} for node in nodes]
 
 
-def _pop_extension(holder: dict[str, Any]) -> None:
+def _pop_extension(holder: JsonObject) -> None:
     holder["extensions"].pop(EXTENSION)
     if not holder["extensions"]:
         del holder["extensions"]
@@ -489,7 +492,7 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
     )
 
 
-def _drop_channels(gltf: dict[str, Any], moving: set[int], meshes: set[int], needless: set[int]) -> None:
+def _drop_channels(gltf: JsonObject, moving: set[int], meshes: set[int], needless: set[int]) -> None:
     """Remove the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
 
     def stays(target: Target | str) -> bool:
@@ -519,17 +522,17 @@ def _drop_channels(gltf: dict[str, Any], moving: set[int], meshes: set[int], nee
                     del gltf[key]
 
 
-def _has_pointer(channel: dict[str, Any]) -> bool:
+def _has_pointer(channel: JsonObject) -> bool:
     return POINTER in (channel["target"].get("extensions") or {})
 
 
-def _knows_references(gltf: dict[str, Any]) -> bool:
+def _knows_references(gltf: JsonObject) -> bool:
     """Return whether _references lists every index of the file: not where pointers to places in it remain, which are
     text."""
     return all(name.startswith(KNOWN) and name != POINTER for name in gltf.get("extensionsUsed", ()))
 
 
-def _needless_nodes(gltf: dict[str, Any], freed: set[int]) -> set[int]:
+def _needless_nodes(gltf: JsonObject, freed: set[int]) -> set[int]:
     """Return the nodes that moved vertices, those above and those below them, which show nothing, no skin uses, and
     nothing that stays is below."""
     nodes = gltf["nodes"]

@@ -6,7 +6,7 @@ that is written. It writes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,7 +57,7 @@ def fit_joints(
     moving = fit(motion, Placed, fitted, most, lambda done: report(0.7 * done), chosen)
     if moving is None:
         return None
-    parts, poses = moving.parts, [moving.places, *moving.values]
+    parts, poses = moving.parts, (moving.places, *moving.values)
     still = (parts.middle, quaternions(parts.axes), np.ones((len(parts), 3)))
     for start, stop in motion.clip_range_frames:
         hold([pose[start:stop] for pose in poses], still, parts.extent, SLACK * allowed)
@@ -65,14 +65,15 @@ def fit_joints(
     bind[:, :3, :3] = parts.axes.swapaxes(1, 2)
     bind[:, :3, 3] = -np.einsum("kij,ki->kj", parts.axes, parts.middle)
     bind[:, 3, 3] = 1.0
-    joints = Joints(
-        parts.vertex_part(),
-        bind.astype(np.float32),
-        tuple(a.astype(np.float32) for a in still),
-        tuple(pose.astype(np.float32) for pose in poses),
-    )
+    joints = Joints(parts.vertex_part(), bind.astype(np.float32), _singles(still), _singles(poses))
     joints.max_error = _measured(motion, joints, chosen, lambda done: report(0.7 + 0.3 * done))
     return joints
+
+
+def _singles(pose: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a translation, a rotation and a scale in float32."""
+    translation, rotation, scale = (values.astype(np.float32) for values in pose)
+    return translation, rotation, scale
 
 
 def _measured(motion: Motion, joints: Joints, chosen: np.ndarray | None, report: Progress) -> float:
@@ -92,7 +93,7 @@ def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.nd
     rotations and scales (T, K, width), those at rest (K, width), and how far vertices go along the axes (K, 3)."""
     scaled = extent * np.abs(poses[2]).max(axis=0)
     around = np.sqrt((scaled**2).sum(axis=1, keepdims=True) - scaled**2)  # from each axis
-    moves = (
+    moves: tuple[Callable[[np.ndarray, np.ndarray], np.ndarray], ...] = (
         lambda values, constant: values - constant,
         lambda values, constant: _turns(constant, values) * around,
         lambda values, constant: (values - constant) * extent,

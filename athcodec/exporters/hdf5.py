@@ -22,6 +22,7 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.clip import RESERVED_NAMES, check_branches, check_float_dtype, check_time
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import clip_metadata
+from athcodec.untyped import H5Object, JsonMapping, JsonObject, JsonValue
 
 CHUNK_BYTES = 1 << 20
 
@@ -67,7 +68,7 @@ class Hdf5Writer:
         edges: np.ndarray | None = None,
         faces: np.ndarray | None = None,
         attributes: Mapping[str, np.ndarray] | None = None,
-        metadata: Mapping[str, Any] | None = None,
+        metadata: JsonMapping | None = None,
         gzip: bool = False,
     ) -> None:
         dtype, rest = np.dtype(dtype), np.asarray(rest)
@@ -93,7 +94,7 @@ class Hdf5Writer:
         self._frame_count, self._vertex_count = len(time), len(rest)
         self._written, self._gzip = 0, gzip
         self._pending: PendingFile | None = PendingFile(path)
-        self._file: Any = None  # An h5py.File, which has no types.
+        self._file: H5Object = None  # An h5py.File, which has no types.
         self._sink = Sink(self._pending.descriptor, self._pending.path)
         try:
             self._file = h5py.File(self._sink, "w")
@@ -188,11 +189,11 @@ class Hdf5Writer:
                 options = self._compression() if values.ndim and values.size else {}
                 self._file.create_dataset(name, data=values, **options)
 
-    def _write_metadata(self, metadata: Mapping[str, Any]) -> None:
+    def _write_metadata(self, metadata: JsonMapping) -> None:
         for name, value in metadata.items():
             self._file.attrs[name] = _attribute(value)
 
-    def _compression(self) -> dict[str, Any]:
+    def _compression(self) -> JsonObject:
         return {"compression": "gzip", "shuffle": True} if self._gzip else {}
 
 
@@ -285,8 +286,8 @@ def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarra
     return dict(attributes or {})
 
 
-def _attribute(value: Any) -> Any:
-    """`value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
+def _attribute(value: JsonValue) -> JsonValue:
+    """Return `value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
     text.
     """
     if value is None:

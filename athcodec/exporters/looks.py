@@ -75,8 +75,8 @@ def looks_of_mesh(surface: Surface, name: str) -> Looks:
 
 
 def _looks(surface: Surface, labels: np.ndarray, names: list[str], objects: list[tuple[str, slice, bool]]) -> Looks:
-    """labels (F,): the names of the faces' materials, -1 for none; objects: the name of each, its faces, and whether it
-    states that these are seen from both sides."""
+    """Return the looks. labels (F,): the names of the faces' materials, -1 for none; objects: the name of each, its
+    faces, and whether it states that these are seen from both sides."""
     kinds = np.where(surface.is_open, KINDS.index(LEAVES), KINDS.index(STEMS))
     states_sides = np.zeros(len(labels), bool)
     for object_name, rows, is_stated in objects:

@@ -7,8 +7,6 @@ starts there is at 1 / fps seconds, as the tools count.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from athcodec.errors import ClipError
@@ -18,9 +16,10 @@ from athcodec.exporters.timing import frame_rate_of, start_frame_of
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.mdd import HEADER
+from athcodec.untyped import JsonObject
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
     float32 tells apart, OSError where nothing can be written."""
     check_counts(motion)

@@ -9,13 +9,14 @@ float32, seventeen for float64. Left out: normals, attributes that the format ha
 from __future__ import annotations
 
 import json
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
 from athcodec.exporters.scene_objects import face_materials, names_and_scene
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN
+from athcodec.untyped import JsonObject
 
 COORDINATE_FORMATS = {4: "v %.9g %.9g %.9g\n", 8: "v %.16e %.16e %.16e\n"}
 BLOCK_ROWS = 1 << 14
@@ -33,7 +34,8 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def domain_of(motion: Motion, name: str) -> str:
-    """ "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not vertices."""
+    """Return "vertex", or what metadata["domains"] says of an attribute; "" where nothing says and rows are not
+    vertices."""
     domains = motion.metadata.get("domains")
     domain = domains.get(name) if isinstance(domains, dict) else None
     values = motion.attributes[name]
@@ -42,14 +44,19 @@ def domain_of(motion: Motion, name: str) -> str:
 
 def has_mesh(motion: Motion) -> bool:
     """Return whether there are faces or edges to write."""
-    return _count_polygons(motion) > 0 or (motion.edges is not None and len(motion.edges) > 0)
+    return len(_polygons(motion)[0]) > 0 or (motion.edges is not None and len(motion.edges) > 0)
 
 
 def part_spans(motion: Motion) -> list[tuple[str, int, int]]:
     """Return (name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
-    whole = isinstance(names, list) and counts is not None and len(counts) == len(names)
-    if not whole or int(np.sum(counts)) != motion.vertex_count or np.min(counts, initial=0) < 0:
+    if (
+        not isinstance(names, list)
+        or counts is None
+        or len(counts) != len(names)
+        or int(np.sum(counts)) != motion.vertex_count
+        or np.min(counts, initial=0) < 0
+    ):
         name = names[0] if isinstance(names, list) and len(names) == 1 else "plant"
         return [(_one_line(name), 0, motion.vertex_count)]
     ends = np.cumsum(counts, dtype=np.int64)
@@ -60,8 +67,9 @@ def _one_line(name: object) -> str:
     return " ".join(str(name).split()) or "plant"
 
 
-def _count_polygons(motion: Motion) -> int:
-    return 0 if motion.polygons is None else len(motion.polygons[0])
+def _polygons(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return corners per face (F,), and the vertex of each corner (C,); both are empty if there are no faces."""
+    return motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
@@ -140,9 +148,9 @@ def _obj_tail(motion: Motion) -> list[str]:
 
 
 def _first_corners(motion: Motion) -> np.ndarray | None:
-    if not _count_polygons(motion):
+    counts, corners = _polygons(motion)
+    if not len(counts):
         return None
-    counts, corners = motion.polygons
     starts = np.cumsum(counts, dtype=np.int64) - counts
     return np.asarray(corners, np.int64)[np.minimum(starts, len(corners) - 1)]
 
@@ -155,13 +163,11 @@ def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | No
 
 def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
     """Return a line per face, behind the lines of the group and the material that it is the first of."""
-    if not _count_polygons(motion):
-        return []
-    counts, corners = motion.polygons
-    corners = (np.asarray(corners, np.int64) + 1).tolist()
+    counts, corners = _polygons(motion)
+    vertices = (np.asarray(corners, np.int64) + 1).tolist()
     words = [
         f"{vertex}/{place if per_corner else vertex}" if has_uv else f"{vertex}"
-        for place, vertex in enumerate(corners, 1)
+        for place, vertex in enumerate(vertices, 1)
     ]
     ends = np.cumsum(counts, dtype=np.int64).tolist()
     lines = [f"f {' '.join(words[end - count : end])}\n" for end, count in zip(ends, np.asarray(counts).tolist())]
@@ -201,7 +207,7 @@ class PlyWriter:
             "format binary_little_endian 1.0",
             f"comment {OWN} {json.dumps(_ply_scene(motion))}",
             f"element vertex {motion.vertex_count}",
-            *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name in self._rows.dtype.names),
+            *(f"property {_PLY_NAMES[self._rows.dtype[name].str[1:]]} {name}" for name, _ in fields),
             *face_header,
             *(edge_header if edge_count else []),
             "end_header",
@@ -222,6 +228,7 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
     for name, values in motion.attributes.items():
         if domain_of(motion, name) != "vertex" or len(values) != motion.vertex_count or name == "normals":
             continue
+        names: tuple[str, ...]
         if name == "uv" and values.ndim == 2 and values.shape[1] == 2:
             names = ("s", "t")
         elif name == "colors" and values.ndim == 2 and values.shape[1] in (3, 4):
@@ -235,7 +242,7 @@ def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
     return columns
 
 
-def _ply_scene(motion: Motion) -> dict[str, Any]:
+def _ply_scene(motion: Motion) -> JsonObject:
     """Return what the comment of a PLY file holds. Materials of faces are runs: meshio does not read a property of
     faces beside their corners."""
     scene = names_and_scene(motion)
@@ -247,30 +254,30 @@ def _ply_scene(motion: Motion) -> dict[str, Any]:
 
 
 def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
-    count = _count_polygons(motion)
-    if not count:
+    counts, corners = _polygons(motion)
+    if not len(counts):
         return [], b""
-    counts, corners = motion.polygons
     uv, per_corner = _corner_uv(motion)
     counted = "uint" if max(counts) > 127 else "uchar"
-    header = [f"element face {count}", f"property list {counted} int vertex_indices"]
+    header = [f"element face {len(counts)}", f"property list {counted} int vertex_indices"]
     if per_corner:
         header.append(f"property list {counted} float texcoord")
     corners, number = np.asarray(corners, "<i4"), "<u4" if counted == "uint" else "u1"
     ends = np.cumsum(counts, dtype=np.int64)
+    uv = uv if per_corner else None
     if (np.asarray(counts) == counts[0]).all():
-        return header, _ply_rows(corners, uv if per_corner else None, int(counts[0]), number)
+        return header, _ply_rows(corners, uv, int(counts[0]), number)
     return header, b"".join(
-        _ply_rows(corners[end - size : end], uv[end - size : end] if per_corner else None, int(size), number)
+        _ply_rows(corners[end - size : end], None if uv is None else uv[end - size : end], int(size), number)
         for size, end in zip(np.asarray(counts).tolist(), ends.tolist())
     )
 
 
 def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:
     """Return faces of `size` corners each."""
-    fields = [("count", number), ("corners", "<i4", (size,))]
+    fields: list[tuple[str, str, tuple[int, ...]]] = [("count", number, ()), ("corners", "<i4", (size,))]
     if uv is not None:
-        fields += [("numbers", number), ("uv", "<f4", (2 * size,))]
+        fields += [("numbers", number, ()), ("uv", "<f4", (2 * size,))]
     rows = np.zeros(len(corners) // size if size else 1, fields)
     rows["count"], rows["corners"] = size, corners.reshape(-1, size) if size else 0
     if uv is not None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from os import fspath
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -24,12 +23,13 @@ from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json,
 from athcodec.files.atomic import new_folder
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 NARROWEST = 64
 HIGHEST = 16384
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says of it. options.half: 16
     bits in place of float.
 

@@ -12,7 +12,7 @@ import os
 from contextlib import suppress
 from os import fspath
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -25,14 +25,16 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
 from athcodec.motion.protocol import Motion
-from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.mesh import Mesh
+from athcodec.sources.mesh_files import read_mesh
 from athcodec.sources.pc2 import HEADER, MAGIC
+from athcodec.untyped import JsonObject
 
 STEP_TOLERANCE = 1e-4
 LARGEST_COUNT = 2**31 - 1
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write the cache and its mesh. Raises ClipError where the times are uneven or there is another mesh beside it,
     OSError where nothing can be written."""
     header = HEADER.pack(MAGIC, 1, *_counted(motion, *_start_and_step(motion)))
@@ -64,7 +66,7 @@ def _start_and_step(motion: Motion) -> tuple[float, float]:
     return float(numbers[0]), float(round(step, 6))
 
 
-def write_cache(motion: Motion, path: FilePath, header: bytes, dtype: str, report: Progress) -> dict[str, Any]:
+def write_cache(motion: Motion, path: FilePath, header: bytes, dtype: str, report: Progress) -> JsonObject:
     """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there; return what
     they have no place for."""
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
@@ -80,7 +82,7 @@ def write_cache(motion: Motion, path: FilePath, header: bytes, dtype: str, repor
 
 def _write_frames(motion: Motion, file: BinaryIO, dtype: str, report: Progress) -> None:
     for start, frames in motion.blocks():
-        file.write(np.ascontiguousarray(frames, dtype))
+        file.write(np.ascontiguousarray(frames, dtype).data)
         report((start + len(frames)) / motion.frame_count)
 
 
@@ -91,7 +93,7 @@ def _mesh_to_write(motion: Motion, target: Path) -> str:
     mesh_path = target.with_suffix(".obj")
     if not mesh_path.exists():
         return mesh_path.name
-    topology = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, motion.attributes)
+    topology = Mesh(np.empty((motion.vertex_count, 0)), motion.faces, motion.edges, dict(motion.attributes))
     different = "got no OBJ mesh"
     with suppress(ClipError):
         different = topology.same_topology(read_mesh(mesh_path, Budget()))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from typing import Any
+from typing import Protocol, cast
 
 import numpy as np
 
@@ -16,7 +16,14 @@ from athcodec.motion.frames import is_far
 from athcodec.motion.protocol import Motion
 
 
-def in_singles(motion: Motion, can_move: bool) -> Any:
+class SinglesMotion(Motion, Protocol):
+    """A motion about a place, as `in_singles` gives it."""
+
+    origin: np.ndarray
+    rounding: float
+
+
+def in_singles(motion: Motion, can_move: bool) -> SinglesMotion:
     """Return a float64 motion about `origin` (3,), which is 0 unless the format can hold it and float32 needs it.
 
     Its `rounding` is the largest distance by which float32 moves a vertex in the blocks that were read so far.
@@ -26,20 +33,21 @@ def in_singles(motion: Motion, can_move: bool) -> Any:
     origin = place.astype(np.float32).astype(np.float64)
 
     class InSingles(type(motion)):  # type: ignore[misc]
+        rounding: float
         rest = property(lambda self: motion.rest - origin)
         source_rest = property(lambda self: getattr(motion, "source_rest", motion.rest))
 
         def block(self, start: int, stop: int) -> np.ndarray:
             return motion.block(start, stop) - origin
 
-        def blocks(self, *args: Any) -> Iterator[tuple[int, np.ndarray]]:
+        def blocks(self, *args: bool) -> Iterator[tuple[int, np.ndarray]]:
             for start, block in motion.blocks(*args):
                 points = block - origin
                 away = np.linalg.norm(points - points.astype(np.float32), axis=-1)
                 self.rounding = max(self.rounding, float(away.max(initial=0.0)))
                 yield start, points
 
-    moved = copy.copy(motion)
+    moved = cast(SinglesMotion, copy.copy(motion))
     moved.__class__, moved.origin, moved.rounding = InSingles, origin, 0.0
     return moved
 

@@ -15,6 +15,7 @@ A joint lies where its share of the stem begins and has the world's axes in the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from athcodec.exporters.scene_objects import distinct
 from athcodec.motion.algebra import nearest_rotations
 from athcodec.motion.branches.finding import find_branches
 from athcodec.motion.branches.result import with_branches
+from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import quaternions, rotation_matrices
@@ -70,9 +72,9 @@ class _Parts:
         for number in np.argsort(-off, kind="stable").tolist():
             if off[number] <= max(allowed, WORST * off.max()) or left <= 0:
                 break
-            before = max(rows[number][0][2], 1)
-            rows[number] = _cut(hierarchy, *rows[number][0], off[number] / max(allowed, 1e-30), left)
-            left -= sum(max(chain, 1) for _, _, chain in rows[number]) - before
+            branch, stop, chain = rows[number][0]
+            rows[number] = _cut(hierarchy, branch, stop, chain, off[number] / max(allowed, 1e-30), left)
+            left -= sum(max(each, 1) for _, _, each in rows[number]) - max(chain, 1)
         return _Parts(*np.array([part for row in rows for part in row], np.int64).reshape(-1, 3).T)
 
 
@@ -118,7 +120,10 @@ def hierarchy_to_rig(motion: Motion) -> Hierarchy:
     """Return the branches of a motion, or those that are found where it has none."""
     if isinstance(motion, ClipView):
         return motion.decoder.file.hierarchy
-    return hierarchy_of(motion if motion.has_branches else with_branches(motion, find_branches(motion)))
+    if motion.branch_parent is None:
+        clip = cast(MotionClip, motion)  # Only a clip in memory can lack branches: a file has them.
+        motion = with_branches(clip, find_branches(clip))
+    return hierarchy_of(motion)
 
 
 def _along(points: np.ndarray) -> np.ndarray:
@@ -198,8 +203,8 @@ class _Bones:
         return parent
 
     def fitted(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that they
-        leave at each vertex, (N,)."""
+        """Return rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that
+        they leave at each vertex, (N,)."""
         turn = np.tile(np.eye(3), (len(frames), self.count, 1, 1))
         shift = np.zeros((len(frames), self.count, 3))
         for side in range(2):
@@ -217,8 +222,8 @@ class _Bones:
         return placed * self.weight[:, side, None]
 
     def _fit(self, side: int, target: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> None:
-        """The best rotations and translations of joints of even or odd place, whose weighted places are to be `target`,
-        (T, N, 3)."""
+        """Set the best rotations and translations of joints of even or odd place, whose weighted places are to be
+        `target`, (T, N, 3)."""
         rows, starts, bones = self._sides[side]
         if not len(rows):
             return

@@ -9,7 +9,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -17,11 +16,14 @@ from athcodec.exporters.scene_objects import SceneObject, objects_of
 from athcodec.exporters.timing import frame_rate_of
 from athcodec.motion.frames import Frames
 from athcodec.motion.presence import PRESENCE, stated_presence
+from athcodec.motion.protocol import Motion
+
+Sample = tuple[int, *tuple[np.ndarray, ...]]  # The number of a frame, its positions, and velocities if it has them.
 
 # ---- positions between frames ----
 
 
-def with_samples(motion: Any, samples: int) -> Any:
+def with_samples(motion: Motion, samples: int) -> Motion:
     """Return a motion of one clip with so many samples for every frame interval, the first of which is the frame.
 
     A loop has samples in the interval from its last frame to its first one too. Objects that appear or vanish in an
@@ -69,8 +71,9 @@ def with_samples(motion: Any, samples: int) -> Any:
             after = (frame + 1) % frame_count
             return between(frame, here, motion.block(after, after + 1)[0], some)
 
-        def blocks(self, *_: Any) -> Iterator[tuple[int, np.ndarray]]:
-            first = before = None
+        def blocks(self, *_: object) -> Iterator[tuple[int, np.ndarray]]:
+            first: np.ndarray | None = None
+            before: np.ndarray | None = None
             for start, block in motion.blocks():
                 for frame, here in enumerate(block, start):
                     if before is None:
@@ -79,7 +82,7 @@ def with_samples(motion: Any, samples: int) -> Any:
                     else:
                         yield samples * (frame - 1) + 1, between(frame - 1, before, here, range(1, samples + 1))
                     before = here
-            if is_loop:
+            if is_loop and before is not None and first is not None:
                 yield count - samples + 1, between(frame_count - 1, before, first, range(1, samples))
 
     sampled = copy.copy(motion)
@@ -87,11 +90,11 @@ def with_samples(motion: Any, samples: int) -> Any:
     return sampled
 
 
-def _is_loop(motion: Any) -> bool:
+def _is_loop(motion: Motion) -> bool:
     return len(motion.clip_ranges) == 1 and motion.clip_ranges[0].loop and motion.frame_count > 1
 
 
-def _frame_time(motion: Any) -> float:
+def _frame_time(motion: Motion) -> float:
     """Return the mean time of a frame in seconds, after which the first frame of a loop follows its last."""
     return float(motion.time[-1] - motion.time[0]) / (motion.frame_count - 1)
 
@@ -100,24 +103,24 @@ class _Presence:
     """Which vertices are there in both of two frames, or in neither."""
 
     def __init__(self, objects: Sequence[SceneObject], vertex_count: int):
-        self._hidden = [obj for obj in objects if obj.shown is not None]
+        self._hidden = [(obj, obj.shown) for obj in objects if obj.shown is not None]
         self._vertex_count = vertex_count
 
     def joined(self, frame: int, other: int) -> np.ndarray | None:
         """Return (N,) bool, or None if it is so for all vertices."""
-        changed = [obj for obj in self._hidden if (obj.shown[frame] != obj.shown[other]).any()]
+        changed = [(obj, shown) for obj, shown in self._hidden if (shown[frame] != shown[other]).any()]
         if not changed:
             return None
         joined = np.ones(self._vertex_count, bool)
-        for obj in changed:
-            joined[obj.vertices] = np.repeat(obj.shown[frame] == obj.shown[other], obj.count // obj.shown.shape[1])
+        for obj, shown in changed:
+            joined[obj.vertices] = np.repeat(shown[frame] == shown[other], obj.count // shown.shape[1])
         return joined
 
 
 # ---- velocities ----
 
 
-def samples_of(motion: Any, objects: Sequence[SceneObject], has_velocities: bool) -> Iterator[tuple[Any, ...]]:
+def samples_of(motion: Motion, objects: Sequence[SceneObject], has_velocities: bool) -> Iterator[Sample]:
     """Yield the number of each frame and its positions, (N, 3) float32; and its velocities in lengths per second,
     (N, 3) float32, if `has_velocities`.
 
@@ -125,12 +128,13 @@ def samples_of(motion: Any, objects: Sequence[SceneObject], has_velocities: bool
     object appears or vanishes, they are differences from the only neighbour; without any they are 0.
     """
     frames = ((start + row, here) for start, block in motion.blocks() for row, here in enumerate(block))
-    moving = _with_velocities(motion, objects, frames) if has_velocities else frames
-    yield from ((frame, *(each.astype(np.float32, copy=False) for each in values)) for frame, *values in moving)
+    moving: Iterator[Sample] = _with_velocities(motion, objects, frames) if has_velocities else frames
+    for frame, *arrays in moving:
+        yield frame, *(each.astype(np.float32, copy=False) for each in arrays)
 
 
 def _with_velocities(
-    motion: Any, objects: Sequence[SceneObject], frames: Iterator[tuple[int, np.ndarray]]
+    motion: Motion, objects: Sequence[SceneObject], frames: Iterator[tuple[int, np.ndarray]]
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
     """Yield frames with their velocities, each when the next one has come."""
     presence, steps, last = _Presence(objects, motion.vertex_count), _steps(motion), motion.frame_count - 1
@@ -153,7 +157,7 @@ def _with_velocities(
 
 
 def velocities_of_copies(
-    motion: Any, shown: np.ndarray | None, places: np.ndarray, turns: np.ndarray
+    motion: Motion, shown: np.ndarray | None, places: np.ndarray, turns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the velocities of k copies that places (T, k, 3) and quaternions (T, k, 4) move.
 
@@ -171,13 +175,13 @@ def velocities_of_copies(
     return velocities[0], velocities[1]
 
 
-def _steps(motion: Any) -> np.ndarray:
+def _steps(motion: Motion) -> np.ndarray:
     """Return (T,) the seconds that each frame follows the one before; of the first frame those that it follows the last
     one of a loop, else NaN."""
     return np.append(_frame_time(motion) if _is_loop(motion) else np.nan, np.diff(motion.time))
 
 
-def _velocity(arriving: np.ndarray, leaving: np.ndarray, before: Any, after: Any) -> np.ndarray:
+def _velocity(arriving: np.ndarray, leaving: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return velocities, float32, at the middle of three times from those before and behind, whose steps may differ.
 
     It is the slope of the parabola through the three. A velocity that is NaN does not count; 0 if both are.

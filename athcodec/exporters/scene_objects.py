@@ -16,6 +16,7 @@ from athcodec.motion.joining import OWN as CLIPS
 from athcodec.motion.presence import PRESENCE, presence_of_parts, stated_presence
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, SCENE_KEYS, SCHEME, ArrayDescriptor
+from athcodec.untyped import JsonObject, JsonValue
 
 # kept by the formats themselves, or by their objects
 KNOWN_METADATA = ("fps", "start_frame", "part_names", "part_kinds", "part_usd", "domains", PRESENCE)
@@ -74,7 +75,7 @@ def objects_of(motion: Motion) -> list[SceneObject]:
     return objects
 
 
-def hidden_copies(objects: list[SceneObject], instances: bool = False) -> dict[str, Any]:
+def hidden_copies(objects: list[SceneObject], instances: bool = False) -> JsonObject:
     """Return the sentence about objects whose copies are hidden one by one, but are not written as instances; and about
     all that are not, where `instances` were asked for."""
     names = [obj.name for obj in objects if obj.copies == 1 and obj.shown is not None and obj.shown.shape[1] > 1]
@@ -112,15 +113,15 @@ def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
     return lost if not presence or is_one_clip and "presence" in kept else lost | {"presence": list(presence)}
 
 
-def is_double_sided(details: Any) -> bool:
+def is_double_sided(details: JsonValue) -> bool:
     """Return whether the faces of an object with such details in "part_usd" are seen from both sides."""
     return isinstance(details, dict) and details.get("doubleSided") == "true"
 
 
-def stated_names(motion: Motion) -> dict[str, Any]:
+def stated_names(motion: Motion) -> JsonObject:
     """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
     and copies, and the names of materials. sources.scene_objects.scene_fields reads it back."""
-    stated: dict[str, Any] = {}
+    stated: JsonObject = {}
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
         copies, kinds = motion.attributes.get("part_copies"), motion.metadata.get("part_kinds")
@@ -132,7 +133,7 @@ def stated_names(motion: Motion) -> dict[str, Any]:
     return stated
 
 
-def names_and_scene(motion: Motion) -> dict[str, Any]:
+def names_and_scene(motion: Motion) -> JsonObject:
     """Return `stated_names`, and with them unit, up axis and frame rate."""
     scene = {key: motion.metadata[key] for key in SCENE_KEYS if motion.metadata.get(key) is not None}
     return {key: SCENE_KEYS[key](value) for key, value in scene.items()} | stated_names(motion)
@@ -140,8 +141,9 @@ def names_and_scene(motion: Motion) -> dict[str, Any]:
 
 def _copies(motion: Motion, object_count: int) -> list[int]:
     copies = motion.attributes.get("part_copies")
-    usable = copies is not None and copies.shape == (object_count,) and copies.dtype.kind in "iu"
-    return copies.tolist() if usable else [1] * object_count
+    if copies is None or copies.shape != (object_count,) or copies.dtype.kind not in "iu":
+        return [1] * object_count
+    return copies.tolist()
 
 
 def _repeats(obj: SceneObject, copies: int) -> bool:
@@ -174,15 +176,15 @@ def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[di
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
-    described = (
+    if (
         isinstance(names, list)
         and counts is not None
         and counts.dtype.kind in "iu"
         and counts.shape == (len(names),)
         and (counts >= 0).all()
         and counts.sum(dtype=np.int64) == count
-    )
-    if described and _fits(motion, counts):
+        and _fits(motion, counts)
+    ):
         if not isinstance(kinds, list) or len(kinds) != len(names):
             kinds = [_kind(motion, counts, i) for i in range(len(names))]
         details = metadata.get("part_usd")
@@ -235,12 +237,13 @@ def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterato
     totals = [
         int(end - start) if kind == "curves" else 0 for end, start, kind in zip(ends, np.append(0, ends[:-1]), kinds)
     ]
-    usable = stated is not None and stated.ndim == 1 and stated.dtype.kind in "iu" and int(stated.sum()) == sum(totals)
+    if stated is not None and (stated.ndim != 1 or stated.dtype.kind not in "iu" or int(stated.sum()) != sum(totals)):
+        stated = None
     done = 0
     for end, total in zip(ends, totals):
         if not total:
             yield np.empty(0, np.int64)
-        elif usable:
+        elif stated is not None:
             stop = done + int(np.searchsorted(np.cumsum(stated[done:], dtype=np.int64), total)) + 1
             yield stated[done:stop]
             done = stop

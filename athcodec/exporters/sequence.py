@@ -26,11 +26,12 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.numbering import LARGEST_NUMBER, Numbering, numbering_of
+from athcodec.untyped import JsonObject
 
 DIGITS = 4
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write all files; returns their names. Raises ClipError where there are others of the same numbering, OSError
     where nothing can be written."""
     suffix = Path(path).suffix.lower()

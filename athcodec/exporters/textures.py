@@ -6,19 +6,19 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from typing import Any
 
 import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.exporters.gltf_build import clock
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 WIDEST = 4096  # pixels of a side that all devices support
 LAYOUT = "athcodec/exporters/vat.md"
 
 
-def facts_of(motion: Motion) -> dict[str, Any]:
+def facts_of(motion: Motion) -> JsonObject:
     """Return rate, level and size of a MotionClip or ClipView."""
     level = {"level": motion.level, "level_max_error": float(motion.max_error)} if isinstance(motion, ClipView) else {}
     return {"layout": LAYOUT} | clock(motion) | level | {"frames": motion.frame_count, "vertices": motion.vertex_count}
@@ -54,7 +54,7 @@ def write_png(path: str, pixels: np.ndarray) -> None:
             out.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
 
 
-def write_json(path: str, facts: dict[str, Any]) -> None:
+def write_json(path: str, facts: JsonObject) -> None:
     """Raise OSError."""
     with open(path, "w", encoding="utf-8") as out:
         json.dump(facts, out, indent=1, allow_nan=False)

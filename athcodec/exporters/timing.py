@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.clip import stated_fps
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonMapping
 
 
 def frame_rate_of(motion: Motion) -> float:
@@ -17,7 +15,7 @@ def frame_rate_of(motion: Motion) -> float:
     return stated_fps(motion.metadata) or float(motion.fps)
 
 
-def start_frame_of(metadata: Mapping[str, Any]) -> float:
+def start_frame_of(metadata: JsonMapping) -> float:
     """Return the number of the frame at time 0, 0 where the metadata state no number."""
     stated = metadata.get("start_frame", 0)
     is_number = isinstance(stated, (int, float)) and not isinstance(stated, bool) and abs(stated) < 1e9

@@ -51,10 +51,13 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.motion.units import METRES, metres_of, unit_symbol
 from athcodec.sources.scene_objects import FACE_MATERIAL, GUESSED, OWN, SCHEME
+from athcodec.untyped import JsonObject, UsdObject
 
 SAVE_BYTES = 16 << 20
 PRIMVARS = {"uv": "st", "colors": "displayColor"}
-TYPES = {  # By a row's shape and kind; the shape None stands for any number of values per row.
+TYPES: dict[
+    str, dict[tuple[int, ...], str]
+] = {  # By a row's shape and kind; the shape None stands for any number of values per row.
     "f": {(): "Float", (2,): "Float2", (3,): "Float3", (4,): "Float4"},
     "d": {(): "Double", (2,): "Double2", (3,): "Double3", (4,): "Double4"},
     "e": {(): "Half", (2,): "Half2", (3,): "Half3", (4,): "Half4"},
@@ -87,7 +90,7 @@ WIND = "wind"  # in what is known of an assembly: the text of its JSON
 INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform", "constant": "constant"}
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd; returns what instances cost. Raises
     ClipError, OSError."""
     path = os.fspath(path)
@@ -136,7 +139,7 @@ def _must(done: object, name: str) -> None:
         raise OSError(f"{name}: cannot be written")
 
 
-def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -> JsonObject:
     codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
@@ -148,7 +151,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
     objects = objects_of(motion)
     looks = looks_of(motion, objects)
     if joints is not None and options.nanite:
-        return _write_assembly(stage, motion, joints, objects, looks, codes, report)
+        return _write_assembly(stage, motion, joints, objects, looks, report)
     instanced = fit_copies(motion, objects) if options.instances and joints is None else {}
     names = distinct(_identifier(obj.name) for obj in objects)
     for number, (obj, name) in enumerate(zip(objects, names)):
@@ -163,7 +166,7 @@ def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -
     _own_arrays(root, motion, left)
     _write_presence(objects, codes)
     if joints is not None:
-        return _write_rigged(stage, motion, joints, objects, looks, codes, report) | hidden_copies(objects)
+        return _write_rigged(stage, motion, joints, objects, looks, report) | hidden_copies(objects)
     placed = [(objects[number], copies) for number, copies in instanced.items()]
     _write_places(stage, placed, codes)
     if options.velocities:
@@ -181,16 +184,10 @@ def _time_codes(motion: Motion) -> np.ndarray:
 
 
 def _write_rigged(
-    stage: Usd.Stage,
-    motion: Motion,
-    joints: Joints,
-    objects: list[SceneObject],
-    looks: Looks,
-    codes: np.ndarray,
-    report: Progress,
-) -> dict[str, Any]:
+    stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
+) -> JsonObject:
     _set_rest(motion, objects, looks)
-    write_rig(stage, "/clip", motion, joints, objects, codes)
+    write_rig(stage, "/clip", motion, joints, objects, _time_codes(motion))
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     report(1.0)
     return {"animation": "a rig", "joints": len(joints.bind), "max_error": joints.max_error}
@@ -208,14 +205,8 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
 
 
 def _write_assembly(
-    stage: Usd.Stage,
-    motion: Motion,
-    joints: Joints,
-    objects: list[SceneObject],
-    looks: Looks,
-    codes: np.ndarray,
-    report: Progress,
-) -> dict[str, Any]:
+    stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
+) -> JsonObject:
     """Return as Nanite Assemblies are laid out, see usd_nanite.py."""
     parts = nanite.parts_of(motion, objects, joints)
     UsdSkel.Root.Define(stage, nanite.BASE)
@@ -234,10 +225,10 @@ def _write_assembly(
     _own_arrays(stage.GetDefaultPrim(), motion, _static_arrays(stage, motion, objects))
     base = [obj for number, obj in enumerate(objects) if number not in parts]
     _set_rest(motion, base, looks)
-    write_rig(stage, nanite.BASE, motion, joints, base, codes)
+    write_rig(stage, nanite.BASE, motion, joints, base, _time_codes(motion))
     for number, part in parts.items():
         nanite.place_part(stage, f"{nanite.ROOT_PRIM}/{names[number]}", names[number], objects[number], part, joints)
-    _write_presence(objects, codes)
+    _write_presence(objects, _time_codes(motion))
     _must(stage.GetRootLayer().Save(), stage.GetRootLayer().identifier)
     error = nanite.largest_error(motion, objects, joints, parts)
     report(1.0)
@@ -353,7 +344,7 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
         face_labels = rows_of_one(labels[obj.face_rows], obj) if obj.copies > 1 else labels[obj.face_rows]
         runs = [] if face_labels is None or obj.kind != "mesh" else material_runs(face_labels, names)
         prim = obj.target.GetPrim()
-        if len(runs) == 1 and len(runs[0][1]) == len(face_labels):
+        if face_labels is not None and len(runs) == 1 and len(runs[0][1]) == len(face_labels):
             UsdShade.MaterialBindingAPI.Apply(prim).Bind(materials[runs[0][0]])
             continue
         for label, faces in runs:
@@ -382,7 +373,9 @@ def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]],
     """Write where the copies are in each frame. USD's older programs know rotations in half precision only."""
     for obj, copies in instanced:
         instancer = obj.instancer
-        turned = [(instancer.CreateOrientationsAttr(), Vt.QuathArray, np.float16)]
+        turned: list[tuple[Usd.Attribute, UsdObject, type[np.floating]]] = [
+            (instancer.CreateOrientationsAttr(), Vt.QuathArray, np.float16)
+        ]
         if hasattr(instancer, "CreateOrientationsfAttr"):
             turned.append((instancer.CreateOrientationsfAttr(), Vt.QuatfArray, np.float32))
         places, scales = instancer.CreatePositionsAttr(), instancer.CreateScalesAttr()
@@ -393,7 +386,7 @@ def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]],
                 attribute.Set(array.FromNumpy(copies.turns[frame].astype(dtype)), code)
 
 
-def _write_velocities_of_places(motion: Any, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
+def _write_velocities_of_places(motion: Motion, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
     for obj, copies in instanced:
         attributes = obj.instancer.CreateVelocitiesAttr(), obj.instancer.CreateAngularVelocitiesAttr()
         for attribute, values in zip(attributes, velocities_of_copies(motion, obj.shown, copies.places, copies.turns)):
@@ -402,7 +395,8 @@ def _write_velocities_of_places(motion: Any, instanced: list[tuple[SceneObject, 
 
 
 def _write_presence(objects: list[SceneObject], codes: np.ndarray) -> None:
-    """Visibility of objects, and the copies that an instancer hides, from the frames on in which they change."""
+    """Write the visibility of objects, and the copies that an instancer hides, from the frames on in which they
+    change."""
     for obj in objects:
         if obj.shown is None or obj.shown.shape[1] > 1 and obj.copies == 1:
             continue
@@ -447,8 +441,8 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     if row not in shapes and len(row) > 1:
         return False
     type_name = _type_name(name, kind, row if row in shapes else ())
-    placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(place is None for place in placed):
+    placed = _all_placed(values, domain, objects)
+    if placed is None:
         return False
     for target, rows in placed:
         if not len(rows):  # An object that has no faces or corners has no values for them.
@@ -464,7 +458,20 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
     return True
 
 
-def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, np.ndarray] | None:
+def _all_placed(
+    values: np.ndarray, domain: str, objects: list[SceneObject]
+) -> list[tuple[UsdObject, np.ndarray]] | None:
+    """Return what `_placed_rows` gives for each object; None where one has no place for its rows."""
+    placed = []
+    for obj in objects:
+        rows = _placed_rows(rows_of(values, domain, obj), domain, obj)
+        if rows is None:
+            return None
+        placed.append(rows)
+    return placed
+
+
+def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[UsdObject, np.ndarray] | None:
     """Return the schema that takes the rows of an object, and those that it takes: of copies those of one, where all
     have the same, or one for each, where it has the same throughout. None where neither is so."""
     if obj.copies == 1 or domain == "constant":
@@ -480,8 +487,8 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[Any, 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
     """Return as widths of curves and points; of meshes as a primvar."""
-    placed = [_placed_rows(rows_of(values, domain, obj), domain, obj) for obj in objects]
-    if any(place is None or place[0] is not obj.target for place, obj in zip(placed, objects)):
+    placed = _all_placed(values, domain, objects)
+    if placed is None or any(target is not obj.target for (target, _), obj in zip(placed, objects)):
         return False
     for obj, (_, rows) in zip(objects, placed):
         if obj.kind == "mesh":
@@ -502,7 +509,7 @@ def _type_name(name: str, kind: str, row: tuple[int, ...]) -> Sdf.ValueTypeName:
     return getattr(Sdf.ValueTypeNames, f"{roles.get((name, base), base)}Array")
 
 
-def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> Any:
+def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> UsdObject:
     array = type(type_name.defaultValue)
     values = np.ascontiguousarray(values, dtype)
     if values.ndim > 1 and not array.__name__.startswith("Vec"):
@@ -552,12 +559,14 @@ def _write_frames(
     _must(layer.Save(), layer.identifier)
 
 
-def _whole(obj: SceneObject) -> Any:
+def _whole(obj: SceneObject) -> UsdObject:
     """Return the schema that all its vertices are under."""
     return obj.target if obj.copies == 1 else obj.instancer
 
 
-def _write_extents(layer: Sdf.Layer, extents: list, positions: np.ndarray, code: float) -> None:
+def _write_extents(
+    layer: Sdf.Layer, extents: list[tuple[SceneObject, Sdf.Path]], positions: np.ndarray, code: float
+) -> None:
     for obj, path in extents:
         points = positions[obj.vertices]
         if len(points):

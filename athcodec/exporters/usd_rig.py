@@ -38,6 +38,7 @@ def write_rig(
 
 def _paths(joints: Joints) -> list[str]:
     paths: list[str] = []
+    assert joints.parent is not None  # A rig has parents and weights.
     for name, above in zip(joints.names, joints.parent.tolist()):
         paths.append(name if above < 0 else f"{paths[above]}/{name}")
     return paths
@@ -59,6 +60,7 @@ def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndar
 
 def _bind(obj: SceneObject, joints: Joints, skeleton: str) -> None:
     binding = UsdSkel.BindingAPI.Apply(obj.target.GetPrim())
+    assert joints.weights is not None  # A rig has parents and weights.
     bones, weights = joints.vertex_joint[obj.vertices], joints.weights[obj.vertices]
     width = bones.shape[1]
     binding.CreateSkeletonRel().SetTargets([skeleton])

@@ -12,7 +12,6 @@ import os
 from collections.abc import Iterator
 from os import fspath
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,13 +24,14 @@ from athcodec.exporters.textures import WIDEST, facts_of, write_exr, write_json
 from athcodec.files.atomic import new_folder
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
+from athcodec.untyped import JsonObject
 
 PER_ROW = WIDEST // 3
 MOST_NODES = PER_ROW * WIDEST
 FLOAT16_MAX = 65504.0
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
     precision in place of float.
 
@@ -49,9 +49,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
     return facts
 
 
-def _write(
-    motion: Motion, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress
-) -> dict[str, Any]:
+def _write(motion: Motion, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress) -> JsonObject:
     pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
     grid = _Grid(len(pivots), motion.frame_count)
     textures = []
@@ -109,7 +107,7 @@ class _Grid:
         self.frames = min(frames, WIDEST // self.rows_per_frame)  # Frames that one texture holds.
         self.height = self.frames * self.rows_per_frame
 
-    def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+    def textures(self, rows: np.ndarray, name: str) -> Iterator[tuple[JsonObject, np.ndarray]]:
         """Yield (what the JSON says of it, (height, width, 4)) each; texels without a node are 0."""
         for number, start in enumerate(range(0, len(rows), self.frames)):
             frames = rows[start : start + self.frames]

@@ -13,7 +13,7 @@ import json
 import os
 import zlib
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -26,6 +26,7 @@ from athcodec.files.atomic import check_target, new_files
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.scene_objects import OWN
+from athcodec.untyped import JsonObject
 
 _HEAD = (
     '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
@@ -34,7 +35,7 @@ _HEAD = (
 _PIECE = '<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write all files; returns the name of the index, or of the only one. Raises ClipError where there are others of
     the same numbering, OSError where nothing can be written."""
     target = Path(check_target(path))

@@ -12,7 +12,6 @@ import json
 import os
 from os import fspath
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import h5py
@@ -27,6 +26,7 @@ from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
 from athcodec.sources.cells import VTK_NAMES, VTK_NUMBERS
 from athcodec.sources.xdmf_cells import MIXED
+from athcodec.untyped import JsonObject
 
 DISPLACEMENT = "displacement"
 _XDMF_NUMBERS = {name: number for number, name in MIXED.items()} | {"line": 2, "vertex": 1}
@@ -49,7 +49,7 @@ _FORMS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 SERIES = "motion"
 
 
-def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> dict[str, Any]:
+def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
     """Write both files. Raises OSError where nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:

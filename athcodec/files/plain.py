@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from os import fspath
-from typing import BinaryIO, TypeAlias, cast
+from typing import BinaryIO, TypeAlias
 
 from athcodec.errors import ClipError
 
@@ -22,4 +22,4 @@ def open_plain(path: FilePath, buffering: int = 0) -> BinaryIO:
     if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
         file.close()
         raise ClipError(f"{fspath(path)}: got a device, pipe or socket, expected a plain file")
-    return cast(BinaryIO, file)
+    return file

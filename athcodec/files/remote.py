@@ -19,6 +19,7 @@ from urllib.parse import urljoin, urlsplit
 
 from athcodec.errors import RemoteError
 from athcodec.files.shown import redacted, without_secrets
+from athcodec.untyped import JsonObject
 
 READ_AHEAD = 64 << 10
 GAP = 16 << 10  # Unwanted bytes that cost less than another request.
@@ -146,7 +147,7 @@ def _joined(ranges: list[Range]) -> list[Range]:
     return joined
 
 
-def _source(remote: Remote, options: dict):
+def _source(remote: Remote, options: JsonObject):
     """Return the transport of a URL: HTTP with checks of its answers, or any other file system."""
     shown = without_secrets(remote.url)
     try:
@@ -168,7 +169,7 @@ def _source(remote: Remote, options: dict):
     return _Http(remote, system, shown) if http else _AnySystem(remote, system, path, shown)
 
 
-def guarded(url: str, options: dict) -> dict:
+def guarded(url: str, options: JsonObject) -> JsonObject:
     """Return options for fsspec's file system of HTTP, with which a server cannot redirect us to machines that it does
     not reach itself: redirects from a public address to a private one raise RemoteError."""
     import aiohttp

@@ -8,7 +8,7 @@ import io
 import re
 import sys
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple, TextIO
+from typing import Any, Literal, NamedTuple, TextIO
 from urllib.parse import urlsplit
 
 _TABLE_WIDTH = 250  # Characters, more than any table takes: a narrow terminal wraps lines, and nothing is left out.
@@ -55,7 +55,7 @@ class Table(NamedTuple):
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
-    justify: str = "right"
+    justify: Literal["right", "left"] = "right"
 
     def print(self, file: TextIO) -> None:
         from rich import box, console, table, text  # The package takes long to import.
@@ -116,5 +116,7 @@ def print_parts(parts: Iterable[str | Table]) -> None:
             echo(part)
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], justify: str = "right") -> None:
+def print_table(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], justify: Literal["right", "left"] = "right"
+) -> None:
     print_parts([Table(columns, rows, justify)])

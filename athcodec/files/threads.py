@@ -10,10 +10,13 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from typing import TypeVar
 
 MOST = 4  # Threads by default.
 RANGE_NUMBERS = 3 << 18  # Numbers of an array for each call of a thread.
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 def default_jobs() -> int:
@@ -31,7 +34,7 @@ class ThreadPool:
         self.jobs = jobs
         self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
-    def map(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> list[Any]:
+    def map(self, function: Callable[..., Result], items: Sequence[tuple[object, ...]]) -> list[Result]:
         """Return function(*item) of all items, in order."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
@@ -42,12 +45,12 @@ class ThreadPool:
             for future in started:
                 future.cancel()
 
-    def ordered(self, function: Callable[[Any], Any], items: Iterable[Any], ahead: int) -> Iterator[Any]:
+    def ordered(self, function: Callable[[Item], Result], items: Iterable[Item], ahead: int) -> Iterator[Result]:
         """Yield function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
         if self._executor is None:
             yield from map(function, items)
             return
-        pending: deque[Future[Any]] = deque()
+        pending: deque[Future[Result]] = deque()
         for item in items:
             pending.append(self._start(function, item))
             if len(pending) > ahead:
@@ -55,7 +58,7 @@ class ThreadPool:
         while pending:
             yield pending.popleft().result()
 
-    def _start(self, function: Callable[..., Any], *words: Any) -> Future[Any]:
+    def _start(self, function: Callable[..., Result], *words: object) -> Future[Result]:
         """Start the call on another thread or, if there is no memory for one, run it on the caller's."""
         if self._executor is not None:
             try:
@@ -63,7 +66,7 @@ class ThreadPool:
             except RuntimeError:  # The call may be queued all the same, and run twice.
                 self._executor.shutdown()
                 self._executor = None
-        done: Future[Any] = Future()
+        done: Future[Result] = Future()
         try:
             done.set_result(function(*words))
         except Exception as error:

@@ -97,7 +97,7 @@ class GpuFile:
         into = core_file.Segment(self.core.segment_size(level))
         place = self._work.pointer, len(self._work.memory), self._file, segment, level
         self._check(lib.ath_prepare_start(*place, into.pointer, len(into.memory)))
-        if memory is not None:
+        if room is not None and memory is not None:
             self._check(lib.ath_gpu_record(self._work.pointer, byref(room), memory.ctypes.data, len(memory)))
         self._check(lib.ath_prepare_step(self._work.pointer, core_file.MOST_STEPS))
         return into

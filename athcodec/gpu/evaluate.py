@@ -4,6 +4,7 @@ program to read beside the shaders."""
 from __future__ import annotations
 
 import numpy as np
+from numpy import typing as npt
 
 NODE, FOLLOWS, FITTED = 1, 2, 4
 MOVED = 1 << 31
@@ -35,7 +36,7 @@ SEGMENT = np.dtype(
 )
 
 
-def section(words: np.ndarray, at: int, dtype, count: int) -> np.ndarray:
+def section(words: np.ndarray, at: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
     """Return records of a block."""
     size = np.dtype(dtype).itemsize // 4
     return words[at : at + size * count].view(dtype)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from athcodec.metrics.shape import ShapeMeter, edges_of, stem_links
 from athcodec.metrics.smoothness import SmoothnessMeter
 from athcodec.motion.clip import MotionClip
 from athcodec.options import real
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.decoding.decoder import Decoder
@@ -72,7 +73,7 @@ class MotionMeter(Meter):
         for meter in (self.error, self.smoothness, self.shape):
             meter._add(reference, decoded)
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> JsonObject:
         """Return the measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
 
         Second differences of the error are in bounds, angles in degrees. What a clip has no seams, edges or faces for
@@ -98,7 +99,7 @@ class MotionMeter(Meter):
             "shape": self._shape(),
         }
 
-    def _shape(self) -> dict[str, Any]:
+    def _shape(self) -> JsonObject:
         shape = self.shape
         edges = {
             "edges": shape.edge_count,
@@ -150,5 +151,5 @@ def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
     ]
 
 
-def _or_none(figures: dict[str, Any], count: int) -> dict[str, Any]:
+def _or_none(figures: JsonObject, count: int) -> JsonObject:
     return figures if count else dict.fromkeys(figures)

@@ -64,7 +64,7 @@ class Pieces:
     """Sets of vertices that each get one affine map per frame, with what their fits need of the rest pose.
 
     A piece is a range of branches: a subtree, or a single stem. `parent` is the piece that a straight one
-    inherits its free rotation from (-1: none), `level` a number greater than the parent's.
+    inherits its free rotation from (-1: none), `generation` a number greater than the parent's.
     """
 
     def __init__(
@@ -74,16 +74,16 @@ class Pieces:
         first_branch: np.ndarray,
         stop_branch: np.ndarray,
         parent: np.ndarray,
-        level: np.ndarray,
+        generation: np.ndarray,
     ) -> None:
         bounds = np.append(hierarchy.first_vertex, hierarchy.vertex_count).astype(np.intp)
         self.first_branch, self.stop_branch, self.parent = first_branch, stop_branch, parent
         self.first, self.stop = bounds[first_branch], bounds[stop_branch]
         self.counts = self.stop - self.first
-        self.stems, self.order = bounds.astype(np.int64), np.argsort(level, kind="stable")
+        self.stems, self.order = bounds.astype(np.int64), np.argsort(generation, kind="stable")
         self.origin = rest.mean(axis=0)
         self.rest = np.ascontiguousarray((rest - self.origin).T)
-        self._describe_rest_pose([np.flatnonzero(level == value) for value in np.unique(level)])
+        self._describe_rest_pose([np.flatnonzero(generation == value) for value in np.unique(generation)])
         inherits, lends = (self.rank < 2) & (parent >= 0), np.zeros(len(first_branch), bool)
         lends[parent[inherits]] = True
         self.links = np.stack([first_branch, stop_branch, parent, self.rank, lends], axis=1).astype(np.int64)
@@ -93,10 +93,10 @@ class Pieces:
 
     @classmethod
     def subtrees(
-        cls, hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray, parent: np.ndarray, level: np.ndarray
+        cls, hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray, parent: np.ndarray, generation: np.ndarray
     ) -> Pieces:
         stop_branch = branches + hierarchy.subtree_branches[branches]
-        return cls(hierarchy, rest, branches, stop_branch, parent, level)
+        return cls(hierarchy, rest, branches, stop_branch, parent, generation)
 
     def vertices(self, some: np.ndarray) -> np.ndarray:
         """Return the vertices of some pieces, one piece after the other."""
@@ -107,12 +107,12 @@ class Pieces:
         """Return the maps of all pieces in frames (3,k,N)."""
         return Fit(self, frames)
 
-    def _describe_rest_pose(self, levels: list[np.ndarray]) -> None:
+    def _describe_rest_pose(self, generations: list[np.ndarray]) -> None:
         """Fill each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
         count = len(self.first)
         self.centroid = np.empty((count, 3))
         covariance = np.empty((count, 3, 3))
-        for some in levels:  # Pieces of one level do not overlap.
+        for some in generations:  # Pieces of one generation do not overlap.
             vertices, counts = self.vertices(some), self.counts[some]
             points = self.rest[:, vertices]
             centroid = np.add.reduceat(points, starts(counts), axis=1) / counts

@@ -1,4 +1,4 @@
-"""The motion clip: what every source reader makes and every later stage reads.
+"""The motion clip: what every source reader makes and everything after it reads.
 
 A clip is positions over time, a rest pose, the branch of every vertex and any named static arrays. It checks
 its own structure when it is made, and the positions while they are read in blocks of frames, so that a clip
@@ -19,6 +19,7 @@ from athcodec.errors import ClipError
 from athcodec.files.atomic import FileId
 from athcodec.files.shown import counted
 from athcodec.options import real, set_numbers, whole
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject, JsonValue
 
 LARGEST_COORDINATE = 1e18
 BLOCK_BYTES = 32 << 20
@@ -157,7 +158,7 @@ class MotionClip:
     MotionClip(60 frames, 20 vertices, 1 branch, float32)
     """
 
-    positions: Any
+    positions: ArrayLike
     time: np.ndarray
     vertex_branch: np.ndarray | None = None
     branch_parent: np.ndarray | None = None
@@ -165,7 +166,7 @@ class MotionClip:
     edges: np.ndarray | None = None
     faces: np.ndarray | None = None
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: JsonObject = field(default_factory=dict)
     rest_pose: str = "first"
     stem_index: np.ndarray | None = None
     clip_ranges: tuple[ClipRange, ...] = ()
@@ -499,7 +500,7 @@ def is_name(text: str) -> bool:
     return not any(c < " " or c == "\x7f" or "\ud800" <= c <= "\udfff" for c in text)
 
 
-def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
+def check_time(time: ArrayLike, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
     """Return (T,) float64 seconds. Raises ClipError unless they are finite, increase within each clip range, one per
     frame."""
     times: np.ndarray = np.asarray(time)
@@ -521,16 +522,16 @@ def check_time(time: Any, frame_count: int, clip_ranges: Sequence[ClipRange] = (
     return times
 
 
-def stated_fps(metadata: Mapping[str, Any]) -> float | None:
+def stated_fps(metadata: JsonMapping) -> float | None:
     """Return the frames per second in `metadata["fps"]`; None if it is missing or no positive number."""
     try:
-        fps = real("fps", cast(Any, metadata.get("fps")))
+        fps = real("fps", cast(JsonValue, metadata.get("fps")))
     except TypeError:
         return None
     return fps if 0 < fps < float("inf") else None
 
 
-def frame_rate(metadata: Mapping[str, Any]) -> float:
+def frame_rate(metadata: JsonMapping) -> float:
     """Return the frames per second in `metadata["fps"]`, by default 30. Raises ClipError for no positive number."""
     fps = stated_fps(metadata) if "fps" in metadata else DEFAULT_FPS
     if fps is None:
@@ -557,7 +558,7 @@ def median_rate(*runs: np.ndarray) -> float:
     return next((number for number in usual if 0 < number and abs(number - rate) <= slack), rate)
 
 
-def check_indices(name: str, indices: Any, stop: int, width: int | None = None) -> np.ndarray | None:
+def check_indices(name: str, indices: ArrayLike, stop: int, width: int | None = None) -> np.ndarray | None:
     """Return `indices` as an array of its integer dtype. Raises ClipError unless every entry is in 0 .. stop - 1."""
     if indices is None:
         return None
@@ -592,7 +593,9 @@ def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: in
     check_indices("face_vertex_indices", indices[:, None], vertex_count)
 
 
-def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+def check_branches(
+    vertex_branch: ArrayLike, branch_parent: ArrayLike, vertex_count: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Return (N,) and (B,) int32 labels and parents. Raises ClipError unless they are a forest of branches with
     vertices."""
     branch_parent = _integers("branch_parent", branch_parent)
@@ -611,7 +614,7 @@ def check_branches(vertex_branch: Any, branch_parent: Any, vertex_count: int) ->
     return vertex_branch, _check_parents(branch_parent)
 
 
-def check_stem_index(stem_index: Any, vertex_branch: np.ndarray) -> np.ndarray | None:
+def check_stem_index(stem_index: ArrayLike, vertex_branch: np.ndarray) -> np.ndarray | None:
     """Return (N,) int32, or None if it only repeats the order of the vertex numbers.
 
     Raises ClipError unless every branch with n vertices has the places 0 .. n - 1 once each.
@@ -650,7 +653,7 @@ def stem_index_of(vertex_branch: np.ndarray, along: np.ndarray) -> np.ndarray:
     return places
 
 
-def check_attributes(attributes: Mapping[str, Any] | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
+def check_attributes(attributes: JsonMapping | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
     """Return named arrays, little-endian and without records, and the names of those that no file holds (`NOT_KEPT`).
 
     Raises ClipError unless the names are free, and the values numbers, booleans or bytes.
@@ -680,7 +683,7 @@ def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield from _columns(f"{name}.{field_name}", array[field_name])
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: JsonValue) -> JsonValue:
     """Return a value of metadata with Python's numbers in place of NumPy's and those of other libraries."""
     if type(value) in PLAIN_TYPES:
         return value
@@ -727,7 +730,7 @@ def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
     return int(ancestor[cyclic[0]]) if cyclic.size else None
 
 
-def _integers(name: str, values: Any) -> np.ndarray:
+def _integers(name: str, values: ArrayLike) -> np.ndarray:
     array: np.ndarray = np.asarray(values)
     if array.ndim != 1:
         raise ClipError(f"{name}: got shape {array.shape}, expected one dimension")

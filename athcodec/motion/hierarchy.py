@@ -15,7 +15,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.motion.clip import MotionClip, check_branches, check_indices, check_stem_index
+from athcodec.motion.clip import check_branches, check_indices, check_stem_index
+from athcodec.motion.protocol import Motion
 from athcodec.options import whole
 
 MAX_VERTICES = 2**31 - 1
@@ -145,9 +146,9 @@ class Hierarchy:
         return vertex_branch, branch_parent, stem_index
 
 
-def hierarchy_of(clip: MotionClip) -> Hierarchy:
+def hierarchy_of(clip: Motion) -> Hierarchy:
     """Return the hierarchy of a clip's branches; see build_hierarchy()."""
-    assert clip.vertex_branch is not None and clip.branch_parent is not None  # MotionClip has set both or neither.
+    assert clip.vertex_branch is not None and clip.branch_parent is not None  # A motion has both or neither.
     return build_hierarchy(clip.vertex_branch, clip.branch_parent, clip.rest, clip.edges, clip.stem_index)
 
 

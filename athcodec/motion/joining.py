@@ -20,6 +20,7 @@ from athcodec.files.atomic import FileId
 from athcodec.motion.clip import ClipRange, MotionClip, check_clip_ranges, clip_range_frames
 from athcodec.motion.frames import Frames
 from athcodec.options import real, whole
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 BLEND = "loop_blend"  # Key of metadata: number of frames that were blended.
 OWN = "clips"  # Key of metadata: by name, what only one of several clips has.
@@ -115,7 +116,7 @@ def split(clip: MotionClip) -> dict[str, MotionClip]:
     }
 
 
-def metadata_of(metadata: Mapping[str, Any], name: str) -> dict[str, Any]:
+def metadata_of(metadata: JsonMapping, name: str) -> JsonObject:
     """Return the metadata of one of several clips: what all have in common, and what only this one has."""
     owned = metadata.get(OWN)
     by_clip = owned.get(name) if isinstance(owned, dict) else None
@@ -158,7 +159,7 @@ def in_wind(clip: MotionClip, strength: float, heading: float = 0.0) -> MotionCl
     return clip.replace(metadata=clip.metadata | {STRENGTH: strength, HEADING: heading % 360})
 
 
-def wind_of(metadata: Mapping[str, Any]) -> tuple[float, float]:
+def wind_of(metadata: JsonMapping) -> tuple[float, float]:
     """Return strength and heading of a clip's wind, from its metadata; NaN if it names none."""
     numbers = metadata.get(STRENGTH, math.nan), metadata.get(HEADING, 0.0)
     are_known = all(isinstance(one, int | float) and not isinstance(one, bool) and abs(one) < 1e300 for one in numbers)
@@ -208,7 +209,7 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     )
 
 
-def clip_metadata(motion: Any) -> dict[str, Any]:
+def clip_metadata(motion: Any) -> JsonObject:
     """Return metadata of a motion, with the name of its clip and whether that is a loop, for files with a single
     clip."""
     clip_range = next(iter(getattr(motion, "clip_ranges", ())), ClipRange("", 0))
@@ -267,7 +268,7 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
     return chosen.source_rest
 
 
-def _common_metadata(clips: Mapping[str, MotionClip]) -> dict[str, Any]:
+def _common_metadata(clips: Mapping[str, MotionClip]) -> JsonObject:
     """Return the metadata that all have in common, with the others of each clip under OWN."""
     every = [clip.metadata for clip in clips.values()]
     common = {
@@ -309,14 +310,14 @@ def _joined(parts: Sequence[Any]) -> Frames:
     return Frames(read, ranges[-1][1], parts[0].shape[1], dtype)
 
 
-def _run(positions: Any, first: int, last: int) -> Frames:
+def _run(positions: ArrayLike, first: int, last: int) -> Frames:
     """Return frames `first` to `last` - 1."""
     return Frames(
         lambda start, stop: positions[first + start : first + stop], last - first, positions.shape[1], positions.dtype
     )
 
 
-def _blended(positions: Any, blend: int) -> Frames:
+def _blended(positions: ArrayLike, blend: int) -> Frames:
     """Return all but the last `blend` frames; the first ones are blended from the frames that follow the new last
     one."""
     frame_count, dtype = positions.shape[0] - blend, positions.dtype

@@ -76,15 +76,14 @@ class Polygons:
 
     @property
     def shape(self) -> CorePolygons:
-        mixed = self.count_type is not None
         return CorePolygons(
             self.face_count,
             len(self.corners),
             self.columns,
-            mixed,
+            self.count_type is not None,
             False,
             type_code(self.index_type),
-            type_code(self.count_type) if mixed else 0,
+            0 if self.count_type is None else type_code(self.count_type),
         )
 
     @property
@@ -95,5 +94,6 @@ class Polygons:
     @property
     def attributes(self) -> dict[str, np.ndarray]:
         """Arrays of faces of different sizes, of the source's types."""
+        assert self.counts is not None  # Faces of different sizes have counts.
         arrays = self.counts.astype(self.count_type), self.corners.astype(self.index_type)
         return dict(zip(POLYGON_ARRAYS, arrays))

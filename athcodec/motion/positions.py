@@ -15,13 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from athcodec.errors import ClipError
 from athcodec.motion.frames import Frames
+from athcodec.untyped import ArrayLike, JsonMapping
 
 FRAMES, VERTICES, XYZ, INDICES = "frames", "vertices", "xyz", "indices"
 Order = tuple[tuple[str, ...], ...]
@@ -60,7 +60,7 @@ def parse_order(axes: str | Sequence[str]) -> Order:
     return order
 
 
-def order_of_labels(labels: Sequence[Any]) -> Order | None:
+def order_of_labels(labels: Sequence[ArrayLike]) -> Order | None:
     """Return the order that the names of an array's dimensions state; None where they state none."""
     names = [_NAMES.get(str(label).strip().lower().rpartition("/")[2]) for label in labels]
     return tuple((name,) for name in names if name) if sorted(map(str, names)) == sorted(_text(USUAL)) else None
@@ -78,7 +78,7 @@ def advice(orders: Sequence[Order]) -> str:
     return f"--axes {' or '.join(words)} ({in_python})"
 
 
-def facts_of(arrays: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
+def facts_of(arrays: JsonMapping) -> dict[str, tuple[str, int]]:
     """Return the facts that arrays with the names of a clip's state; None for one that is missing."""
     facts = {}
     for name, axis in _COUNTED.items():
@@ -133,7 +133,7 @@ def is_possible(shape: Sequence[int], order: Order | None = None) -> bool:
         return False
 
 
-def ordered(array: Any, order: Order) -> Any:
+def ordered(array: ArrayLike, order: Order) -> ArrayLike:
     """Return an array of positions as (frames, vertices, 3), which reads frames of `array` when they are sliced.
 
     Parameters
@@ -169,7 +169,7 @@ def ordered(array: Any, order: Order) -> Any:
     return Frames(read, frame_count, lengths[VERTICES], dtype.newbyteorder("="), keeps=axis != 0)
 
 
-def in_floats(positions: Any) -> tuple[Any, str]:
+def in_floats(positions: ArrayLike) -> tuple[ArrayLike, str]:
     """Return positions (frames, vertices, 3) in float32 or float64, whichever holds them, and a sentence if that is
     another type."""
     before = np.dtype(positions.dtype)
@@ -189,7 +189,7 @@ def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
     return (dates - dates[:1]).astype("timedelta64[ns]").astype(np.float64) / 1e9 if dates.dtype.kind in "mM" else dates
 
 
-def looks_turned(positions: Any, facts: Facts) -> bool:
+def looks_turned(positions: ArrayLike, facts: Facts) -> bool:
     """Return whether frames look like paths of vertices, so that the array probably has vertices first.
 
     A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If each frame is much

@@ -7,10 +7,12 @@ vertices keep positions, which count like all others: for the diagonal, the erro
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+from athcodec.untyped import JsonMapping, JsonObject, JsonValue
 
 PRESENCE = "presence"
 FAR = 1.1  # Ratio of the diagonals with and without a hidden part above which the part is named.
@@ -22,18 +24,18 @@ def frame_runs(shown: np.ndarray) -> list[list[int]]:
     return edges.reshape(-1, 2).tolist()
 
 
-def stated_presence(metadata: Mapping[str, Any]) -> dict[str, list[list[int]]]:
+def stated_presence(metadata: JsonMapping) -> dict[str, list[list[int]]]:
     """Return metadata["presence"], without entries that are no list of [first, stop] frames."""
     stated = metadata.get(PRESENCE)
     return {name: runs for name, runs in stated.items() if _are_runs(runs)} if isinstance(stated, dict) else {}
 
 
-def _are_runs(runs: Any) -> bool:
+def _are_runs(runs: JsonValue) -> bool:
     pairs = isinstance(runs, list) and all(isinstance(run, list) and len(run) == 2 for run in runs)
     return pairs and all(type(frame) is int and 0 <= frame < 1 << 31 for run in runs for frame in run)
 
 
-def presence_within(metadata: Mapping[str, Any], frames: range) -> dict[str, Any]:
+def presence_within(metadata: JsonMapping, frames: range) -> JsonObject:
     """Return the metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
     if PRESENCE not in metadata:
         return dict(metadata)
@@ -47,10 +49,10 @@ def presence_within(metadata: Mapping[str, Any], frames: range) -> dict[str, Any
 
 
 def presence_of_parts(
-    metadata: Mapping[str, Any], names: Sequence[str], copies: Sequence[int], frame_count: int
+    metadata: JsonMapping, names: Sequence[str], copies: Sequence[int], frame_count: int
 ) -> dict[int, np.ndarray]:
-    """By the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those that
-    show each of its copies, (T, copies)."""
+    """Return, by the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those
+    that show each of its copies, (T, copies)."""
     presence: dict[int, np.ndarray] = {}
     stated = stated_presence(metadata)
     places = {name: number for number, name in enumerate(names)} if stated else {}

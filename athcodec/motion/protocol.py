@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from athcodec.motion.clip import ClipRange
+from athcodec.untyped import JsonMapping
 
 
 class Motion(Protocol):
@@ -46,6 +47,10 @@ class Motion(Protocol):
         """The parent of each branch, (B,) int32, -1 for a root."""
 
     @property
+    def branch_count(self) -> int:
+        """Branches, B; 0: none are known."""
+
+    @property
     def stem_index(self) -> np.ndarray | None:
         """Place of each vertex on its stem, (N,) int32; None: their order says it."""
 
@@ -66,7 +71,7 @@ class Motion(Protocol):
         """Named static arrays."""
 
     @property
-    def metadata(self) -> Mapping[str, Any]:
+    def metadata(self) -> JsonMapping:
         """Unit, up axis and whatever else the source states."""
 
     @property

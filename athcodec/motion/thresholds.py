@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from athcodec.motion.units import Length, LengthLike, length_of
 from athcodec.options import whole
+from athcodec.untyped import JsonMapping
 
 THRESHOLDS = "hierarchy_thresholds"  # Key of metadata.
 
@@ -76,7 +75,7 @@ class Thresholds:
         return {"epsilon": epsilon, "xi": xi, "eta": self.eta, "lambda": self.lam}
 
     @classmethod
-    def of_metadata(cls, metadata: Mapping[str, Any]) -> Thresholds | None:
+    def of_metadata(cls, metadata: JsonMapping) -> Thresholds | None:
         """Return the thresholds in a file's metadata, or None if there are none, or no numbers."""
         try:
             kept = metadata[THRESHOLDS]

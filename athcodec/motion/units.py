@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from athcodec.errors import BoundError, ClipError
 from athcodec.options import real, set_numbers
+from athcodec.untyped import JsonMapping, JsonValue
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "in": 0.0254, "ft": 0.3048}
 AXES = ("x", "y", "z")
@@ -221,12 +221,12 @@ def unit_symbol(unit: object) -> str:
     return _LONG_NAMES.get(name.lower().removesuffix("s"), name if name in METRES else name.lower())
 
 
-def scene_unit(metadata: Mapping[str, Any]) -> Any:
+def scene_unit(metadata: JsonMapping) -> JsonValue:
     """Return the unit of a clip for `Length.in_scene_units`: its name, its length in metres, or None."""
     return metadata.get("unit") or metres_of(metadata)
 
 
-def metres_of(metadata: Mapping[str, Any]) -> float | None:
+def metres_of(metadata: JsonMapping) -> float | None:
     """Return the length of a clip's unit in metres; None if its metadata state none that is known."""
     metres = METRES.get(unit_symbol(metadata.get("unit") or ""), metadata.get(METRES_PER_UNIT))
     if isinstance(metres, (int, float)) and not isinstance(metres, bool) and 0 < metres < math.inf:
@@ -234,7 +234,7 @@ def metres_of(metadata: Mapping[str, Any]) -> float | None:
     return None
 
 
-def checked_unit(unit: Any, name: str = "unit") -> str:
+def checked_unit(unit: JsonValue, name: str = "unit") -> str:
     """Return a unit that an option names, a symbol of METRES.
 
     Parameters
@@ -260,7 +260,7 @@ def checked_unit(unit: Any, name: str = "unit") -> str:
     raise ClipError(f"{name}: got {unit!r:.80}, expected one of {', '.join(METRES)}{hint}")
 
 
-def checked_axis(axis: Any, name: str = "up_axis") -> str:
+def checked_axis(axis: JsonValue, name: str = "up_axis") -> str:
     """Return an axis that an option names.
 
     Parameters
@@ -286,7 +286,7 @@ def checked_axis(axis: Any, name: str = "up_axis") -> str:
     raise ClipError(f"{name}: got {axis!r:.80}, expected one of {', '.join(AXES)}{hint}")
 
 
-def stated_scene(metadata: Mapping[str, Any]) -> dict[str, str]:
+def stated_scene(metadata: JsonMapping) -> dict[str, str]:
     """Return the unit and the up axis that metadata state, as the options name them: "Meters" is "m", "Z" is "z".
 
     Parameters

@@ -28,6 +28,7 @@ from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.scene import in_scene
 from athcodec.motion.units import checked_axis, checked_unit, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
+from athcodec.untyped import JsonMapping, JsonObject
 
 # Kinds of what is not read that are no shapes, or that are not shown as the source stands.
 NO_SHAPES = frozenset("Material Camera Light GeomSubset FaceSet SkelAnimation".split()).union(
@@ -467,12 +468,12 @@ def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
     return next((candidate for candidate in formats if candidate.begins(head)), None)
 
 
-def _stated(metadata: Mapping[str, Any], path: str | PathLike[str], **wanted: str | None) -> dict[str, Any]:
+def _stated(metadata: JsonMapping, path: str | PathLike[str], **wanted: str | None) -> JsonObject:
     """Return the unit and the up axis that a file states, None in place of one that is unknown and stated otherwise.
 
     Raises ClipError for one that is unknown and not in `wanted`.
     """
-    scene: dict[str, Any] = {}
+    scene: JsonObject = {}
     for name, option in wanted.items():
         try:
             scene |= stated_scene({name: metadata.get(name)})

@@ -37,6 +37,7 @@ from athcodec.sources.scene_objects import (
     frames_of_objects,
     own_metadata,
 )
+from athcodec.untyped import AlembicObject, JsonObject
 
 MAX_SAMPLES = 1 << 24
 MAX_OBJECTS = 1 << 20
@@ -89,7 +90,7 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
 class _Track:
     """Samples of a property over time: what it is at a time, or between which two samples."""
 
-    def __init__(self, sampling: Any, count: int):
+    def __init__(self, sampling: AlembicObject, count: int):
         if count > MAX_SAMPLES:
             raise ClipError(f"archive: got {count} samples, expected at most {MAX_SAMPLES}")
         kind = sampling.getTimeSamplingType()
@@ -101,7 +102,7 @@ class _Track:
         if not np.isfinite(self.times).all():
             raise ClipError("archive: got times that are no numbers, expected seconds")
 
-    def sample(self, number: int) -> Any:
+    def sample(self, number: int) -> AlembicObject:
         """Return the selector of a sample: by its time, because the bindings take its number for one."""
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
@@ -124,7 +125,7 @@ class _Track:
 class _Xform:
     """A transform above an object."""
 
-    schema: Any
+    schema: AlembicObject
     track: _Track
     still: np.ndarray | None = None
 
@@ -187,10 +188,10 @@ class _Object(SceneObject):
     """An object that is read, where it and its instances hang, and how its points are found. source: its path, of an
     instance that of what it shows."""
 
-    schema: Any = None
+    schema: AlembicObject = None
     places: list[_Place] = field(default_factory=list)
     source: str = ""
-    points: Any = None
+    points: AlembicObject = None
     track: _Track | None = None
 
     def tracks(self) -> Iterator[_Track]:
@@ -202,7 +203,7 @@ class _Object(SceneObject):
         return any(len(xform.track.times) > 1 for place in self.places for xform in place.xforms)
 
 
-def _clip(archive: Any, options: ReadOptions) -> MotionClip:
+def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
     metadata, kept = _kept(archive)
@@ -252,7 +253,7 @@ def _clip(archive: Any, options: ReadOptions) -> MotionClip:
 # ---- objects ----
 
 
-def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
+def _find(archive: AlembicObject, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
     """Return all objects that are read, those of instances too; adds the others to not_read, by the names of their
     kinds."""
     objects, visited, refused = [], 0, list[str]()
@@ -283,15 +284,15 @@ def _find(archive: Any, only: Sequence[str], not_read: dict[str, list[str]]) -> 
     return objects
 
 
-def _schema(child: Any) -> str:
+def _schema(child: AlembicObject) -> str:
     return child.getHeader().getMetaData().get("schema") or ""
 
 
-def _is_shape(child: Any) -> bool:
+def _is_shape(child: AlembicObject) -> bool:
     return any(_schema(child).startswith(start) for start in SCHEMAS)
 
 
-def _is_named(child: Any, patterns: Sequence[str]) -> bool:
+def _is_named(child: AlembicObject, patterns: Sequence[str]) -> bool:
     names = (child.getName(), child.getFullName())
     return any(fnmatchcase(name, pattern) for pattern in patterns for name in names)
 
@@ -312,7 +313,9 @@ def _together(objects: list[_Object]) -> list[_Object]:
     return remaining
 
 
-def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]) -> _Place:
+def _add(
+    child: AlembicObject, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]
+) -> _Place:
     """Add an object that has points and is shown; returns where its children hang."""
     name = _schema(child)
     if unread := _unread_properties(child):
@@ -340,7 +343,7 @@ def _add(child: Any, source: str, place: _Place, objects: list[_Object], not_rea
     return place
 
 
-def _unread_properties(child: Any) -> list[str]:
+def _unread_properties(child: AlembicObject) -> list[str]:
     """Return the names of properties beside the schema of an object, and, of a transform, of what users add to it."""
     if child.isInstanceRoot() or child.isInstanceDescendant():
         return []  # They are named where the instance's source stands.
@@ -353,11 +356,11 @@ def _unread_properties(child: Any) -> list[str]:
     return beside + [name for each in further if each.valid() for name in _names_of(each) if not _is_own(transform)]
 
 
-def _names_of(properties: Any) -> list[str]:
+def _names_of(properties: AlembicObject) -> list[str]:
     return [properties.getPropertyHeader(i).getName() for i in range(properties.getNumProperties())]
 
 
-def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
+def _above(child: AlembicObject, xforms: list[_Xform]) -> list[_Xform]:
     schema = AbcGeom.IXform(child, EXISTING).getSchema()
     above = xforms if schema.getInheritsXforms() else []
     count = schema.getNumSamples()
@@ -367,11 +370,11 @@ def _above(child: Any, xforms: list[_Xform]) -> list[_Xform]:
     return [transform, *above]
 
 
-def _track(samples: Any) -> _Track:
+def _track(samples: AlembicObject) -> _Track:
     return _Track(samples.getTimeSampling(), 1 if samples.isConstant() else samples.getNumSamples())
 
 
-def _visibility(child: Any) -> Iterator[_Visibility]:
+def _visibility(child: AlembicObject) -> Iterator[_Visibility]:
     """Return an object's stated visibility, if any."""
     samples = AbcGeom.GetVisibilityProperty(child)
     if samples and samples.valid() and samples.getNumSamples():
@@ -451,7 +454,7 @@ def _fixed(obj: _Object, values: Any) -> np.ndarray:
 # ---- time ----
 
 
-def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
+def _times(archive: AlembicObject, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
     """Return seconds of the frames in the archive, and frames per second, None where nothing says it."""
     tracks = [track for obj in objects for track in obj.tracks()]
     if not tracks:
@@ -468,7 +471,7 @@ def _times(archive: Any, objects: list[_Object], fps: float | None) -> tuple[np.
     return times[0] + np.arange(count) / fps, fps
 
 
-def _rate(archive: Any, step: float, times: np.ndarray) -> float:
+def _rate(archive: AlembicObject, step: float, times: np.ndarray) -> float:
     """Return the rate of the samples; where their steps differ, the one that the archive states for the tool that made
     it."""
     stated = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
@@ -482,8 +485,8 @@ def _rate(archive: Any, step: float, times: np.ndarray) -> float:
     return rate
 
 
-def _metadata(archive: Any, times: np.ndarray, rate: float | None) -> dict[str, Any]:
-    metadata: dict[str, Any] = {}
+def _metadata(archive: AlembicObject, times: np.ndarray, rate: float | None) -> JsonObject:
+    metadata: JsonObject = {}
     if rate is not None:
         start = float(times[0]) * rate
         whole = math.isclose(start, round(start), abs_tol=1e-4)
@@ -513,7 +516,7 @@ def _statics(obj: _Object, time: float) -> None:
     obj.turn_normals(obj.places[0].matrix(time), obj.moves)
 
 
-def _keep(obj: _Object, name: str, param: Any) -> None:
+def _keep(obj: _Object, name: str, param: AlembicObject) -> None:
     if not param.valid() or not param.getNumSamples():
         return
     if not param.isConstant():
@@ -538,19 +541,19 @@ def _keep(obj: _Object, name: str, param: Any) -> None:
 # ---- what exporters/alembic.py has written besides ----
 
 
-def _own_properties(schema: Any) -> Any:
+def _own_properties(schema: AlembicObject) -> AlembicObject:
     properties = schema.getUserProperties()
     if not properties.valid():
         return None
     return properties if OWN in _names_of(properties) else None
 
 
-def _is_own(schema: Any) -> bool:
+def _is_own(schema: AlembicObject) -> bool:
     """Return whether a transform is the one above everything in a file of ours, which only turns Z up into Y up."""
     return _own_properties(schema) is not None
 
 
-def _kept(archive: Any) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
+def _kept(archive: AlembicObject) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
     """Return the metadata as JSON, and further arrays, that athcodec's writer has kept."""
     top = archive.getTop()
     if top.getNumChildren() != 1:

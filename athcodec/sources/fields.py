@@ -21,6 +21,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.cells import Part, Topology
 from athcodec.sources.mesh import kind_of
 from athcodec.sources.scene_objects import scene_fields
+from athcodec.untyped import JsonObject
 
 AMBIGUOUS = "u"  # Name of the displacement in some programs and of the velocity in others.
 DISPLACEMENTS = ("displacement", "displacements", "disp", "displ", AMBIGUOUS)
@@ -34,9 +35,12 @@ class Steps(Protocol):
     elsewhere      names of the data of the first step that are not per point, and what they are per
     """
 
-    topology: Topology
-    left_out: Sequence[str]
-    elsewhere: Mapping[str, str]
+    @property
+    def topology(self) -> Topology: ...
+    @property
+    def left_out(self) -> Sequence[str]: ...
+    @property
+    def elsewhere(self) -> Mapping[str, str]: ...
 
     def points(self, step: int) -> np.ndarray:
         """Return (N, 2) or (N, 3) points of the mesh."""
@@ -57,10 +61,11 @@ class Steps(Protocol):
 def clip_of_steps(
     steps: Steps,
     time: np.ndarray,
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     name: str,
     options: ReadOptions,
     static: dict[str, np.ndarray],
+    *,
     resource: Any = None,
     unchanged: Any = None,
     parts: Sequence[Part] = (),

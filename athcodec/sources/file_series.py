@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from athcodec.sources import SERIES, ReadOptions, is_pattern
 from athcodec.sources.index_files import index_of, is_index, list_of, read_index
 from athcodec.sources.numbering import NumberedFiles, files_to_read, numbered_files
 from athcodec.sources.timing import numbered_times, plain_number, times_in_seconds
+from athcodec.untyped import JsonObject
 
 SAME = 1e-5  # Largest relative difference of times that two places state alike.
 SHOWN = 3  # Times or numbers in a message.
@@ -118,7 +118,7 @@ class Series:
 
     def clock(
         self, stated: Sequence[StatedTime | None], options: ReadOptions, fps: float | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    ) -> tuple[np.ndarray, JsonObject]:
         """Return (T,) seconds from 0, and the metadata of their rate.
 
         stated: what each file says of its own time. fps: the rate that the files say.
@@ -133,9 +133,8 @@ class Series:
                 self._compare(self.numbers, stated, "the name has", "and is not taken")
             kind = next(time.kind for time in stated if time is not None)
             if kind is not Kind.TIME:
-                self._warn(
-                    f"{_place(stated)}, {kind.value}, is taken for the time: {_shown(seconds)} s; {self._advice}"
-                )
+                shown = _shown(seconds.tolist())
+                self._warn(f"{_place(stated)}, {kind.value}, is taken for the time: {shown} s; {self._advice}")
             return self._in_seconds(seconds, rate)
         if self.numbers is None:
             return np.zeros(1), {}
@@ -145,7 +144,7 @@ class Series:
             return self._in_seconds(self.numbers, None)
         return numbered_times(self.numbers, rate)
 
-    def _in_seconds(self, seconds: np.ndarray, rate: float | None) -> tuple[np.ndarray, dict[str, Any]]:
+    def _in_seconds(self, seconds: np.ndarray, rate: float | None) -> tuple[np.ndarray, JsonObject]:
         """Return the times; the number of the first frame is that in its name, where those of all frames fit the
         times."""
         time, metadata = times_in_seconds(seconds, rate)

@@ -16,7 +16,6 @@ from __future__ import annotations
 import fnmatch
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from athcodec.sources.gltf_nodes import GltfNode, load_node, moving_nodes, nodes
 from athcodec.sources.gltf_scene import Scene
 from athcodec.sources.gltf_unread import INSTANCING, guessed, not_read
 from athcodec.sources.scene_objects import FACE_MATERIAL, MATERIAL_NAMES, Facing, presence_metadata
+from athcodec.untyped import JsonObject
 
 MOST_VERTICES = 1 << 27
 CORNER_BYTES = 96  # Bytes that a corner of a face takes; strips make three of each.
@@ -173,7 +173,7 @@ def _clip(
         node.mirrored, node.is_flipped = facing.mirrored, facing.changes
     faces, edges, face_material = _connections(file, nodes)
     names = _names(scene, nodes)
-    stated: dict[str, Any] = {}
+    stated: JsonObject = {}
     if face_material is not None and FACE_MATERIAL not in options.skip:
         attributes[FACE_MATERIAL] = face_material
         stated = {MATERIAL_NAMES: _material_names(file), "domains": {FACE_MATERIAL: "face"}}
@@ -336,7 +336,7 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
     return node.mesh == other.mesh and node.index != other.index and node.primitives == other.primitives
 
 
-def _names(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
+def _names(scene: Scene, nodes: list[GltfNode]) -> JsonObject:
     parts = _parts(scene, nodes)
     details = [
         {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in members) else {}
@@ -359,7 +359,7 @@ def _shown(scene: Scene, nodes: list[GltfNode], times: np.ndarray) -> list[np.nd
     return [np.stack([scene.shown(node.index, times) for node in part], axis=1) for part in parts]
 
 
-def _played(scene: Scene, nodes: list[GltfNode]) -> dict[str, Any]:
+def _played(scene: Scene, nodes: list[GltfNode]) -> JsonObject:
     """Return the names of the animations that move these nodes, and of those that are not played."""
     names = list(_animation_numbers(scene.file))
     movers = {node.index for node in nodes}.union(scene.ancestors(moving_nodes(nodes)))
@@ -378,7 +378,8 @@ def _other_animations(scene: Scene) -> dict[str, list[str]]:
 def _connections(
     file: GltfFile, nodes: list[GltfNode]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has one."""
+    """Return faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has
+    one."""
     indices: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials, numbers = [], _material_numbers(file)
     for node in nodes:
@@ -424,8 +425,8 @@ def _material_names(file: GltfFile) -> list[str]:
 def _attributes(
     scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: NodeMotion, keeps_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the file
-    was written with them."""
+    """Return static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the
+    file was written with them."""
     file = scene.file
     keys = dict.fromkeys(
         key

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from athcodec.sources.gltf_nodes import GltfNode, is_number, moving_nodes, tripl
 from athcodec.sources.gltf_scene import Scene, key_rate, off_grid
 from athcodec.sources.scene_objects import Facing
 from athcodec.sources.timing import warn_of_missed
+from athcodec.untyped import JsonObject
 
 WORK_BYTES = 64 << 20
 MOST_FRAMES = 1 << 20
@@ -147,7 +147,7 @@ class Sampling:
 
     fps: float
     times: np.ndarray
-    clock: dict[str, Any]
+    clock: JsonObject
     is_loop: bool = False
 
 
@@ -177,7 +177,7 @@ def sampling_of(motion: NodeMotion, wanted: float | None) -> Sampling:
     return Sampling(float(fps), _on_keys(times, keys, fps), clock, is_loop)
 
 
-def _stated_extras(scene: Scene) -> dict[str, Any]:
+def _stated_extras(scene: Scene) -> JsonObject:
     """Return the extras: those of the file, overridden by those of the animation."""
     items = [scene.file.json["asset"]]
     if len(scene.played) == 1:
@@ -193,7 +193,7 @@ def _returns(motion: NodeMotion, keys: np.ndarray) -> bool:
     return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 
 
-def _stated_rate(extras: dict, keys: np.ndarray) -> float | None:
+def _stated_rate(extras: JsonObject, keys: np.ndarray) -> float | None:
     """Return the frame rate that the file states, if its keys agree."""
     fps = extras.get("fps")
     return float(fps) if is_number(fps) and 0 < fps < 1e6 and not off_grid(keys, fps).any() else None

@@ -13,6 +13,7 @@ from athcodec.files.gltf.json import brief, entries, entry, extension, integer
 from athcodec.motion.quaternions import rotation_matrices
 from athcodec.sources.gltf_scene import Scene
 from athcodec.sources.gltf_unread import INSTANCE_PARTS, INSTANCING
+from athcodec.untyped import JsonObject, JsonValue
 
 INSTANCE_BYTES = 256  # Bytes that an instance takes.
 INFLUENCE_BYTES = 100  # Bytes that a joint of a vertex takes.
@@ -35,7 +36,7 @@ class GltfNode:
     first: int = 0
     count: int = 0
     kind: str = "points"
-    primitives: list[dict] = field(default_factory=list)
+    primitives: list[JsonObject] = field(default_factory=list)
     base: np.ndarray | None = None
     joints: list[int] = field(default_factory=list)
     bind: np.ndarray | None = None
@@ -56,7 +57,7 @@ class GltfNode:
         return slice(self.first, self.first + self.count)
 
 
-def nodes_of_mesh(scene: Scene, index: int, mesh: dict, name: str) -> list[GltfNode]:
+def nodes_of_mesh(scene: Scene, index: int, mesh: JsonObject, name: str) -> list[GltfNode]:
     """Return one per set of vertices: primitives that use the same accessors share theirs."""
     copies, of_copies = _copies(scene, index)
     nodes: dict[Any, GltfNode] = {}
@@ -147,7 +148,7 @@ def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
     return attributes
 
 
-def _refuse_draco(file: GltfFile, primitive: dict, positions: int) -> None:
+def _refuse_draco(file: GltfFile, primitive: JsonObject, positions: int) -> None:
     packed = DRACO in (primitive.get("extensions") or {})
     if packed and file.item("accessors", positions).get("bufferView") is None:
         raise ClipError(f"meshes: got {DRACO}, expected a file without it: {UNPACKED_BY}")
@@ -180,7 +181,7 @@ def triples(file: GltfFile, index: int, count: int, subject: str) -> np.ndarray:
     return values
 
 
-def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
+def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.ndarray:
     if skin.get("inverseBindMatrices") is None:
         return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
     file.budget.take(256 * file.count(skin["inverseBindMatrices"]), "skins")
@@ -191,7 +192,8 @@ def _bind_matrices(file: GltfFile, skin: dict, joint_count: int) -> np.ndarray:
 
 
 def _load_influences(node: GltfNode, file: GltfFile) -> None:
-    """Per joint its vertices and their weights, which add up to 1; where a file has none, the first joint counts."""
+    """Load for each joint its vertices and their weights, which add up to 1; where a file has none, the first joint
+    counts."""
     vertex, joint, weight = [], [], []
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
@@ -229,7 +231,7 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
     node.strongest[vertex[order]] = joint[order]
 
 
-def is_number(value: Any) -> bool:
+def is_number(value: JsonValue) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e15
 
 

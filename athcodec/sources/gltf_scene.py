@@ -20,6 +20,7 @@ from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import brief, entries, entry, extension, indices, integer, vector
 from athcodec.motion.quaternions import normalized, rotation_matrices
+from athcodec.untyped import JsonObject
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
 COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
@@ -58,7 +59,7 @@ class Channel(NamedTuple):
     sampler: int
 
 
-def target_of(channel: dict) -> Target | str:
+def target_of(channel: JsonObject) -> Target | str:
     """Return what a channel animates; where that is nothing that is played, its pointer or a name for it. Raises
     ClipError."""
     target = entry(channel, "target")
@@ -263,7 +264,7 @@ class Scene:
         for tracks in self._weights.values():  # A node's weights count more than its mesh's, and single ones than all.
             tracks.sort(key=lambda each: (each[0].holder == "nodes", each[0].weight >= 0))
 
-    def _track(self, sampler: dict, target: Target, where: str) -> Track:
+    def _track(self, sampler: JsonObject, target: Target, where: str) -> Track:
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
             raise ClipError(

@@ -7,13 +7,14 @@ move nothing are named, too, because a reader cannot know what they mean to the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.json import entries, entry, extension
 from athcodec.files.gltf.motion import EXTENSION
 from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
 from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
+from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
     from athcodec.sources.gltf_nodes import GltfNode
@@ -53,16 +54,16 @@ def not_read(scenes: Sequence[Scene], nodes: Sequence[GltfNode], keeps_normals: 
     return unread
 
 
-def _add(unread: dict[str, list[str]], kind: str, number: int, item: Any) -> None:
+def _add(unread: dict[str, list[str]], kind: str, number: int, item: JsonValue) -> None:
     unread.setdefault(kind, []).append(_name(kind.lower(), number, item))
 
 
-def _name(kind: str, number: int, item: Any) -> str:
+def _name(kind: str, number: int, item: JsonValue) -> str:
     name = item.get("name") if isinstance(item, dict) else None
     return name if isinstance(name, str) and name else f"{kind} {number}"
 
 
-def guessed(item: Any) -> list[Any]:
+def guessed(item: JsonValue) -> list[JsonValue]:
     """Return the names of what athcodec's writer has guessed of a part of the file."""
     extras = item.get("extras") if isinstance(item, dict) else None
     entry = extras.get(OWN) if isinstance(extras, dict) else None
@@ -117,7 +118,7 @@ def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
                 yield kind, f"{_name('animation', index, animation)}: {pointer}"
 
 
-def _parts(file: GltfFile) -> Iterator[tuple[str, int, dict]]:
+def _parts(file: GltfFile) -> Iterator[tuple[str, int, JsonObject]]:
     """Yield (kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
     yield "file", 0, file.json
     yield "asset", 0, entry(file.json, "asset")

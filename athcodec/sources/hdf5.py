@@ -27,11 +27,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from os import fspath
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -47,6 +46,7 @@ from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import POSITIONS, Stored, clip_of_arrays
+from athcodec.untyped import ArrayLike, H5Object, JsonMapping, JsonObject, JsonValue
 
 CHUNK_CACHE_BYTES = 16 << 20
 CACHE_SLOTS = 8191  # Chunks that the cache of a small dataset has places for.
@@ -154,11 +154,11 @@ class _Datasets:
         for name in ("domains", THRESHOLDS, PRESENCE, "part_usd"):
             if isinstance(self.metadata.get(name), str):
                 self.metadata[name] = _parsed(name, self.metadata[name])
-        seen: set[Any] = set()
+        seen: set[H5Object] = set()
         for name in sorted((name.lstrip("/") for name in _names(file)), key=lambda name: name.split("/")):
             self._add(name, seen)
 
-    def _add(self, name: str, seen: set[Any]) -> None:
+    def _add(self, name: str, seen: set[H5Object]) -> None:
         """Take the dataset of a name into `stored`, or name what it is in place of one."""
         link, item = self._file.get(name, getlink=True), self._file.get(name)
         if item is None:
@@ -209,7 +209,7 @@ class _Datasets:
             return np.array(rows).reshape(self.stored[name].shape)
         return values.T.astype(bool) if kind == "logical" else values.T
 
-    def positions(self, name: str, order: Order) -> Any:
+    def positions(self, name: str, order: Order) -> ArrayLike:
         dataset = _unpacked_once(self._file, name, self._budget)
         order = order[::-1] if _is_matlab(dataset) else order
         positions = ordered(dataset, order)
@@ -218,7 +218,7 @@ class _Datasets:
         self._budget.need(4 * frame + chunk_bytes(dataset), f"{name}: a frame")
         return positions
 
-    def notes(self, name: str) -> Mapping[str, Any]:
+    def notes(self, name: str) -> JsonMapping:
         return _notes(self._file[name], False)
 
     def labels(self, name: str) -> Sequence[str]:
@@ -228,12 +228,12 @@ class _Datasets:
         ]
 
 
-def _notes(item: Any, of_file: bool = True) -> dict[str, Any]:
+def _notes(item: H5Object, of_file: bool = True) -> JsonObject:
     """Return the attributes of a file, group or dataset; of the latter two without those by which libraries find their
     way."""
     if of_file:
         return {name: _to_python(item.attrs[name]) for name in item.attrs}
-    notes: dict[str, Any] = {}
+    notes: JsonObject = {}
     for name in item.attrs:
         if name not in BOOKKEEPING and not name.startswith(BOOKKEEPING_OF):
             notes[name] = None
@@ -323,7 +323,7 @@ def may_explode(file: h5py.File, limit: int) -> bool:
     size = os.fstat(file.id.get_vfd_handle()).st_size
     verdicts: list[bool] = [_texts_are_more(file, size, limit)]
 
-    def visit(_: str, item: Any) -> None:
+    def visit(_: str, item: H5Object) -> None:
         is_more = isinstance(item, h5py.Dataset) and unpacks_to_more(item, limit)
         verdicts.append(is_more or (hasattr(item, "attrs") and _texts_are_more(item, size, limit)))
 
@@ -331,7 +331,7 @@ def may_explode(file: h5py.File, limit: int) -> bool:
     return any(verdicts)
 
 
-def _texts_are_more(item: Any, size: int, limit: int) -> bool:
+def _texts_are_more(item: H5Object, size: int, limit: int) -> bool:
     """Return whether attributes may hold more than `limit` bytes of text, each as long as the file of `size` bytes."""
     texts = 0
     for name in item.attrs:
@@ -356,7 +356,7 @@ def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
         return False
     largest = 0
 
-    def see(chunk: Any) -> None:
+    def see(chunk: H5Object) -> None:
         nonlocal largest
         largest = max(largest, chunk.size)
 
@@ -378,14 +378,14 @@ def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
         raise ClipError(f"{name}: the dataset cannot be read: {error}") from error
 
 
-def _parsed(name: str, text: str) -> Any:
+def _parsed(name: str, text: str) -> JsonValue:
     try:
         return json.loads(text)
     except ValueError as error:
         raise ClipError(f"{name}: got {text[:40]!r}, expected JSON: {error}") from None
 
 
-def _to_python(value: Any) -> Any:
+def _to_python(value: JsonValue) -> JsonValue:
     """Return an HDF5 attribute as str, int, float, bool, None or nested lists of them."""
     if isinstance(value, h5py.Empty):
         return None

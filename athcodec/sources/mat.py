@@ -7,7 +7,7 @@ matrices and arrays of structs are named as not read. Vertices are counted from 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from os import fspath
 from typing import Any
 
@@ -21,6 +21,7 @@ from athcodec.motion.positions import Order, ordered
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import read_apart
 from athcodec.sources.schema import Stored, clip_of_arrays
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 MOST_NESTED = 16  # Structs inside structs.
 SYSTEM = "__"  # Beginning of names that SciPy adds.
@@ -50,9 +51,9 @@ class _Variables:
 
     counts_from_1 = True
 
-    def __init__(self, variables: Mapping[str, Any]):
+    def __init__(self, variables: JsonMapping):
         self._arrays: dict[str, np.ndarray] = {}
-        self.metadata: dict[str, Any] = {}
+        self.metadata: JsonObject = {}
         self.not_read: dict[str, list[str]] = {}
         for name, values in variables.items():
             if not name.startswith(SYSTEM):
@@ -73,10 +74,10 @@ class _Variables:
     def read(self, name: str) -> np.ndarray:
         return self._arrays[name]
 
-    def positions(self, name: str, order: Order) -> Any:
+    def positions(self, name: str, order: Order) -> ArrayLike:
         return ordered(self._arrays[name], order)
 
-    def notes(self, name: str) -> Mapping[str, Any]:
+    def notes(self, name: str) -> JsonMapping:
         return {}
 
     def labels(self, name: str) -> Sequence[str]:

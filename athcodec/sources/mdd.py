@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import struct
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.pc2 import check_size, open_cache
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import times_in_seconds
+from athcodec.untyped import JsonObject
 
 HEADER = struct.Struct(">ii")
 
@@ -30,7 +31,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     return open_cache(path, options, _read_header)
 
 
-def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
+def _read_header(file: BinaryIO, options: ReadOptions) -> JsonObject:
     frame_count, vertex_count = HEADER.unpack(read_exactly(file, HEADER.size, "header"))
     if not 0 < 4 * frame_count <= os.fstat(file.fileno()).st_size:
         raise ClipError(f"header: got {frame_count} frames, expected at least one and no more than the file can hold")

@@ -323,7 +323,7 @@ class _Plants:
         return entity
 
 
-def _only_breaks(match: re.Match) -> str:
+def _only_breaks(match: re.Match[str]) -> str:
     return "\n" * match[0].count("\n")
 
 

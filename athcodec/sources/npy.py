@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import tokenize
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -22,6 +22,7 @@ from athcodec.motion.positions import FRAMES, Order, ordered
 from athcodec.sources import ReadOptions
 from athcodec.sources.raw import RawRows
 from athcodec.sources.schema import Stored, clip_of_arrays
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 BROKEN = (
     OSError,
@@ -107,18 +108,18 @@ class _Array:
         self._file, self._budget, self._header = file, budget, read_header("array", file)
         check_size("array", self._header, os.fstat(file.fileno()).st_size - self._header.size)
         self.stored = {"": Stored("", self._header.shape, self._header.dtype)}
-        self.metadata: dict[str, Any] = {}
+        self.metadata: JsonObject = {}
         self.not_read: dict[str, list[str]] = {}
 
     def read(self, name: str) -> np.ndarray:
         raise ClipError(f"{name}: got no such array, expected the only one")
 
-    def positions(self, name: str, order: Order) -> Any:
+    def positions(self, name: str, order: Order) -> ArrayLike:
         header = self._header
         rows = RawRows(self._file, header.size, rows_shape(header), header.dtype)
         return positions_of_rows("positions", rows, header, order, self._budget)
 
-    def notes(self, name: str) -> Mapping[str, Any]:
+    def notes(self, name: str) -> JsonMapping:
         return {}
 
     def labels(self, name: str) -> Sequence[str]:

@@ -14,7 +14,7 @@ import struct
 import sys
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, BinaryIO
 
@@ -29,6 +29,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.npy import BROKEN, Header, check_size, positions_of_rows, read_header, rows_shape
 from athcodec.sources.raw import RawRows, read_exactly
 from athcodec.sources.schema import Stored, clip_of_arrays
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 SUFFIX = ".npy"
 METADATA = "metadata"
@@ -69,7 +70,7 @@ class _Members:
         self._file, self._archive, self._budget = file, zipfile.ZipFile(file), budget
         self._members: dict[str, zipfile.ZipInfo] = {}
         self._headers: dict[str, Header] = {}
-        self.metadata: dict[str, Any] = {}
+        self.metadata: JsonObject = {}
         self.not_read: dict[str, list[str]] = {}
         for info in self._archive.infolist():
             self._add(info.filename.removesuffix(SUFFIX), info)
@@ -109,7 +110,7 @@ class _Members:
                 raise ClipError(f"{name}: got text with numbers beyond those of letters, expected Unicode")
         return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
 
-    def positions(self, name: str, order: Order) -> Any:
+    def positions(self, name: str, order: Order) -> ArrayLike:
         info, header = self._members[name], self._headers[name]
         check_size(name, header, info.file_size - header.size)
         if info.compress_type == zipfile.ZIP_STORED:
@@ -118,7 +119,7 @@ class _Members:
             rows = _UnpackedRows(self._file, self._archive, info, header)
         return positions_of_rows(name, rows, header, order, self._budget)
 
-    def notes(self, name: str) -> Mapping[str, Any]:
+    def notes(self, name: str) -> JsonMapping:
         return {}
 
     def labels(self, name: str) -> Sequence[str]:
@@ -138,7 +139,7 @@ class _Members:
         return int(start)
 
 
-def _parsed(values: np.ndarray) -> dict[str, Any]:
+def _parsed(values: np.ndarray) -> JsonObject:
     """Return the metadata in an array of JSON text."""
     try:
         text = values.reshape(()).item()

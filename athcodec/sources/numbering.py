@@ -110,7 +110,7 @@ def numbering_of(path: FilePath) -> Numbering | None:
 def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, str]]:
     """Return the names of the files with only a number between prefix and suffix, the sign of each, and its digits."""
     form = re.compile(re.escape(prefix) + r"(-?)([0-9]+)" + re.escape(suffix))
-    return [(name, *match.groups()) for name in os.listdir(folder) if (match := form.fullmatch(name))]
+    return [(name, match[1], match[2]) for name in os.listdir(folder) if (match := form.fullmatch(name))]
 
 
 def numbered_files(path: FilePath) -> NumberedFiles:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.reading import Budget
 from athcodec.sources.cells import Block, topology_of
 from athcodec.sources.mesh import kind_of
+from athcodec.untyped import JsonObject
 
 NODE, CELL = "node", "cell"
 
@@ -66,7 +67,7 @@ class JoinedSteps:
         self.left_out = self._add_cell_data()
         self._warned: set[str] = set()
 
-    def objects(self) -> dict[str, Any]:
+    def objects(self) -> JsonObject:
         """Return what scene_objects.scene_fields takes: names, numbers of vertices and kinds of the parts."""
         return {
             "names": [part.name for part in self._parts],

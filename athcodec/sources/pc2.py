@@ -24,9 +24,11 @@ from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import FORMATS, ReadOptions, read
-from athcodec.sources.mesh import Mesh, read_mesh
+from athcodec.sources.mesh import Mesh
+from athcodec.sources.mesh_files import read_mesh
 from athcodec.sources.raw import raw_frames, read_exactly
 from athcodec.sources.timing import numbered_times
+from athcodec.untyped import JsonObject
 
 MAGIC = b"POINTCACHE2\0"
 HEADER = struct.Struct("<12siiffi")
@@ -39,7 +41,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     return open_cache(path, options, _read_header)
 
 
-def _read_header(file: BinaryIO, options: ReadOptions) -> dict[str, Any]:
+def _read_header(file: BinaryIO, options: ReadOptions) -> JsonObject:
     fields = HEADER.unpack(read_exactly(file, HEADER.size, "header"))
     magic, version, vertex_count, first, step, frame_count = fields
     if magic != MAGIC:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import BinaryIO
 
 import numpy as np
+from numpy import typing as npt
 
 from athcodec.errors import ClipError
 from athcodec.motion.frames import Frames
@@ -27,7 +28,7 @@ class RawRows:
         In any byte order; rows come in that of the machine.
     """
 
-    def __init__(self, file: BinaryIO, offset: int, shape: tuple[int, ...], dtype: object):
+    def __init__(self, file: BinaryIO, offset: int, shape: tuple[int, ...], dtype: npt.DTypeLike):
         self._file, self._offset, self._stored = file, offset, np.dtype(dtype)
         self.shape, self.dtype = shape, self._stored.newbyteorder("=")
 
@@ -51,7 +52,7 @@ class RawRows:
         return block.astype(self.dtype, copy=False)[(slice(None), *others)]
 
 
-def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: object) -> Frames:
+def raw_frames(file: BinaryIO, offset: int, frame_count: int, vertex_count: int, dtype: npt.DTypeLike) -> Frames:
     """Return the (T, N, 3) numbers of `dtype`, in any byte order, that begin at `offset` of `file`. The caller has
     checked that the file is long enough."""
     rows = RawRows(file, offset, (frame_count, vertex_count, 3), dtype)

@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from athcodec.files.reading import no_room
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import ARRAYS
+from athcodec.untyped import JsonObject
 
 try:
     import resource
@@ -92,7 +93,7 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest
-    facts: dict[str, Any] = {
+    facts: JsonObject = {
         "shape": (clip.frame_count, clip.vertex_count, 3),
         "dtype": clip.dtype.str,
         "rest_given": clip.rest_given,

@@ -15,7 +15,6 @@ import threading
 import warnings
 import weakref
 from os import fspath
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from athcodec.files.reading import FileWatch, closing_on_failure, naming
 from athcodec.motion.clip import MotionClip, Skin
 from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
+from athcodec.untyped import JsonObject
 
 ARRAYS = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces")
 MAIN = "athcodec.sources.reader_main"
@@ -83,7 +83,7 @@ class _Process:
             env=env,
         )
         self._end = weakref.finalize(self, _stop, self._process)
-        wanted: dict[str, Any] = dataclasses.asdict(options)
+        wanted: JsonObject = dataclasses.asdict(options)
         wanted |= {"path": os.path.abspath(path), "mesh": None, "root": None}
         wanted |= {name: list(wanted[name]) for name in ("only", "takes", "skip")}
         with naming(path), closing_on_failure(self):

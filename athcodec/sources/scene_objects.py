@@ -20,6 +20,7 @@ from athcodec.motion.frames import Frames, is_far
 from athcodec.motion.presence import PRESENCE, frame_runs
 from athcodec.motion.units import METRES_PER_UNIT
 from athcodec.sources import ReadOptions
+from athcodec.untyped import JsonObject, JsonValue
 
 MOST_VERTICES = 1 << 27  # Largest number of vertices that copies may make.
 MAX_METADATA_BYTES = 1 << 24
@@ -173,7 +174,7 @@ class SceneObject:
                 static.values = static.values[order]
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Transform normals to world space; remove them where they turn in time, or have no direction there."""
+        """Turn normals to world space; remove them where they turn in time, or have no direction there."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return
@@ -223,7 +224,7 @@ def clip_of_objects(
     objects: list[Any],
     frames: Frames,
     time: np.ndarray,
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     kept: Iterable[tuple[ArrayDescriptor, bytes]],
     options: ReadOptions,
     **more: Any,
@@ -338,8 +339,8 @@ def _add_kept(
             domains[name] = domain
 
 
-def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
-    """Metadata: the names, or the paths where names come twice."""
+def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
+    """Return metadata: the names, or the paths where names come twice."""
     names = [obj.name for obj in objects]
     unique = len(set(names)) == len(names)
     metadata = {
@@ -349,9 +350,9 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> dict[str, Any]:
     return metadata | ({"part_usd": [obj.details for obj in objects]} if any(obj.details for obj in objects) else {})
 
 
-def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> dict[str, Any]:
-    """Metadata: the frames that show each object, or each of its copies, that some frame does not show. presence:
-    (T, 1) or (T, copies) bool for each object."""
+def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> JsonObject:
+    """Return metadata: the frames that show each object, or each of its copies, that some frame does not show.
+    presence: (T, 1) or (T, copies) bool for each object."""
     stated = {}
     for name, shown in zip(names, presence):
         if (shown == shown[:, :1]).all():
@@ -391,7 +392,8 @@ def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Static arrays of all objects, one after the other, and what their rows stand for where that is no vertex."""
+    """Return static arrays of all objects, one after the other, and what their rows stand for where that is no
+    vertex."""
     attributes, domains = {}, {}
     for name in dict.fromkeys(name for obj in objects for name in obj.statics):
         if name in skip:
@@ -453,7 +455,7 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
     return np.repeat(static.values, obj.face_counts, axis=0)
 
 
-def scene_of_json(text: str | bytes) -> dict[str, Any]:
+def scene_of_json(text: str | bytes) -> JsonObject:
     """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
     with suppress(ValueError, RecursionError):
         entries = json.loads(text)
@@ -464,7 +466,7 @@ def scene_of_json(text: str | bytes) -> dict[str, Any]:
     return {}
 
 
-def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def scene_fields(entries: JsonObject, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
     """Return (metadata, attributes) of a clip of `count` vertices; objects where they fit its vertices, names where
     they are some."""
     metadata = {key: value for key, value in entries.items() if key not in ("objects", MATERIAL_NAMES, FACE_MATERIAL)}
@@ -475,7 +477,7 @@ def scene_fields(entries: dict[str, Any], count: int) -> tuple[dict[str, Any], d
     return metadata | objects, numbers
 
 
-def _object_fields(entries: Any, count: int) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def _object_fields(entries: Any, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
     entries = entries if isinstance(entries, dict) else {}
     names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(
@@ -491,17 +493,17 @@ def _object_fields(entries: Any, count: int) -> tuple[dict[str, Any], dict[str, 
     return metadata, {keys[key]: np.array(each, np.int32) for key, each in numbers.items()}
 
 
-def _are_names(value: Any) -> bool:
+def _are_names(value: JsonValue) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _join_materials(
     objects: list[SceneObject],
-    metadata: dict[str, Any],
+    metadata: JsonObject,
     attributes: dict[str, np.ndarray],
     domains: dict[str, str],
     skip: Collection[str],
-) -> dict[str, Any]:
+) -> JsonObject:
     """Add "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
     Names come in the order that the file was written from, where it says one."""
     if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
@@ -550,7 +552,7 @@ def _edges(objects: list[SceneObject]) -> np.ndarray | None:
     return np.concatenate(edges).astype(np.int32) if edges else None
 
 
-def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[str, Any]:
+def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> JsonObject:
     """Take what a MotionClip has members for out of the attributes; others of these names are renamed."""
     fields = {}
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
@@ -572,7 +574,7 @@ def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> dict[
     return fields
 
 
-def own_metadata(text: Any) -> dict[str, Any]:
+def own_metadata(text: Any) -> JsonObject:
     """Return the JSON metadata that our exporter kept besides what the format itself holds; else nothing."""
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}

@@ -36,6 +36,7 @@ from athcodec.motion.positions import (
 )
 from athcodec.motion.units import METRES, unit_symbol
 from athcodec.sources import ReadOptions
+from athcodec.untyped import ArrayLike, JsonMapping, JsonObject
 
 POSITIONS = "positions"
 BRANCHES = ("vertex_branch", "branch_parent", "stem_index")
@@ -85,18 +86,22 @@ class Arrays(Protocol):
     counts_from_1  whether the program that wrote it numbers vertices from 1
     """
 
-    stored: Mapping[str, Stored]
-    metadata: dict[str, Any]
-    not_read: dict[str, list[str]]
-    counts_from_1: bool
+    @property
+    def stored(self) -> Mapping[str, Stored]: ...
+    @property
+    def metadata(self) -> JsonObject: ...
+    @property
+    def not_read(self) -> dict[str, list[str]]: ...
+    @property
+    def counts_from_1(self) -> bool: ...
 
     def read(self, name: str) -> np.ndarray:
         """Return the whole array."""
 
-    def positions(self, name: str, order: Order) -> Any:
+    def positions(self, name: str, order: Order) -> ArrayLike:
         """Return (T, N, 3) frames of an array whose axes have this order, read when they are sliced."""
 
-    def notes(self, name: str) -> Mapping[str, Any]:
+    def notes(self, name: str) -> JsonMapping:
         """Return what the file says of an array, or of a group."""
 
     def labels(self, name: str) -> Sequence[str]:
@@ -214,7 +219,7 @@ class _Clip:
             beside = f", not {others}" if others else ""
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
-    def _order(self, name: str, known: Mapping[str, Any]) -> Order:
+    def _order(self, name: str, known: JsonMapping) -> Order:
         stored = self.arrays.stored[name]
         stated = self.options.order or order_of_labels(self.arrays.labels(name))
         try:
@@ -224,7 +229,7 @@ class _Clip:
                 f"{error}; --dataset (dataset=) names another array; {listing(self.arrays.stored)}"
             ) from None
 
-    def _facts(self, known: Mapping[str, Any]) -> dict[str, tuple[str, int]]:
+    def _facts(self, known: JsonMapping) -> dict[str, tuple[str, int]]:
         facts = facts_of(known)
         if "time" not in facts and self.options.fps is None and len(guess := self._guessed_times()) == 1:
             name, count = guess[0], self.arrays.stored[guess[0]].shape
@@ -275,7 +280,7 @@ class _Clip:
                     known[name] = values.astype(np.int64) - 1
             self._warn(f"{names[0]}: the lowest number is {first.min()}, so they were taken to be counted from 1")
 
-    def _metadata(self, name: str) -> dict[str, Any]:
+    def _metadata(self, name: str) -> JsonObject:
         """Return what the file says, the groups of the positions, and the positions themselves."""
         metadata = dict(self.arrays.metadata)
         groups = [full.rpartition("/")[0] for full in _upwards(name, "")]
@@ -301,13 +306,13 @@ class _Clip:
         self._name_notes(name, notes)
         return metadata
 
-    def _name_notes(self, name: str, notes: Mapping[str, Any]) -> None:
+    def _name_notes(self, name: str, notes: JsonMapping) -> None:
         if notes:
             self.not_read.setdefault(NOTE, []).extend(f"{name}@{key}" for key in notes)
 
     # ---- times ----
 
-    def _times(self, known: Mapping[str, Any], metadata: dict[str, Any], frame_count: int) -> np.ndarray:
+    def _times(self, known: JsonMapping, metadata: JsonObject, frame_count: int) -> np.ndarray:
         """Return (T,) seconds: of the schema's time, else by a rate, else of what seems to be one of both."""
         if known["time"] is not None:
             return self._in_seconds(self.used["time"], known["time"])
@@ -338,7 +343,7 @@ class _Clip:
         return np.arange(frame_count) / frame_rate(metadata)
 
     @staticmethod
-    def _row_of_times(metadata: Mapping[str, Any], frame_count: int) -> str | None:
+    def _row_of_times(metadata: JsonMapping, frame_count: int) -> str | None:
         """Return the name of metadata that seem to be times: ascending numbers, one for each frame."""
         for key, row in metadata.items():
             is_row = (
@@ -373,7 +378,7 @@ class _Clip:
                 return guesses
         return []
 
-    def _guess_rate(self, metadata: dict[str, Any]) -> None:
+    def _guess_rate(self, metadata: JsonObject) -> None:
         """Add the rate that metadata, or arrays of one item, state under another name than fps."""
         stated = {key: value for key, value in metadata.items() if _plain(key) in RATE_NAMES | STEP_NAMES}
         groups = {full.rpartition("/")[0] for full in _upwards(self.used[POSITIONS], "")}
@@ -463,7 +468,7 @@ def _plain(key: str) -> str:
 
 
 def _branches(
-    positions: Any, known: Mapping[str, np.ndarray | None], metadata: dict[str, Any], options: ReadOptions
+    positions: ArrayLike, known: Mapping[str, np.ndarray | None], metadata: JsonObject, options: ReadOptions
 ) -> dict[str, np.ndarray | None]:
     """Return the branches of the file, else those that its edges make."""
     branches = {name: known[name] for name in BRANCHES}

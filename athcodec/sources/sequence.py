@@ -2,9 +2,9 @@
 
 Which files these are, and at what times, say their names or an index: see file_series.py. A file without a number is a
 motion of one frame. One file is in memory at a time. Faces and edges come from the first file, and so do texture
-coordinates and other arrays that are the same in all; the clip's `not_read` names those that change. See mesh.py for
-what is read of a file. Exporters that split vertices (Blender's PLY does where texture coordinates are to be written)
-split those of all frames alike.
+coordinates and other arrays that are the same in all; the clip's `not_read` names those that change. See obj.py and
+ply.py for what is read of a file. Exporters that split vertices (Blender's PLY does where texture coordinates are to be
+written) split those of all frames alike.
 """
 
 from __future__ import annotations
@@ -22,19 +22,10 @@ from athcodec.motion.clip import MotionClip, stated_fps
 from athcodec.motion.frames import Frames
 from athcodec.sources import ReadOptions
 from athcodec.sources.file_series import Series, StatedTime, series_of, time_in_text
-from athcodec.sources.mesh import (
-    NAMED,
-    POSITION_COLUMNS,
-    Mesh,
-    comments,
-    narrowed,
-    obj_lines,
-    obj_points,
-    parse_mesh,
-    ply_header,
-    ply_points,
-    same_values,
-)
+from athcodec.sources.mesh import NAMED, Mesh, comments, same_values
+from athcodec.sources.mesh_files import parse_mesh
+from athcodec.sources.obj import narrowed, obj_lines, obj_points
+from athcodec.sources.ply import POSITION_COLUMNS, ply_header, ply_points
 
 _ELEMENTS = (b"f ", b"f\t", b"l ", b"l\t")
 _LABELS = (b"vt ", b"vt\t", b"usemtl ", b"usemtl\t", b"o ", b"o\t", b"g ", b"g\t")
@@ -213,7 +204,7 @@ def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
     head, end = data[: header.length], header.length + vertex.count * dtype.itemsize
     tail = data[end:]
     first = np.frombuffer(data, dtype, vertex.count, len(head))
-    others = [name for name in dtype.names if name not in POSITION_COLUMNS]
+    others = [name for name in dtype.names or () if name not in POSITION_COLUMNS]
 
     def points(data: bytes) -> np.ndarray | None:
         if data[: len(head)] != head or data[end:] != tail:

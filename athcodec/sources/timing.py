@@ -6,19 +6,19 @@ Where a file has no rate and none is given, frames come DEFAULT_FPS a second, an
 from __future__ import annotations
 
 import warnings
-from typing import Any
 
 import numpy as np
 
 from athcodec.errors import GuessWarning
 from athcodec.motion.clip import DEFAULT_FPS
+from athcodec.untyped import JsonObject
 
 SAME_TIME = 1e-5  # Largest difference of equal times, in seconds.
 MOST_FPS = 1000.0  # Highest rate that is advised.
 MOST_FRAMES = 100_000  # Most frames of a rate that is advised.
 
 
-def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
+def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, JsonObject]:
     """Return (T,) seconds from 0 of frames with these numbers in the tool that made them, and the metadata that says
     so.
 
@@ -27,13 +27,13 @@ def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, 
     """
     numbers = np.asarray(numbers, np.float64)
     rate = fps or DEFAULT_FPS
-    metadata: dict[str, Any] = {"start_frame": whole(numbers[0])}
+    metadata: JsonObject = {"start_frame": whole(numbers[0])}
     if fps is not None or (np.diff(numbers) != 1).any():
         metadata["fps"] = float(rate)
     return (numbers - numbers[0]) / rate, metadata
 
 
-def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray, dict[str, Any]]:
+def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray, JsonObject]:
     """Return (T,) seconds from 0 of frames whose times a file has as float32 or float64, and the metadata of their
     rate.
 
@@ -52,8 +52,8 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
 
 
 def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
-    """A GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which is at
-    `start` seconds (default: at the first key that is not missed, else at 0)."""
+    """Warn with a GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which
+    is at `start` seconds (default: at the first key that is not missed, else at 0)."""
     if not missed.any():
         return
     met = keys[~missed]
@@ -94,7 +94,7 @@ def whole(number: float) -> int | float:
     return int(number) if number == int(number) else float(number)
 
 
-def _start(number: float) -> dict[str, Any]:
+def _start(number: float) -> JsonObject:
     return {"start_frame": whole(number)} if np.isfinite(number) and number else {}
 
 

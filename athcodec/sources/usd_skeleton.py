@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pxr import Usd, UsdSkel, Vt
+from pxr import Sdf, Usd, UsdSkel, Vt
 
 from athcodec.errors import ClipError
 from athcodec.motion.clip import Skin
 from athcodec.sources.usd_values import PrimObject, lineage
+from athcodec.untyped import UsdObject
 
 
 class Skeleton:
@@ -130,9 +129,11 @@ def _missing_animation(skeleton: Usd.Prim) -> str | None:
     return None
 
 
-def skin_of(objects: list[PrimObject], queries: list[tuple[Any, UsdSkel.SkeletonQuery]]) -> Skin | None:
+def skin_of(objects: list[PrimObject], queries: list[tuple[UsdObject, UsdSkel.SkeletonQuery]]) -> Skin | None:
     """Return the joints of all skeletons, one after the other."""
-    parents, names, first = [], [], {}
+    parents: list[np.ndarray] = []
+    names: list[str] = []
+    first: dict[Sdf.Path, int] = {}
     for _, query in queries:
         path = query.GetPrim().GetPath()
         if path in first:

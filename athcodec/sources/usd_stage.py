@@ -69,6 +69,7 @@ from athcodec.sources.usd_values import (
     value_at,
     visibility,
 )
+from athcodec.untyped import JsonObject
 
 # Types of prims that need no note when they are not read.
 READ = frozenset(("", "Xform", "Scope", "SkelRoot", "Skeleton", "SkelAnimation", "BlendShape"))
@@ -127,8 +128,8 @@ class _Stage:
 
 
 def _check_layers(path: str, allow_outside: bool) -> None:
-    """ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the folder of
-    the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
+    """Raise ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the
+    folder of the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
     folder, waiting, seen = Path(path).parent, [path], set()
     while waiting:
         name = waiting.pop()
@@ -359,7 +360,7 @@ def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, lis
 
 
 def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[PrimObject, int], np.ndarray]) -> None:
-    """Fills in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
+    """Fill in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
     for obj in objects:
         _follow_ids(obj, codes)
@@ -446,9 +447,9 @@ def _note(obj: PrimObject, name: str, attribute: Usd.Attribute, usual: str) -> N
 # ---- time ----
 
 
-def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> dict[str, Any]:
+def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> JsonObject:
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
-    metadata: dict[str, Any] = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
+    metadata: JsonObject = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
         metres = stage.GetMetadata(UsdGeom.Tokens.metersPerUnit)  # float32 in files of Blender 2.8
         if not isinstance(metres, (int, float)) or not 0 < metres < math.inf:

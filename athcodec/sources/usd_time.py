@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pxr import Sdf, Ts, Usd, UsdGeom
@@ -12,6 +11,7 @@ from pxr import Sdf, Ts, Usd, UsdGeom
 from athcodec.errors import ClipError
 from athcodec.sources.timing import warn_of_missed
 from athcodec.sources.usd_values import PrimObject, all_above, has_range, hiding, lineage, quietly, visibility
+from athcodec.untyped import JsonObject
 
 MAX_FRAMES = 1 << 24
 
@@ -29,7 +29,7 @@ class _Keys:
 def time_codes(
     stage: Usd.Stage, objects: list[PrimObject], fps: float | None, irregular: bool, not_read: dict[str, list[str]]
 ) -> tuple[np.ndarray, float]:
-    """Time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
+    """Return time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
     codes_per_second = stage.GetTimeCodesPerSecond()
     if not 0 < codes_per_second < math.inf:
         raise ClipError(f"timeCodesPerSecond: got {codes_per_second}, expected a positive number")
@@ -92,7 +92,7 @@ def _name_keys_outside(times: np.ndarray, start: float, end: float, not_read: di
 
 def _keys(objects: list[PrimObject]) -> _Keys:
     times: set[float] = set()
-    splines: dict[str, Any] = {}
+    splines: JsonObject = {}
     seen: set[Sdf.Path] = set()
 
     def add(attribute: Usd.Attribute) -> None:

@@ -68,7 +68,8 @@ class _PrimsOnce:
 
     def __init__(self, stage: Usd.Stage):
         predicate = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
-        self._range, self._seen = iter(Usd.PrimRange(stage.GetPseudoRoot(), predicate)), set()
+        self._range = iter(Usd.PrimRange(stage.GetPseudoRoot(), predicate))
+        self._seen: set[Usd.Prim] = set()
 
     def __iter__(self) -> _PrimsOnce:
         return self

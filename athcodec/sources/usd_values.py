@@ -13,6 +13,7 @@ from pxr import Gf, Tf, Usd, UsdGeom
 from athcodec.errors import ClipError
 from athcodec.sources.scene_objects import GUESSED, OWN, SceneObject
 from athcodec.sources.usd_unread import is_array
+from athcodec.untyped import UsdObject
 
 if TYPE_CHECKING:
     from athcodec.sources.usd_instances import Instances
@@ -107,7 +108,7 @@ def array_of(value: Any, dtype: Any) -> np.ndarray:
     return np.empty(0, dtype) if value is None else np.array(value, dtype)
 
 
-def value_at(source: Usd.Attribute | UsdGeom.Primvar, code: float) -> Any:
+def value_at(source: Usd.Attribute | UsdGeom.Primvar, code: float) -> UsdObject:
     """Return what an array holds at a time, without indices; None where USD finds it faulty."""
     try:
         return source.ComputeFlattened(code) if isinstance(source, UsdGeom.Primvar) else source.Get(code)

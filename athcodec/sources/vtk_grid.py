@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.sources.cells import VTK_NAMES, Part, Topology, blocks_of, topology_of
+from athcodec.untyped import JsonObject
 
 # Cells of PolyData in the order of their data: VTK's numbers of those with so many nodes, and of the others.
 POLY_CELLS: dict[str, tuple[dict[int, int], int]] = {
@@ -53,7 +53,7 @@ class Grid:
     field_data: dict[str, np.ndarray] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     other: list[str] = field(default_factory=list)
-    metadata: dict[str, Any] = field(default_factory=dict)
+    metadata: JsonObject = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
     hidden_count: int = 0
     title: str = ""
@@ -88,7 +88,7 @@ class Grid:
         self.cell_data = {name: values[shown] for name, values in self.cell_data.items()}
 
     @property
-    def cells(self) -> tuple[np.ndarray, ...]:
+    def cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """What has to be the same in all steps."""
         return self.types, self.starts, self.stops, self.nodes
 

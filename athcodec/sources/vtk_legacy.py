@@ -221,8 +221,8 @@ class _Legacy:
         """Return (stops, nodes). From version 5.0 on, offsets and nodes are arrays of their own."""
         first, second = _number(words, 0, line), _number(words, 1, line)
         if self._next_is(b"OFFSETS"):
-            kinds = [self._line().split()[1], None]
-            offsets = self._integers(kinds[0], first)
+            kind = self._line().split()[1]
+            offsets = self._integers(kind, first)
             head = self._line().split()
             if [word.upper() for word in head[:1]] != ["CONNECTIVITY"] or len(head) < 2:
                 raise ClipError(f"{line[:40]}: got no CONNECTIVITY behind the OFFSETS, expected one")

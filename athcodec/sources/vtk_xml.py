@@ -33,6 +33,7 @@ from athcodec.sources.vtk_grid import (
     starts_of,
 )
 from athcodec.sources.xml_tree import TEXT_BYTES, parse_xml
+from athcodec.untyped import JsonObject
 
 _TYPES = {
     "Float32": "f4",
@@ -112,10 +113,10 @@ class VtkXml:
             raise ClipError(f"got no {tag} with a {attribute}, expected the files of a {self._type}")
         return files
 
-    def fields(self) -> tuple[dict[str, np.ndarray], dict[str, Any], list[str]]:
+    def fields(self) -> tuple[dict[str, np.ndarray], JsonObject, list[str]]:
         """Return fields that may be times, what our writer adds, and the names of the other fields."""
         times: dict[str, np.ndarray] = {}
-        metadata: dict[str, Any] = {}
+        metadata: JsonObject = {}
         others = []
         for field in self._root.iter("FieldData"):
             for element in field:

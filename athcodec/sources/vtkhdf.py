@@ -28,6 +28,7 @@ from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.mesh import same_values
 from athcodec.sources.parts import CELL, NODE, JoinedSteps
 from athcodec.sources.timing import times_in_seconds
+from athcodec.untyped import H5Object
 
 ROOT, ASSEMBLY = "VTKHDF", "Assembly"
 GRID, SURFACE = "UnstructuredGrid", "PolyData"
@@ -97,7 +98,7 @@ def _block_names(root: h5py.Group) -> dict[str, str]:
     names: dict[str, str] = {}
     assembly = root.get(ASSEMBLY)
 
-    def visit(name: str, link: Any) -> None:
+    def visit(name: str, link: H5Object) -> None:
         if isinstance(link, h5py.SoftLink):
             key = link.path.rpartition("/")[2]
             names.setdefault(key, name.rpartition("/")[2])
@@ -290,5 +291,5 @@ class _Part:
         return dataset
 
 
-def _is_numbers(dataset: Any) -> bool:
+def _is_numbers(dataset: H5Object) -> bool:
     return isinstance(dataset, h5py.Dataset) and bool(dataset.shape) and dataset.dtype.kind in "fiu"

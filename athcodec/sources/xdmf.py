@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from os import fspath
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,6 +48,7 @@ from athcodec.sources.xdmf_cells import (
 from athcodec.sources.xdmf_document import Element
 from athcodec.sources.xdmf_items import Items
 from athcodec.sources.xpointer import local_name
+from athcodec.untyped import JsonObject
 
 KNOWN = ("Grid", "Topology", "Geometry", "Attribute", "Time", "DataItem")  # Elements of a grid that are read.
 COLLECTIONS, UNIFORM = ("collection", "tree"), "uniform"
@@ -79,7 +79,8 @@ def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
     steps = JoinedSteps(parts, items.budget, fspath(path))
     metadata = metadata if len(parts) == 1 else {"objects": steps.objects()} | metadata
     steps.left_out += selection.other_fields
-    clip = clip_of_steps(steps, time, metadata, Path(path).stem, options, steps.static(), items, items.unchanged)
+    name, static = Path(path).stem, steps.static()
+    clip = clip_of_steps(steps, time, metadata, name, options, static, resource=items, unchanged=items.unchanged)
     clip.not_read = {**clip.not_read, **{kind: names for kind, names in scene.not_read.items() if names}}
     return clip
 
@@ -229,7 +230,7 @@ class _Scene:
             raise ClipError(f"Time: got {len(numbers)} times, expected {count}, one per grid")
         return numbers
 
-    def times(self, track: Track) -> tuple[np.ndarray, dict[str, Any]]:
+    def times(self, track: Track) -> tuple[np.ndarray, JsonObject]:
         """Return (T,) seconds from 0, and what the file says of rate, unit and up axis."""
         information, stored, count = self._facts, track.times, len(track.steps)
         fps = information.get("fps") if self.options.fps is None else self.options.fps
@@ -246,10 +247,10 @@ class _Scene:
                 metadata["start_frame"] = whole(round(start, 6))
         return time, information | metadata
 
-    def _information(self) -> dict[str, Any]:
-        """fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of objects and
-        materials that our writer adds as JSON."""
-        information: dict[str, Any] = {}
+    def _information(self) -> JsonObject:
+        """Return fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of
+        objects and materials that our writer adds as JSON."""
+        information: JsonObject = {}
         self._name_unknown(self.documents.root, ("Domain", "Information"))
         for domain in (self.documents.root, *self._domains):
             if domain is not self.documents.root:

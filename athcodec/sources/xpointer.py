@@ -32,17 +32,17 @@ class Pointers:
         self._top = Element("")  # Stands for the document, whose only child is the root.
         self._top.append(root)
         self._parents: dict[Element, Element] | None = None
-        self._found: dict[str, list[Element]] = {}
+        self._elements: dict[str, list[Element]] = {}
         self.visited = 0
 
     def find(self, path: str, start: Element | None = None) -> list[Element]:
         """Return the elements of an XPath, which may be relative to `start`. Raises ClipError for one that is not
         known."""
         key = path if start is None or path.lstrip().startswith("/") else ""
-        if key not in self._found or not key:
+        if key not in self._elements or not key:
             elements = _Parser(path).parsed()(self, self._top if start is None else start)
-            self._found[key] = [element for element in elements if element is not self._top]
-        return self._found[key]
+            self._elements[key] = [element for element in elements if element is not self._top]
+        return self._elements[key]
 
     def of_xpointer(self, pointer: str) -> list[Element]:
         """Return the elements of an XPointer: the first of its parts that names any. Raises ClipError."""

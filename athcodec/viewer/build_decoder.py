@@ -151,6 +151,8 @@ def _lean(text: str) -> str:
 def unpack(module: str) -> tuple[str, bytes]:
     """Return (text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
     match = PAYLOAD.search(module)
+    if match is None:
+        return "", b""
     try:
         return PAYLOAD.sub("", module, count=1), zstandard.ZstdDecompressor().decompress(base64.b64decode(match[2]))
     except (TypeError, ValueError, zstandard.ZstdError):

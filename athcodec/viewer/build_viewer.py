@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import athcodec
 from athcodec.viewer.still import still_svg
@@ -60,7 +61,7 @@ def build(folder: Path) -> None:
         (folder / "still.svg").write_text(still_svg(decoder), "utf-8")
 
 
-def _run(command: list[str], **options) -> None:
+def _run(command: list[str], **options: Any) -> None:
     done = subprocess.run(command, capture_output=True, text=True, **options)
     if done.returncode != 0:
         last = (done.stderr.strip() or "no message").splitlines()[-1]

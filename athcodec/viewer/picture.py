@@ -13,13 +13,13 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from athcodec.decoding.host_mesh import HostMesh
 from athcodec.errors import MissingExtra
 from athcodec.files.atomic import check_target, new_file
 from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
+from athcodec.untyped import PlaywrightObject
 from athcodec.viewer.view import export_page
 
 INSTALL = 'pip install "athcodec[picture]"'
@@ -68,6 +68,7 @@ def save_picture(
     kind: str = "gif",
     clip: str | None = None,
     size: tuple[int, int] = SIZE,
+    *,
     fps: float = FRAMES_PER_SECOND,
     time: float = 0.0,
     host_mesh: HostMesh | None = None,
@@ -108,7 +109,8 @@ def save_picture(
     check_target(out, f".{kind}")
     image = _packages()
     pictures = [
-        image.open(io.BytesIO(data)).convert("RGB") for data in _drawn(path, kind, clip, size, fps, time, host_mesh)
+        image.open(io.BytesIO(data)).convert("RGB")
+        for data in _drawn(path, kind, size, fps=fps, time=time, clip=clip, host_mesh=host_mesh)
     ]
     data = io.BytesIO()
     moving = {"save_all": True, "append_images": pictures[1:], "duration": round(1000 / fps), "loop": 0}
@@ -125,7 +127,7 @@ def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
     image = _packages()
     with open_ath(path) as decoder:
         time = _STILL_AT * decoder.clip.duration
-    (png,) = _drawn(path, "png", None, size, FRAMES_PER_SECOND, time, None)
+    (png,) = _drawn(path, "png", size, time=time)
     data = io.BytesIO()
     image.open(io.BytesIO(png)).convert("RGB").save(data, "WEBP", quality=_STILL_QUALITY, method=6)
     return data.getvalue()
@@ -140,7 +142,7 @@ def can_draw() -> bool:
     return True
 
 
-def _packages() -> Any:
+def _packages() -> PlaywrightObject:
     """Return Pillow's module of images if all packages that a picture needs are installed."""
     try:
         import playwright.sync_api  # noqa: F401
@@ -155,7 +157,7 @@ def _packages() -> Any:
 
 
 @contextmanager
-def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
+def chromium(flags: Sequence[str] = FLAGS) -> Iterator[PlaywrightObject]:
     """Start a browser, Playwright's. Raises MissingExtra."""
     _packages()
     from playwright.sync_api import sync_playwright
@@ -168,7 +170,16 @@ def chromium(flags: Sequence[str] = FLAGS) -> Iterator[Any]:
             browser.close()
 
 
-def _drawn(path, kind, clip, size, fps, time, host_mesh) -> Iterator[bytes]:
+def _drawn(
+    path: FilePath,
+    kind: str,
+    size: tuple[int, int],
+    *,
+    fps: float = FRAMES_PER_SECOND,
+    time: float = 0.0,
+    clip: str | None = None,
+    host_mesh: HostMesh | None = None,
+) -> Iterator[bytes]:
     """Yield each picture as PNG, with all of the scenery, also without a graphics processor."""
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip

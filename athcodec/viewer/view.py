@@ -212,6 +212,7 @@ def serve(
     ready: Callable[[str], None] = print,
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
+    *,
     forest: bool = False,
     floor: Floor | None = None,
 ) -> None:

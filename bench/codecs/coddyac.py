@@ -98,7 +98,7 @@ def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> n
 def _predicted(
     order: VertexOrder, step_ratio: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
 ) -> np.ndarray:
-    """Coefficients (N, W, K) in steps: the weighted prediction plus `residual(vertices, predicted)`."""
+    """Return coefficients (N, W, K) in steps: the weighted prediction plus `residual(vertices, predicted)`."""
     units = np.zeros(shape)
     near, along = weights / WEIGHT_STEPS
     for vertices in order.generations:

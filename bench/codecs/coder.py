@@ -55,7 +55,7 @@ def compiler() -> list[str] | None:
 
 
 def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
-    """Compiles C with the options that CMakeLists.txt gives the core.
+    """Compile C with the options that CMakeLists.txt gives the core.
 
     Raises SystemExit with the compiler's line about the first error.
     """

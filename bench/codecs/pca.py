@@ -148,7 +148,7 @@ def _in_threes(tracks: np.ndarray) -> np.ndarray:
 def write_coefficients(
     writer: Writer, q: np.ndarray, order: VertexOrder, trajectories: Trajectories, most: int
 ) -> None:
-    """Integers (rows, K), each component by the differences between vertices that make it smallest, of degree
+    """Write integers (rows, K), each component by the differences between vertices that make it smallest, of degree
     <= most.
     """
     q = q.reshape(len(order.source), -1, q.shape[1])
@@ -197,7 +197,7 @@ def write_group(
     settings: Settings,
     trajectories: Trajectories,
 ) -> np.ndarray:
-    """Motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
+    """Write motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
 
     Returns what a reader will decode.
     """
@@ -343,7 +343,8 @@ class ClusteredPca(Baseline):
 
     @staticmethod
     def _nearest(by_vertex: np.ndarray, bases: list[np.ndarray]) -> np.ndarray:
-        """Of (N, rows, K) the basis that has most of each vertex's motion; never an empty one before another."""
+        """Return the basis, of (N, rows, K), that has most of each vertex's motion; never an empty one before
+        another."""
         caught = [
             ((by_vertex @ basis.T) ** 2).sum(axis=(1, 2)) if len(basis) else np.full(len(by_vertex), -1.0)
             for basis in bases

@@ -34,7 +34,7 @@ def armature(path: Path, seed: int) -> None:
 
 
 def shape_keys(path: Path, seed: int) -> None:
-    """A tree with four shapes, bent by wind from four sides, whose values are keyed."""
+    """Make a tree with four shapes, bent by wind from four sides, whose values are keyed."""
     rng = np.random.default_rng(seed)
     plant = grow(NODES, 2, 4.0, seed)
     tree = _tree(plant)
@@ -44,7 +44,7 @@ def shape_keys(path: Path, seed: int) -> None:
 
 
 def grass(path: Path, seed: int, blades: int) -> None:
-    """Blades whose upper parts are displaced by clouds that an empty carries over them."""
+    """Make blades whose upper parts are displaced by clouds that an empty carries over them."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     levels = np.linspace(0, 1, 10)[:, None]
@@ -75,7 +75,8 @@ def grass(path: Path, seed: int, blades: int) -> None:
 
 
 def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
-    """A flower that opens by shape keys, one for each whorl of petals; flat faces, whose corners a GLB has apart."""
+    """Return a flower that opens by shape keys, one for each whorl of petals; flat faces, whose corners a GLB has
+    apart."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     rows, columns = 11, 7
@@ -125,7 +126,7 @@ def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
 
 
 def forest(path: Path, seed: int, trees: int, nodes: int) -> None:
-    """Trees beside each other, each an object with shapes and winds of its own."""
+    """Make trees beside each other, each an object with shapes and winds of its own."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     side = int(np.ceil(np.sqrt(trees)))
@@ -140,7 +141,7 @@ def forest(path: Path, seed: int, trees: int, nodes: int) -> None:
 
 
 def terrain(path: Path, seed: int, nodes: int, side: int) -> None:
-    """A tree that sways on ground that stands still, as two meshes of a GLB."""
+    """Make a tree that sways on ground that stands still, as two meshes of a GLB."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side, size=14.0)
@@ -160,7 +161,7 @@ def terrain(path: Path, seed: int, nodes: int, side: int) -> None:
 
 
 def turntable(path: Path, seed: int, nodes: int) -> None:
-    """A tree that sways on a table that turns once."""
+    """Make a tree that sways on a table that turns once."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     plant = grow(nodes, 2, 4.0, seed)
@@ -177,7 +178,7 @@ def turntable(path: Path, seed: int, nodes: int) -> None:
 
 
 def cloth(path: Path, seed: int, width: float, rows: int, columns: int) -> None:
-    """A leaf of cloth that is held at its stalk, in wind and turbulence."""
+    """Make a leaf of cloth that is held at its stalk, in wind and turbulence."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
@@ -283,7 +284,7 @@ def _finish(tree: Any, plant: Plant, rng: np.random.Generator, bones: Sequence[A
 
 
 def _noise(owner: Any, where: str, index: int, strength: float, scale: float, rng: np.random.Generator) -> None:
-    """Key a property and put noise on its curve: `scale` in frames."""
+    """Set keys of a property and put noise on its curve: `scale` in frames."""
     for frame in (1, FRAMES):
         owner.keyframe_insert(where, index=index, frame=frame)
     block = owner.id_data.animation_data

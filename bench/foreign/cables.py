@@ -25,7 +25,7 @@ RADIUS, WIDTH, DENSITY = 0.002, 0.012, 600.0  # Metres, kg/m3. Width: what the w
 
 
 def grass(path: Path, seed: int, stems: int) -> None:
-    """Stems of grass that stand on a square metre."""
+    """Make stems of grass that stand on a square metre."""
     rng = np.random.default_rng(seed)
     level = np.linspace(0, 1, 16)[:, None]
     lean = rng.normal(0, 0.08, (stems, 1, 3)) * [1, 0, 1]
@@ -35,7 +35,7 @@ def grass(path: Path, seed: int, stems: int) -> None:
 
 
 def field(path: Path, seed: int, stems: int, apart: float, speed: float, has_faces: bool) -> None:
-    """Blades of a crop in rows, `apart` metres from each other, as ribbons of pairs of vertices."""
+    """Make blades of a crop in rows, `apart` metres from each other, as ribbons of pairs of vertices."""
     rng = np.random.default_rng(seed)
     level, side = np.linspace(0, 1, 12)[:, None], int(np.ceil(np.sqrt(stems)))
     row, column = np.divmod(np.arange(stems), side)
@@ -49,7 +49,7 @@ def field(path: Path, seed: int, stems: int, apart: float, speed: float, has_fac
 
 
 def hedge(path: Path, seed: int, stems: int, sides: int) -> None:
-    """Stems of a hedge as tubes, 40 to a metre, that grow through each other."""
+    """Make stems of a hedge as tubes, 40 to a metre, that grow through each other."""
     rng = np.random.default_rng(seed)
     level = np.linspace(0, 1, 12)[:, None]
     feet = rng.uniform(-0.5, 0.5, (stems, 1, 3)) * [stems / 40, 0, 0.4]
@@ -61,7 +61,7 @@ def hedge(path: Path, seed: int, stems: int, sides: int) -> None:
 
 
 def vine(path: Path, seed: int, joints: int) -> None:
-    """Three vines that hang between posts."""
+    """Make three vines that hang between posts."""
     rng = np.random.default_rng(seed)
     level = np.linspace(-1, 1, joints)[:, None]
     sag = rng.uniform(0.5, 0.8, (3, 1, 1))
@@ -84,7 +84,7 @@ def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) ->
 
 
 def _write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, has_faces: bool) -> None:
-    """A NumPy archive of (T, S, n, 3) positions, whose stems all have the (F, 4) faces."""
+    """Write a NumPy archive of (T, S, n, 3) positions, whose stems all have the (F, 4) faces."""
     frames, count, size, _ = positions.shape
     numbers = (faces + size * np.arange(count)[:, None, None]).reshape(-1, 4).astype(np.int32)
     arrays = {"faces": numbers} if has_faces else {}

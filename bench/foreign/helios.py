@@ -15,20 +15,20 @@ import athcodec
 
 
 def growth(path: Path, species: str, start: int, days: int, step: int, seed: int) -> None:
-    """A plant from its library from day `start` on, a pose every `step` days, 1 / `step` seconds apart."""
+    """Make a plant from its library from day `start` on, a pose every `step` days, 1 / `step` seconds apart."""
     _grown(path, species, [(0.0, 0.0)], start, days, step, seed)
 
 
 def bed(
     path: Path, species: str, rows: int, columns: int, apart: float, start: int, days: int, step: int, seed: int
 ) -> None:
-    """Plants side by side, `apart` metres between neighbours, as one stage; each grows by chances of its own."""
+    """Make plants side by side, `apart` metres between neighbours, as one stage; each grows by chances of its own."""
     places = [(apart * row, apart * column) for row in range(rows) for column in range(columns)]
     _grown(path, species, places, start, days, step, seed)
 
 
 def array(path: Path, species: str, start: int, days: int, step: int, seed: int, has_faces: bool) -> None:
-    """A NumPy archive of the positions alone, or with faces: what remains of a simulator's mesh in a script."""
+    """Make a NumPy archive of the positions alone, or with faces: what remains of a simulator's mesh in a script."""
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder) / "growth.usdc"
         growth(stage, species, start, days, step, seed)

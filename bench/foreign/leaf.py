@@ -15,7 +15,8 @@ FRAMES, FPS, MODES = 200, 60.0, 12
 
 
 def flutter(path: Path, seed: int, shape: float, refine: int) -> None:
-    """An XDMF series with the displacement of every step, as meshio writes it; `shape` is the width over the length."""
+    """Return an XDMF series with the displacement of every step, as meshio writes it; `shape` is the width over the
+    length."""
     rng = np.random.default_rng(seed)
     grid = skfem.MeshTri.init_tensor(np.linspace(0, 1, 10 * refine + 1), np.linspace(-1, 1, 6 * refine + 1))
     along, across = grid.p

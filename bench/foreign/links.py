@@ -21,7 +21,8 @@ SIDES, LEAVES, WIDTH = 5, 2, 0.05  # Leaves: on each node that carries foliage. 
 
 
 def bush(path: Path, seed: int, stems: int, nodes: int, height: float) -> None:
-    """Stems that leave one patch of ground, each with side stems and cards as leaves; a NumPy archive of the mesh."""
+    """Make stems that leave one patch of ground, each with side stems and cards as leaves; a NumPy archive of the
+    mesh."""
     rng = np.random.default_rng(seed)
     points, faces, motion = [], [], []
     wind = Wind(4.0, height, length=2.0, seed=seed)

@@ -37,7 +37,8 @@ SIDES = np.array([[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 
 
 
 def sequence(path: Path, plant: str, seed: int, is_split: bool = False) -> None:
-    """Numbered files beginning with `path`; split: each triangle has vertices of its own, as flat shading needs."""
+    """Make numbered files beginning with `path`; split: each triangle has vertices of its own, as flat shading
+    needs."""
     grammar = PLANTS[plant]
     word = _derived(grammar)
     chance = np.random.default_rng(seed).normal(1, 0.12, len(word))
@@ -100,7 +101,7 @@ def _mesh(
 
 
 def _turn(kind: int, sign: int, degrees: float) -> np.ndarray:
-    """Rotation about the turtle's up, right or ahead."""
+    """Return rotation about the turtle's up, right or ahead."""
     one, two = ((0, 2), (1, 2), (0, 1))[kind]
     turn, angle = np.eye(3), sign * np.radians(degrees)
     turn[one, one] = turn[two, two] = np.cos(angle)

@@ -14,7 +14,7 @@ FRAMES, FPS = 120, 24.0
 
 
 def growth(path: Path, plant: str, days: float, seed: int) -> None:
-    """A plant of its library with a branch per root; CPlantBox has no file format for motion of one topology."""
+    """Make a plant of its library with a branch per root; CPlantBox has no file format for motion of one topology."""
     system = plantbox.Plant()
     system.setSeed(seed)
     system.readParameters(str(FOLDER / f"{plant}.xml"))

@@ -20,7 +20,7 @@ FRAMES, FPS = 150, 30.0
 
 
 def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
-    """Numbered VTU files beginning with `path`, of line cells, as a script around meshio writes them; the plant
+    """Make numbered VTU files beginning with `path`, of line cells, as a script around meshio writes them; the plant
     stands on a table that makes so many turns."""
     rng = np.random.default_rng(seed)
     plant = grow(nodes, 3, 9.0, seed)

@@ -85,7 +85,7 @@ class _Willow(_Tree):
 
 
 def morphs(path: Path, seed: int, nodes: int, orders: int, height: float, frames: int) -> None:
-    """A GLB with a morph target for every frame, as tools that bake a shader write it for engines without one."""
+    """Make a GLB with a morph target for every frame, as tools that bake a shader write it for engines without one."""
     _write(path, _Tree(nodes, orders, height, seed), "tree", frames)
 
 

@@ -100,8 +100,8 @@ BUD = 0.9  # Radians by which a closed leaf lies nearer to its twig.
 
 
 def sapling(seed: int, frames: int, nodes: int, leaves: int, height: float = 2.0) -> MotionClip:
-    """A young tree with bark, whose branches come out as the tips of their parents pass and thicken to the end; leaves
-    unfold where a branch has come to an end, small at first."""
+    """Return a young tree with bark, whose branches come out as the tips of their parents pass and thicken to the end;
+    leaves unfold where a branch has come to an end, small at first."""
     plant, rng = grow(nodes, 2, height, seed), np.random.default_rng(seed)
     bones, last = Bones.of(plant), frames - 1 - HELD * FPS
     times = WOOD * flowing_begin_and_end(bones, frames, rng)
@@ -149,9 +149,9 @@ def _sapling_leaves(
     across = np.cross(along, below)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     axes = np.stack([along, across, np.cross(along, across)], axis=1)
-    own = BLADE[0] * (length * rng.uniform(0.7, 1.3, count))[:, None, None]
+    blades = BLADE[0] * (length * rng.uniform(0.7, 1.3, count))[:, None, None]
     folded = rotations(-BUD * (1.0 - opened)[..., None] * across)
-    vertices = opened[..., None, None] * np.einsum("lvk,lki,tlji->tlvj", own, axes, folded)
+    vertices = opened[..., None, None] * np.einsum("lvk,lki,tlji->tlvj", blades, axes, folded)
     return node, skeleton.positions[:, node, None] + vertices
 
 

@@ -31,7 +31,7 @@ def _on(
     points: int,
     bend: float,
 ) -> tuple[Stems, np.ndarray]:
-    """So many stems on each stem, at random points from the lowest one up, and the stem that each is on."""
+    """Return so many stems on each stem, at random points from the lowest one up, and the stem that each is on."""
     count, available = stems.centres.shape[1:3]
     stem = np.repeat(np.arange(count), each)
     point = rng.integers(lowest, available - 1, len(stem))

@@ -172,7 +172,7 @@ class _Splines:
         self.edges = np.stack([below[1:], np.arange(1, self.count)], axis=1)
 
     def apply(self, nodes: np.ndarray) -> np.ndarray:
-        """(..., count, 3) vertices from (..., N, 3) nodes."""
+        """Return (..., count, 3) vertices from (..., N, 3) nodes."""
         return sum(nodes[..., self.controls[:, k], :] * self.weights[:, k : k + 1] for k in range(4))
 
 

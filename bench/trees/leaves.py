@@ -199,7 +199,7 @@ class Plates:
         self.damping = 2 * species.damping * self.inertia * omega
 
     def step(self, air: np.ndarray, seconds: float) -> None:
-        """air: (3, L) relative to the hinge, in the axes of the leaf at rest."""
+        """Move by one step. air: (3, L) relative to the hinge, in the axes of the leaf at rest."""
         wind = _turned_back(self.turn, air)
         wind[1] -= self.speed[2] * self.arm
         wind[2] += self.speed[1] * self.arm

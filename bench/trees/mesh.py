@@ -82,7 +82,7 @@ class Tubes:
         return chord[branch[self.carrier]]
 
     def at(self, nodes: np.ndarray) -> np.ndarray:
-        """(..., count, 3) vertices from (..., N, 3) nodes."""
+        """Return (..., count, 3) vertices from (..., N, 3) nodes."""
         turned = np.einsum("...rij,rsj->...rsi", self.skeleton.turns(nodes, self.carrier), self.offsets)
         points = nodes[..., self.centre, None, :] + turned
         return points.reshape(*nodes.shape[:-2], -1, 3)

@@ -61,7 +61,7 @@ def write(folder: Path = conformance.FOLDER) -> int:
 
 
 def write_sums(folder: Path = conformance.FOLDER) -> None:
-    """Writes SHA256SUMS, the checksums of all other files of the vectors, as `sha256sum --check` reads them."""
+    """Write SHA256SUMS, the checksums of all other files of the vectors, as `sha256sum --check` reads them."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "SHA256SUMS")
     sums = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.relative_to(folder).as_posix()}" for path in files]
     (folder / "SHA256SUMS").write_text("\n".join(sums) + "\n", "utf-8")

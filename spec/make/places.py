@@ -14,7 +14,7 @@ def in_turn(numbers: list[int]) -> list[int]:
 
 
 def by_chance(seed: int, count: int, more: int, near: int | None = None) -> list[int]:
-    """So many places, and vertices more that share them; near: how far back those are at most."""
+    """Return so many places, and vertices more that share them; near: how far back those are at most."""
     random, places = np.random.default_rng(seed), list(range(count))
     for _ in range(more):
         at = int(random.integers(1, len(places) + 1))
@@ -41,7 +41,7 @@ def with_places(content: bytes) -> Callable[[], Draft]:
 
 
 def jumps(data: bytes) -> None:
-    """The second vertex has place 2, and the first 0."""
+    """Decode corners of which the second vertex has place 2, and the first 0."""
     rules.decode_polygons(
         data, rules.Record(index_type=2, count_type=None, face_count=9, columns=1, corner_count=9), range(5)
     )

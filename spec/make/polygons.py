@@ -11,7 +11,7 @@ def polygon_type(name: str) -> int:
 
 
 def polygon_head(type_: str, faces: int, corners: int, count_type: str | None = None, flags: int = 0) -> bytes:
-    """corners: of each face, or where there is a count_type of all."""
+    """Return the head of polygons. corners: of each face, or where there is a count_type of all."""
     mixed = b"" if count_type is None else bytes([polygon_type(count_type)])
     return bytes([polygon_type(type_) | flags | 8 * len(mixed)]) + mixed + struct.pack("<II", faces, corners)
 
@@ -29,7 +29,7 @@ def polygon_shape(index_type: int, count_type: int | None, face_count: int, colu
 
 
 def polygons(rows: np.ndarray, places: int | list = 5, script: Script | None = None) -> bytes:
-    """FACES or EDGES with as many corners each. places: of each vertex, or how many that share none."""
+    """Return FACES or EDGES with as many corners each. places: of each vertex, or how many that share none."""
     shape = polygon_shape(polygon_type(rows.dtype.str), None, *rows.shape, rows.size)
     places = range(places) if isinstance(places, int) else places
     stream = write(rules.decode_polygons, script or rows.reshape(-1).tolist(), shape, places)
@@ -42,7 +42,7 @@ def mixed_polygons(
     types: tuple[str, str] = ("<u4", "|u1"),
     corner_count: int | None = None,
 ) -> bytes:
-    """FACES of different sizes; types: of vertices and numbers of corners."""
+    """Return FACES of different sizes; types: of vertices and numbers of corners."""
     corners = sum(map(len, faces)) if corner_count is None else corner_count
     index_type, count_type = map(polygon_type, types)
     shape = polygon_shape(index_type, count_type, len(faces), 0, corners)
@@ -76,7 +76,7 @@ def edges(content: bytes) -> Callable[[], Draft]:
 
 
 def recent(_: bytes) -> None:
-    """A triangle of vertex 0 and of the corner before that."""
+    """Decode a triangle of vertex 0 and of the corner before that."""
     coder, model = rules.RangeDecoder(b""), rules.PolygonModel(range(5))
     decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
     node = 1

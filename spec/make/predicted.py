@@ -27,12 +27,12 @@ def frame_of(stems: list[Stem], of_vertex: Callable[[], list[int]], follow: Call
 
 
 def followed_at(share: float) -> int:
-    """Who follows the ends of a stem: none from 1 on, below that all, in two ways."""
+    """Return who follows the ends of a stem: none from 1 on, below that all, in two ways."""
     return 2 if share < 0.5 else int(share < 1)
 
 
 def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.5, follow: float = 0.3) -> list[int]:
-    """Of a frame: whether vertices have integers, and these."""
+    """Return, for the vertices of a frame, whether they have integers, and these."""
     chance = Chance(seed, large=large)
 
     def of_vertex() -> list[int]:
@@ -43,7 +43,8 @@ def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.
 
 
 def predicted(stems: list[Stem], frames: list, segments: int = 1, **fields) -> Plant:
-    """frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1), and its steps."""
+    """Return PREDICTED. frames: of each segment alike what it is coded about, (copied, 1) or (copied, 0, distance - 1),
+    and its steps."""
     scripts = {(PREDICTED, 1, s): [x for frame in frames for x in frame] for s in range(segments)}
     fields = {"predicted": predicted_head()} | fields
     fields["scripts"] = scripts | fields.get("scripts", {})

@@ -64,7 +64,7 @@ def item_type(name: str) -> tuple[int, int]:
 def array_chunk(
     type_: str | tuple[int, int], shape: Sequence[int], body: bytes = b"", name: str | bytes = "a"
 ) -> bytes:
-    """type_: as NumPy writes it, or Item_Type and Item_Bytes."""
+    """Return ATTRIBUTE. type_: as NumPy writes it, or Item_Type and Item_Bytes."""
     code, size = item_type(type_) if isinstance(type_, str) else type_
     text = name.encode() if isinstance(name, str) else name
     return struct.pack(f"<BBHI{len(shape)}I", code, len(shape), len(text), size, *shape) + text + body

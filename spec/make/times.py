@@ -9,7 +9,7 @@ def steady(first: float, step: float) -> Callable[[], bytes]:
 
 
 def clip_times(title: str, make: Callable[[], bytes]) -> None:
-    """TIME of the two clips."""
+    """Add TIME of the two clips."""
     invalid(f"time-{title}", lambda: two_clips().change(TIME, content=make()))
 
 

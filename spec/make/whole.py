@@ -131,7 +131,7 @@ for name, why in (
     ("encoded-layers-lossless", "three layers of precision, then every bit of the source"),
 ):
     valid(f"{name}: what athcodec wrote: {why}", lambda name=name: encoded(name), scripted=False)
-for name_, what_ in (
+for name_, contents in (
     (
         "all",
         "clips, a loop, uneven times, repeats, layers, learned bases, tubes, a rest pose by faces, a second one, mixed "
@@ -142,7 +142,7 @@ for name_, what_ in (
     ("predicted", "the same in predicted motion, which excludes modes, shapes, bases, corrections, joins and layers"),
 ):
     valid(
-        f"real-size-{name_}: what athcodec wrote of a tree with leaves: {what_}",
+        f"real-size-{name_}: what athcodec wrote of a tree with leaves: {contents}",
         lambda name_=name_: real_size.encoded(name_),
         scripted=False,
     )

@@ -143,7 +143,7 @@ def _in_child(start: int, place: Place, verb: str, target: Path, n: int, lasts: 
 
 
 def _next_run(place: Place, target: Path) -> None:
-    """The next writer to the same place, to be fast one that writes little."""
+    """Write to the same place, as the next writer does; to be fast, little."""
     from athcodec.files.atomic import new_file
 
     with new_file(target) as file:

@@ -142,7 +142,7 @@ def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None,
 
 
 def _next_run(place: Place, target: Path) -> None:
-    """The next writer to the same place; in this process, to be fast."""
+    """Write to the same place, as the next writer does; in this process, to be fast."""
     if target.suffix == ".ath":
         athcodec.truncate(place.encoded, target, 1)
     else:

@@ -159,7 +159,7 @@ def flipped_bit_repaired(data: bytes, bit: int) -> int:
 
 
 def corrupted(data: bytes, seed: int) -> int:
-    """Changed fields of the front that are mostly consistent with each other, or changed contents of chunks."""
+    """Return changed fields of the front that are mostly consistent with each other, or changed contents of chunks."""
     rng = np.random.default_rng(seed)
     if seed % 2:
         return within_limits(corrupted_front(rng, data))
@@ -200,7 +200,8 @@ def _sample_per_byte() -> float:
 
 
 def slow_file(_: bytes, name: str) -> int:
-    """Other load on the machine can only add to a time: a time that is too long is measured again; the least counts."""
+    """Raise Wrong if a file takes too long to open; return the memory that the test needs. Other load on the machine
+    can only add to a time: a time that is too long is measured again; the least counts."""
     files = [hostile_files.SLOW[name](scale) for scale in (1, 2)]
     least, fault = [float("inf")] * 2, ""
     for _ in range(8):

@@ -124,7 +124,7 @@ def write_object(
 
 
 def encoded(clip, path: str, **options):
-    """athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
+    """Return athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
     import athcodec
     from athcodec.motion.branches.finding import pieces
     from athcodec.motion.branches.result import with_branches
@@ -151,7 +151,8 @@ class Recording:
         self._frames, self._first, self._shape, self._static = [], None, None, {}
 
     def add(self, context, frame: int) -> None:
-        """The object in this frame, which the scene is at. Raises ValueError where it has other vertices or faces."""
+        """Add the object in this frame, which the scene is at. Raises ValueError where it has other vertices or
+        faces."""
         evaluated = self._obj.evaluated_get(context.evaluated_depsgraph_get())
         mesh = evaluated.to_mesh()
         try:

@@ -79,7 +79,14 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
         for path in paths:
             try:
                 obj = add_object(
-                    context, path, self.level, self.loop, self.set_scene, self.use_relative, self.clip, self.host_mesh
+                    context,
+                    path,
+                    self.level,
+                    loop=self.loop,
+                    set_scene=self.set_scene,
+                    use_relative=self.use_relative,
+                    clip=self.clip,
+                    host_mesh=self.host_mesh,
                 )
             except Exception as error:  # Any fault of the file is reported in one line.
                 self.report({"ERROR"}, " ".join(f"{path}: {error}".split()))
@@ -108,6 +115,7 @@ def add_object(
     context,
     path: str,
     level: int = DEEPEST,
+    *,
     loop: bool = False,
     set_scene: bool = True,
     use_relative: bool = True,

@@ -138,7 +138,7 @@ def _on_load(*_) -> None:
 
 @persistent
 def _on_save(target=None, *_) -> None:
-    """Blender itself keeps the paths of an extension as they are when a .blend is saved in another folder."""
+    """Make paths relative to the new folder of a .blend: Blender leaves those of an extension as they are."""
     global _busy
     if not isinstance(target, str) or not target:
         return

@@ -617,7 +617,7 @@ static int32_t half_octaves(double step)
 }
 
 static void analyse_node(const ath_plan *plan, const ath_motion *motion, const ath_node *node,
-                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double level_step,
+                         const ath_node_rows *rows, const ath_scratch *scratch, const double *source, double stage_step,
                          const ath_rounding *rounding)
 {
     const ath_piece *piece = plan->pieces + node->piece;
@@ -628,7 +628,7 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
     node_moments(plan, node, T, scratch, source, tracks, centre);
     int stands = piece->parent < 0 && stands_on_foot(plan, T, node->first, node->count, source);
     fit_node(node, free_base, stands ? scratch->track : 0, T, tracks, centre);
-    *rows->step = half_octaves(level_step / ath_sqrt((double)node->count));
+    *rows->step = half_octaves(stage_step / ath_sqrt((double)node->count));
     double step = ath_node_step(*rows->step);
     ath_stream stream = ath_node_stream(motion, step);
     for (int32_t r = 0; r < node->rank; r++)
@@ -637,12 +637,12 @@ static void analyse_node(const ath_plan *plan, const ath_motion *motion, const a
 }
 
 void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                       int32_t stop, const double *source, const double *level_steps, const ath_rounding *rounding)
+                       int32_t stop, const double *source, const double *stage_steps, const ath_rounding *rounding)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++) {
         const ath_node *node = plan->nodes + n;
         ath_node_rows rows = ath_rows_of_node(integers, motion->frames, n);
-        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, level_steps[node->stage], rounding);
+        if (node->coded) analyse_node(plan, motion, node, &rows, &scratch, source, stage_steps[node->stage], rounding);
     }
 }

@@ -192,7 +192,7 @@ int64_t ath_encode_basis(void *memory, uint8_t *bytes, size_t capacity, int32_t 
 }
 
 int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers, int32_t level)
+                          const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers, int32_t stage)
 {
     ath_coder coder;
     shape_model *model = (shape_model *)memory;
@@ -200,7 +200,7 @@ int64_t ath_encode_shapes(void *memory, uint8_t *bytes, size_t capacity, const a
     coder_start(&coder, bytes, capacity);
     shape_model_init(model);
     for (int32_t p = 0; p < plan->piece_count && valid; p++)
-        valid = code_shapes(&coder, model, plan->pieces + p, level, shape_counts[p],
+        valid = code_shapes(&coder, model, plan->pieces + p, stage, shape_counts[p],
                             integers + shape_first[p] * ATH_SHAPE_NUMBERS)
                 >= 0;
     return written(&coder, valid);
@@ -247,7 +247,7 @@ int64_t ath_encode_exact(void *memory, uint8_t *bytes, size_t capacity, int32_t 
 }
 
 int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan, const ath_motion *motion,
-                         const ath_integers *integers, int32_t level)
+                         const ath_integers *integers, int32_t stage)
 {
     ath_coder coder;
     coefficient_model *rows = (coefficient_model *)model;
@@ -255,13 +255,13 @@ int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath
     coefficient_model_init(rows, motion->frames, (uint32_t *)(rows + 1));
     for (int32_t p = 0; p < plan->piece_count; p++) {
         ath_piece_rows piece = ath_rows_of_piece(integers, motion->frames, p);
-        code_piece(&coder, rows, plan, motion->streams + level, motion->frames, p, level, &piece);
+        code_piece(&coder, rows, plan, motion->streams + stage, motion->frames, p, stage, &piece);
     }
     return written(&coder, !rows->invalid);
 }
 
 int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                              const ath_motion *motion, const ath_integers *integers, int32_t level)
+                              const ath_motion *motion, const ath_integers *integers, int32_t stage)
 {
     ath_coder coder;
     refinement_model *rows = (refinement_model *)model;
@@ -270,14 +270,14 @@ int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, cons
     for (int32_t p = 0; p < plan->piece_count; p++) {
         ath_piece_rows piece = ath_rows_of_piece(integers, motion->frames, p);
         ath_coarse_rows(motion, p, &piece);
-        code_refined_tracks(&coder, rows, plan, motion->streams + level, motion, plan->pieces + p, &piece);
-        code_refined_modes(&coder, rows, motion->streams + level, motion, plan->pieces + p, &piece);
+        code_refined_tracks(&coder, rows, plan, motion->streams + stage, motion, plan->pieces + p, &piece);
+        code_refined_modes(&coder, rows, motion->streams + stage, motion, plan->pieces + p, &piece);
     }
     return written(&coder, !rows->rows.invalid);
 }
 
 int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan, const ath_motion *motion,
-                           const ath_integers *integers, int32_t level)
+                           const ath_integers *integers, int32_t stage)
 {
     ath_coder coder;
     affine_model *maps = (affine_model *)model;
@@ -286,7 +286,7 @@ int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const a
     affine_model_init(maps, motion->frames, (uint32_t *)(maps + 1));
     for (int32_t n = 0; n < plan->node_count && valid; n++) {
         ath_node_rows node = ath_rows_of_node(integers, motion->frames, n);
-        if (plan->nodes[n].coded && plan->nodes[n].stage == level)
+        if (plan->nodes[n].coded && plan->nodes[n].stage == stage)
             valid = code_node(&coder, maps, plan, motion->frames, n, &node);
     }
     return written(&coder, valid);

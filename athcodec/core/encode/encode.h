@@ -112,7 +112,7 @@ typedef struct ath_rounding {
 } ath_rounding;
 
 /* Quantise the coefficients and tracks of pieces in closed loop, and the maps of nodes. source: vertex-major doubles
- * less the origin. A map's step is that of its level (height + 2 lengths) over the root of its number of vertices, so
+ * less the origin. A map's step is that of its stage (height + 2 lengths) over the root of its number of vertices, so
  * that equal errors of all vertices together cost the same everywhere. Attach caches have to be kept (ath_build_plan).
  * Only pieces, or nodes, first to stop - 1 are analysed: several threads may work on ranges of one segment, each with
  * its own scratch memory, once the pieces that theirs hang on are done. positions: see ath_pose; may be null.
@@ -121,20 +121,20 @@ ATH_ENCODER_API void ath_analyse(const ath_plan *plan, const ath_motion *motion,
                                  int32_t first, int32_t stop, const double *source, const ath_rounding *rounding,
                                  int bent, const double origin[3], int is_float64, void *positions);
 ATH_ENCODER_API void ath_analyse_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                       int32_t first, int32_t stop, const double *source, const double *level_steps,
+                                       int32_t first, int32_t stop, const double *source, const double *stage_steps,
                                        const ath_rounding *rounding);
 
 /* Puts decoded vertices, less the origin, into positions as ath_pose does. */
 void ath_store_positions(const double *placed, int32_t first, int32_t count, int32_t frames, const double origin[3],
                          int is_float64, void *positions);
 
-/* Fill positions at `level` as a decoder has them before corrections: with the origin, vertex-major, float or
+/* Fill positions at `stage` as a decoder has them before corrections: with the origin, vertex-major, float or
  * (is_float64) double. First call ranges of pieces, under the rule above, then ranges of nodes. */
 ATH_ENCODER_API void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                              int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                              int32_t first, int32_t stop, int32_t stage, const double origin[3], int is_float64,
                               void *positions);
 ATH_ENCODER_API void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers,
-                                    int32_t first, int32_t stop, int32_t level, const double origin[3], int is_float64,
+                                    int32_t first, int32_t stop, int32_t stage, const double origin[3], int is_float64,
                                     void *positions);
 
 /* Fills the steps of a piece's first ATH_SHAPE_MODES modes over that of their stream. */
@@ -263,7 +263,7 @@ ATH_ENCODER_API int64_t ath_encode_basis(void *model, uint8_t *bytes, size_t cap
 /* integers: ATH_SHAPE_NUMBERS of each shape, as streams hold them. */
 ATH_ENCODER_API int64_t ath_encode_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                           const int32_t *shape_counts, const int64_t *shape_first, int32_t *integers,
-                                          int32_t level);
+                                          int32_t stage);
 /* coarse_counts: null if the layer before has no shapes. */
 ATH_ENCODER_API int64_t ath_encode_refined_shapes(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                                   const int32_t *shape_counts, const int64_t *shape_first,
@@ -273,11 +273,11 @@ ATH_ENCODER_API int64_t ath_encode_refined_shapes(void *model, uint8_t *bytes, s
 ATH_ENCODER_API int64_t ath_encode_exact(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                          int32_t frames, int is_float64, const void *positions, const void *source);
 ATH_ENCODER_API int64_t ath_encode_stems(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                         const ath_motion *motion, const ath_integers *integers, int32_t level);
+                                         const ath_motion *motion, const ath_integers *integers, int32_t stage);
 ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                              const ath_motion *motion, const ath_integers *integers, int32_t level);
+                                              const ath_motion *motion, const ath_integers *integers, int32_t stage);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
-                                           const ath_motion *motion, const ath_integers *integers, int32_t level);
+                                           const ath_motion *motion, const ath_integers *integers, int32_t stage);
 /* memory: ath_predicted_memory bytes. source: frames x vertex_count x 3, less the origin. limits: one per vertex. Fills
  * positions, as decoded. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);

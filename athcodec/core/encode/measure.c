@@ -110,24 +110,24 @@ static void pose_node(const ath_plan *plan, const ath_motion *motion, const ath_
 }
 
 void ath_pose(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first, int32_t stop,
-              int32_t level, const double origin[3], int is_float64, void *positions)
+              int32_t stage, const double origin[3], int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t p = first; p < stop; p++) {
         const ath_piece *piece = plan->pieces + p;
         ath_piece_rows rows = ath_rows_of_piece(integers, motion->frames, p);
-        if (piece->stage > level) continue;
+        if (piece->stage > stage) continue;
         const double *placed = ath_pose_piece(plan, motion, p, &rows, &scratch);
         ath_store_positions(placed, piece->first, piece->count, motion->frames, origin, is_float64, positions);
     }
 }
 
 void ath_pose_nodes(const ath_plan *plan, const ath_motion *motion, const ath_integers *integers, int32_t first,
-                    int32_t stop, int32_t level, const double origin[3], int is_float64, void *positions)
+                    int32_t stop, int32_t stage, const double origin[3], int is_float64, void *positions)
 {
     ath_scratch scratch = ath_motion_scratch(plan, motion);
     for (int32_t n = first; n < stop; n++)
-        if (ath_is_shown(plan->nodes + n, level))
+        if (ath_is_shown(plan->nodes + n, stage))
             pose_node(plan, motion, integers, n, &scratch, origin, is_float64, positions);
 }
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, BinaryIO
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from athcodec.motion.hierarchy import derived_edges
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
 from athcodec.motion.thresholds import THRESHOLDS
 from athcodec.motion.units import METRES_PER_UNIT, stated_scene
+from athcodec.untyped import JsonObject
 
 SPOOL_BYTES = 64 << 20  # Bytes of chunks that are held in memory and not in a temporary file.
 STATIC_METADATA = ("unit", METRES_PER_UNIT, "up_axis")
@@ -94,8 +95,8 @@ class FileAssembly:
         """Add all chunks of a file to a store."""
         decided, layers = self.decided, self.decided.layers
         self._add_prelude(store)
-        for (level, kind), content in layer_chunks(layers).items():
-            store.add(kind, content, level)
+        for (stage, kind), content in layer_chunks(layers).items():
+            store.add(kind, content, stage)
         errors, joins, stages = self._add_motion(store, coded)
         self._add_static(store)
         if self.clip.motion.clip_ranges:
@@ -205,9 +206,7 @@ class FileAssembly:
                     continue
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
-    def _stored(
-        self, of_source: dict[str, Any], of_weights: Callable[[ErrorWeights], dict[str, Any]]
-    ) -> dict[str, Any]:
+    def _stored(self, of_source: JsonObject, of_weights: Callable[[ErrorWeights], JsonObject]) -> JsonObject:
         """Return attributes or metadata of the source with those of weights, if there are some."""
         weights = self.clip.placed.weights
         return of_source if weights is None else of_source | of_weights(weights)
@@ -215,12 +214,12 @@ class FileAssembly:
     def _add_motion(
         self, store: writing.ChunkStore, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-        """Return (levels, segments, 3) errors and (levels, segments) joins of the levels that are shown, and which of
-        all they are. Raises ValueError unless each segment comes once."""
+        """Return (levels, segments, 3) errors and (levels, segments) joins of the stages that become levels, and which
+        stages these are. Raises ValueError unless each segment comes once."""
         decided = self.decided
-        levels, count = decided.layers.level_count + self.options.lossless, decided.segment_count
-        errors, joins = np.zeros((levels, count, len(MEASURES))), np.zeros((levels, count), np.uint8)
-        flaws, missing = np.zeros((levels, count, 2)), set(range(count))
+        stages, count = decided.layers.stage_count + self.options.lossless, decided.segment_count
+        errors, joins = np.zeros((stages, count, len(MEASURES))), np.zeros((stages, count), np.uint8)
+        flaws, missing = np.zeros((stages, count, 2)), set(range(count))
         for segment in coded:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
@@ -228,15 +227,15 @@ class FileAssembly:
             errors[:, segment.index] = segment.errors + decided.source.replaced_error
             joins[:, segment.index] = segment.joins
             flaws[:, segment.index] = segment.flaws
-            for (level, kind), payload in segment.chunks.items():
-                store.add(kind, payload, level, segment.index)
+            for (stage, kind), payload in segment.chunks.items():
+                store.add(kind, payload, stage, segment.index)
             self.report("motion", 1 - len(missing) / count)
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         frames = [[stop - start for start, stop in clip] for clip in decided.source.clip_range_segments]
-        first_held = decided.layers.level_0.level_count - 1
+        first_held = decided.layers.stage_0.stage_count - 1
         shown = chosen_levels(errors, frames, flaws, decided.source.seen.diagonal, self.options.lossless, first_held)
-        store.leave_out(lambda chunk: not decided.layers.level_0.serves(chunk.kind, chunk.level, shown))
+        store.leave_out(lambda chunk: not decided.layers.stage_0.serves(chunk.kind, chunk.stage, shown))
         return errors[shown], joins[shown], shown
 
     def _summary(self, path: Path | None, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:

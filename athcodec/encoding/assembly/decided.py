@@ -1,4 +1,4 @@
-"""Records that go from one stage of encoding to the next: what is decided about a file, and what is coded of it."""
+"""Records that go from one step of encoding to the next: what is decided about a file, and what is coded of it."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Draft:
 
 @dataclass(frozen=True)
 class CodedSegment:
-    """One segment: chunks {(level, kind): payload}, (levels, 3) errors of stopping at each level, (levels,) joins to
-    the segment before, and (levels, 2) flaws of what each level shows (SourceFrames)."""
+    """One segment: chunks {(stage, kind): payload}, (stages, 3) errors of stopping at each stage, (stages,) joins to
+    the segment before, and (stages, 2) flaws of what each stage shows (SourceFrames)."""
 
     index: int
     chunks: dict[tuple[int, int], bytes]

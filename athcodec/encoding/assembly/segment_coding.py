@@ -91,13 +91,16 @@ class SegmentCoder:
             order.append((index, True))
         return order
 
-    def _linked(self, order: Sequence[tuple[int, bool]]) -> Iterator[tuple[int, Ends | None, Ends | None]]:
-        """Yield each segment with the ends that it goes on from, and with room for its own if the next one does."""
+    def _linked(
+        self, order: Sequence[tuple[int, bool]]
+    ) -> Iterator[tuple[int, list[np.ndarray], Ends | None, Ends | None]]:
+        """Yield each segment, its positions if they have to be read, the ends that it goes on from, and room for its
+        own if the next one goes on from it."""
         decided = self.decided
         goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
-        ends = None
+        ends: Ends | None = None
         for (index, _), follows in zip(order, [*goes_on[1:], False]):
-            before, ends = ends, Ends(decided.layers.level_count) if follows else None
+            before, ends = ends, Ends(decided.layers.stage_count) if follows else None
             # The search holds the positions of an only segment.
             block = [decided.source.block(index)] if len(decided.source.segments) > 1 else []
             yield index, block, before, ends

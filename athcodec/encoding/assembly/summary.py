@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from athcodec.decoding.file_tables import Level
 from athcodec.files.shown import Report, Table, counted
+from athcodec.untyped import JsonObject
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Summary:
     table1: dict[str, float]
     levels: list[Level]
     chunk_bytes: dict[str, int]
-    choices: dict[str, Any]
+    choices: JsonObject
     seams: tuple[Seam, ...] = ()
     found_branches: str | None = None
     not_read: Mapping[str, Sequence[str]] = field(default_factory=dict)

@@ -492,11 +492,14 @@ def survey(
         frames = _in_file_order(portion, hierarchy)
         return _Extent.of(frames, rest, trees), Differences.of(seen_from(pieces.origin, frames), pieces, xi)
 
-    extent, differences, gads = None, None, _Largest(limits.eta + 1)
+    extent: _Extent | None = None
+    differences: Differences | None = None
+    gads = _Largest(limits.eta + 1)
     steps: list[float] = []
     portions = _noting_steps(_portions(clip, hierarchy.vertex_count), steps)
     for where, how in pool.ordered(measured, portions, 2 * pool.jobs):
-        extent, differences = (where, how) if extent is None else (extent | where, differences | how)
+        extent = where if extent is None else extent | where
+        differences = how if differences is None else differences | how
         gads.add(how.gads)
         if progress is not None:
             progress(extent.frame_count / clip.frame_count)

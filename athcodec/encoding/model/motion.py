@@ -120,7 +120,7 @@ class Plan:
         lib.ath_build_plan(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data, memory.ctypes.data, 1)
         lib.ath_plan_rigid(self.core, self.pieces.ctypes.data, layer)
         if refined:
-            self.pieces["stage"], self.pieces["low_stage"], self.pieces["low_modes"] = self.level_count - 1, -1, 0
+            self.pieces["stage"], self.pieces["low_stage"], self.pieces["low_modes"] = self.stage_count - 1, -1, 0
         if predicted:
             lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
         self.rest = self.bases = None
@@ -129,11 +129,11 @@ class Plan:
 
     @property
     def height(self) -> int:
-        """Depth of the deepest node; levels run from 0 to height + 1."""
+        """Depth of the deepest node; stages run from 0 to height + 1."""
         return self.core.height
 
     @property
-    def level_count(self) -> int:
+    def stage_count(self) -> int:
         return self.height + 2
 
     def set_rest(self, rest: np.ndarray, bases: bool = True, like: Plan | None = None) -> None:
@@ -142,7 +142,7 @@ class Plan:
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
-        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data, 0, self.level_count)
+        lib.ath_plan_nodes(self.core, self.nodes.ctypes.data, 0, self.stage_count)
         if self.predicted or not bases:
             return
         gaps = np.empty(vertices, np.uint8)
@@ -220,7 +220,7 @@ class Plan:
 
     @property
     def base_stage(self) -> np.ndarray:
-        """Per piece the level whose stream holds its tracks and first modes, (P,)."""
+        """Per piece the stage whose stream holds its tracks and first modes, (P,)."""
         return np.where(self.pieces["low_stage"] >= 0, self.pieces["low_stage"], self.pieces["stage"])
 
     @cached_property
@@ -246,30 +246,30 @@ class Plan:
         return np.sqrt(2 / 3 * np.add.reduceat((away**2).sum(axis=1), pieces["first"]))
 
     @property
-    def main_level(self) -> int:
-        """The level whose stream holds the most rows."""
+    def main_stage(self) -> int:
+        """The stage whose stream holds the most rows."""
         low, rotations = np.minimum(self.pieces["low_modes"], self.ranks), self.is_rigid
-        rows = np.bincount(self.base_stage, low + rotations, self.level_count)
-        return int((rows + np.bincount(self.pieces["stage"], self.ranks - low, self.level_count)).argmax())
+        rows = np.bincount(self.base_stage, low + rotations, self.stage_count)
+        return int((rows + np.bincount(self.pieces["stage"], self.ranks - low, self.stage_count)).argmax())
 
-    def has_stems(self, level: int) -> bool:
-        """Return whether the level has a coefficient stream."""
-        return bool(((self.pieces["stage"] == level) | (self.pieces["low_stage"] == level)).any())
+    def has_stems(self, stage: int) -> bool:
+        """Return whether the stage has a coefficient stream."""
+        return bool(((self.pieces["stage"] == stage) | (self.pieces["low_stage"] == stage)).any())
 
-    def has_affines(self, level: int) -> bool:
-        """Return whether nodes of the level have maps of their own."""
-        return bool(((self.nodes["stage"] == level) & (self.nodes["coded"] == 1)).any())
+    def has_affines(self, stage: int) -> bool:
+        """Return whether nodes of the stage have maps of their own."""
+        return bool(((self.nodes["stage"] == stage) & (self.nodes["coded"] == 1)).any())
 
-    def serves(self, kind: int, level: int, shown: Sequence[int]) -> bool:
-        """Return whether the chunks of a kind and level are stored where these levels are shown."""
+    def serves(self, kind: int, stage: int, shown: Sequence[int]) -> bool:
+        """Return whether the chunks of a kind and stage are stored where these stages are shown."""
         if kind == ct.AFFINES:
-            last = self.nodes["last_stage"][(self.nodes["stage"] == level) & (self.nodes["coded"] == 1)].max(initial=-1)
-            return any(level <= one <= last for one in shown)
-        return kind != ct.CORRECTIONS or level in shown
+            last = self.nodes["last_stage"][(self.nodes["stage"] == stage) & (self.nodes["coded"] == 1)].max(initial=-1)
+            return any(stage <= one <= last for one in shown)
+        return kind != ct.CORRECTIONS or stage in shown
 
     @property
-    def level_0_stands_alone(self) -> bool:
-        """Whether nothing of level 0 serves other levels, so that level 1 may refine the rest pose."""
+    def stage_0_stands_alone(self) -> bool:
+        """Whether nothing of stage 0 serves other stages, so that stage 1 may refine the rest pose."""
         return not self.has_stems(0) and not (self.nodes["last_stage"][self.nodes["stage"] == 0] > 0).any()
 
 
@@ -295,22 +295,22 @@ class LearnedModes:
     units: np.ndarray  # (K, LEARNED_NUMBERS) float64 of unit length: axis a of mode m at 3 m + a.
     duals: np.ndarray  # Like units: map a piece's cantilever modes to the tracks of its learned modes.
 
-    def levels(self, plan: Plan) -> np.ndarray:
-        """Return the levels whose streams hold tracks of learned modes."""
+    def stages(self, plan: Plan) -> np.ndarray:
+        """Return the stages whose streams hold tracks of learned modes."""
         pieces, learned = plan.pieces, self.counts > 0
         full = learned & (pieces["low_stage"] >= 0) & (self.counts >= 3 * pieces["low_modes"])
         return np.union1d(plan.base_stage[learned], pieces["stage"][full])
 
 
 @dataclass
-class LevelStream:
-    """How one level's integers are read: step in scene units, rotation step factor (0: no rotations), time basis."""
+class StageStream:
+    """How one stage's integers are read: step in scene units, rotation step factor (0: no rotations), time basis."""
 
     step: float
     rotation_step_factor: float = 0.0
     temporal: np.ndarray | None = None  # (rank, frames) float64; None: waves, by the root.
     turn_step: float = 0.0  # Largest step of rotations of rigid pieces; 0: any.
-    root: int = NO_ROOT  # Level of the first stream whose learned basis begins with the same rows.
+    root: int = NO_ROOT  # Stage of the first stream whose learned basis begins with the same rows.
 
 
 class SegmentMotion:
@@ -320,16 +320,17 @@ class SegmentMotion:
         self,
         plan: Plan,
         frames: int,
-        streams: list[LevelStream],
+        streams: list[StageStream],
         learned_modes: LearnedModes | None = None,
         before: SegmentMotion | None = None,
         ratio: int = 1,
+        *,
         periodic: bool = False,
     ):
-        if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.level_count:
+        if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.stage_count:
             raise ValueError(
                 f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
-                f"frames, {plan.level_count} streams"
+                f"frames, {plan.stage_count} streams"
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
@@ -360,7 +361,7 @@ class SegmentMotion:
         all_at_base = before.plan.ranks <= pieces["low_modes"]
         return (same[before.plan.base_stage] & (same[pieces["stage"]] | all_at_base)).astype(np.uint8)
 
-    def waves_of(self, stream: LevelStream) -> np.ndarray:
+    def waves_of(self, stream: StageStream) -> np.ndarray:
         """Return the waves of a stream, or what is learned in their place, (rank, frames)."""
         return self.waves if stream.temporal is None else stream.temporal
 
@@ -424,13 +425,13 @@ class SegmentMotion:
     ) -> None:
         """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
 
-        positions: filled with what `pose` returns at the last level, which the closed loop has at hand. bent: leave
+        positions: filled with what `pose` returns at the last stage, which the closed loop has at hand. bent: leave
         out rigid pieces on which nothing hangs. Trees that stand still keep the rest pose, whatever the positions are.
         """
         at, into, place = self._source(source), (bent, None, False, None), None
         if positions is not None:
             out = _output(origin, positions)
-            into, place = (bent, *out), self._placing(self.plan.level_count - 1, *out)
+            into, place = (bent, *out), self._placing(self.plan.stage_count - 1, *out)
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
                 self.plan.core, motion, self.integers, first, stop, at, rounding, *into
@@ -439,18 +440,18 @@ class SegmentMotion:
         )
 
     def analyse_nodes(
-        self, source: np.ndarray, level_steps: np.ndarray, rounding: Rounding, level: int | None = None
+        self, source: np.ndarray, stage_steps: np.ndarray, rounding: Rounding, stage: int | None = None
     ) -> None:
-        """Fill the maps of the nodes, or those of one level, after `analyse` or `pose` unless it is level 0.
+        """Fill the maps of the nodes, or those of one stage, after `analyse` or `pose` unless it is stage 0.
 
-        A map's step is that of its level, (level_count,) float64 in scene units, over the root of its vertex count.
+        A map's step is that of its stage, (stage_count,) float64 in scene units, over the root of its vertex count.
         """
-        at, steps = self._source(source), address(level_steps, np.float64, self.plan.level_count)
+        at, steps = self._source(source), address(stage_steps, np.float64, self.plan.stage_count)
         self._nodewise(
             lambda motion, first, stop: lib.ath_analyse_nodes(
                 self.plan.core, motion, self.integers, first, stop, at, steps, rounding
             ),
-            level,
+            stage,
         )
 
     def clear_nodes(self) -> None:
@@ -474,17 +475,17 @@ class SegmentMotion:
             self.plan.pool.map(self._with_scratch(of_still), standing)
 
     def _placing(self, *into: Any) -> Callable[[Motion, int, int], None]:
-        """Return what places a range of pieces at a level; into: the level, and an `_output`."""
+        """Return what places a range of pieces at a stage; into: the stage, and an `_output`."""
 
         def place(motion: Motion, first: int, stop: int) -> None:
             lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
 
         return place
 
-    def _nodewise(self, call: Callable[[Motion, int, int], None], level: int | None = None) -> None:
+    def _nodewise(self, call: Callable[[Motion, int, int], None], stage: int | None = None) -> None:
         plan = self.plan
-        of_level = [(n, n + 1) for n in np.flatnonzero(plan.nodes["stage"] == level).tolist()]
-        plan.pool.map(self._with_scratch(call), plan.node_ranges if level is None else of_level)
+        of_stage = [(n, n + 1) for n in np.flatnonzero(plan.nodes["stage"] == stage).tolist()]
+        plan.pool.map(self._with_scratch(call), plan.node_ranges if stage is None else of_stage)
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
         """Return the call with scratch memory of its own."""
@@ -501,15 +502,15 @@ class SegmentMotion:
     def _source(self, source: np.ndarray) -> int:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
-    def pose(self, level: int, origin: np.ndarray, dtype, room: np.ndarray | None = None) -> np.ndarray:
-        """Return positions at `level` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
+    def pose(self, stage: int, origin: np.ndarray, dtype, room: np.ndarray | None = None) -> np.ndarray:
+        """Return positions at `stage` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
         many float64, whose memory is to hold them."""
         shape = self.plan.vertex_count, 3, self.frames
         if room is None:
             positions = zeros(shape, dtype)
         else:
             positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
-        into = level, *_output(origin, positions)
+        into = stage, *_output(origin, positions)
         place = self._placing(*into)
         self._piecewise(place, place)
         self._nodewise(
@@ -567,6 +568,7 @@ def position_errors(
     pool: ThreadPool,
     shown: np.ndarray | None = None,
     shares: np.ndarray | None = None,
+    *,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
     """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up for files.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,7 @@ class EncodingOptions:
         segment_frames: int | None = None,
         ladder: str | Sequence[float] = DEFAULT_LADDER,
         rest_error: LengthLike | None = None,
-        **options,
+        **options: Any,
     ) -> EncodingOptions:
         """Return checked options; ladder, rest_error: as `ladder_of` and `RestPrecision.of` take them.
         segment_frames: limits the segments of predicted motion, too."""

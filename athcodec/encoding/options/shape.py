@@ -7,9 +7,7 @@ point anywhere. So every branch may have a largest step of its own (FORMAT.md, D
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from athcodec.errors import BoundError
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import sides
 from athcodec.motion.units import Length, LengthLike, length_of, scene_unit
+from athcodec.untyped import JsonMapping
 
 OF_BOUND = "bound"
 EDGE_STEP = 0.025  # Largest step of a branch over the length of its edges, which rounding stretches by as much.
@@ -50,7 +49,7 @@ class RestPrecision:
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
         return precision
 
-    def error(self, metadata: Mapping[str, Any], diagonal: float) -> float:
+    def error(self, metadata: JsonMapping, diagonal: float) -> float:
         """Return the largest error that is asked for, in the scene units of some metadata; infinite: none is."""
         if self.length is not None:
             return self.length.in_scene_units(scene_unit(metadata))

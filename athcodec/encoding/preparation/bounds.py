@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from athcodec.errors import BoundError
 from athcodec.motion.algebra import length
 from athcodec.motion.clip import MotionClip
 from athcodec.options import COARSE_SHARE, DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR, set_numbers
+from athcodec.untyped import JsonValue
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
 SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
@@ -62,7 +62,7 @@ class BoundOption:
         fraction = self.rel_error or DEFAULT_REL_ERROR
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
 
-    def objection(self, bound: float, diagonal: float, unit: Any) -> str:
+    def objection(self, bound: float, diagonal: float, unit: JsonValue) -> str:
         """Return what speaks against a bound for a clip of this diagonal and unit, empty if nothing does. A caller who
         has passed a fraction knows it."""
         if self.max_error is None and self.target_size is None or not bound > COARSE_SHARE * diagonal > 0:

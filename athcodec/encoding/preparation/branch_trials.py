@@ -55,7 +55,7 @@ def _best_candidate(
 ) -> tuple[Found, float]:
     """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
     about its bytes, infinite where nothing had to be tried; of those that are about as small the one of the lowest
-    order, but roots alone last, which have no levels. Predicted motion hardly depends on branches: if two
+    order, but roots alone last, which have no stages. Predicted motion hardly depends on branches: if two
     candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)

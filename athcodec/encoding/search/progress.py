@@ -1,6 +1,6 @@
 """Counted work of an encoding: what it may take, and how far it has come, as one fraction from 0 to 1.
 
-Work is counted, not timed, so that the same file comes out on every machine. Each stage counts from 0 to 1; how much it
+Work is counted, not timed, so that the same file comes out on every machine. Each phase counts from 0 to 1; how much it
 weighs follows from the vertices and frames that it works on.
 """
 
@@ -22,21 +22,21 @@ SURVEY = 0.11  # For a vertex in a frame of the survey.
 MOTION = 0.24  # For a vertex in a frame of a layer that is coded.
 ANALYSIS = 0.06  # For a vertex in a frame that is transformed for a trial.
 PREDICTION = 0.24  # For a vertex in a frame that is predicted for a trial.
-MAPS = 0.005  # For a vertex in a frame at a level whose maps are tried.
+MAPS = 0.005  # For a vertex in a frame at a stage whose maps are tried.
 TURNS = 0.008  # For the same where stems turn with what carries them.
 TRIAL = 1900  # For a trial, however small.
 BYTE = 0.18  # For a byte of a stream that is tried.
 FILE_BYTE = 2.0  # For a byte of a file that is coded.
 CORRECTION = 3.3  # For a correction.
-LEVEL = 1.7  # For a vertex to which the maps of a level are fitted in a few frames.
-LEVEL_MOTION = 0.1  # For a vertex in a frame at a level of the hierarchy of a file.
+MAP_FIT = 1.7  # For a vertex to which the maps of a stage are fitted in a few frames.
+STAGE_MOTION = 0.1  # For a vertex in a frame at a stage of the hierarchy of a file.
 START = 25  # For a vertex of which the settings that a search starts with are found.
 POSE = 0.8  # For a vertex of a rest pose that is coded.
 REST = 6  # For a vertex of a rest pose that is chosen.
 PIECE = 0.05  # For the square of the vertices of a piece of a rest pose that is coded.
 BASIS = 0.09  # For a vertex in a frame of components over time.
 COMPONENT = 0.0002  # For a vertex in a pair of frames of components over time.
-EIGENVECTOR = 0.0013  # For three frames, each any of a segment, of which a level's components over time are made.
+EIGENVECTOR = 0.0013  # For three frames, each any of a segment, of which a stage's components over time are made.
 FINDING = 60  # For a vertex whose branch is sought by motion.
 BRANCH_SHARE = 0.45  # Largest share of all work that finding branches takes.
 LEARNT = 4  # For a vertex from which modes are learned.
@@ -52,7 +52,7 @@ BRANCHES = 0.5  # Work of finding branches, over all other work.
 SIZES = 6  # Files that are made to meet a target size.
 
 
-def silent(stage: str, fraction: float) -> None:
+def silent(phase: str, fraction: float) -> None:
     """Report to nobody."""
 
 
@@ -73,10 +73,10 @@ class Work:
     beyond which nothing more is tried; expected: work at the end of the search; untried: choices left out.
     """
 
-    def __init__(self, allowed: float = math.inf, report: Progress = silent, stage: str = "search"):
+    def __init__(self, allowed: float = math.inf, report: Progress = silent, phase: str = "search"):
         self.allowed, self.expected, self.done = allowed, 0.0, 0
         self.untried: dict[str, None] = {}
-        self._report, self._stage, self._choice, self._lock = report, stage, "", Lock()
+        self._report, self._phase, self._choice, self._lock = report, phase, "", Lock()
 
     def add(self, work: float) -> None:
         """Count work that is done."""
@@ -104,34 +104,34 @@ class Work:
 
     def report(self) -> None:
         """Report what is tried, and how far the search has come."""
-        words = f"{self._stage}: {self._choice}" if self._choice not in ("", self._stage) else self._stage
+        words = f"{self._phase}: {self._choice}" if self._choice not in ("", self._phase) else self._phase
         self._report(words, min(self.done / self.expected, 0.99) if self.expected else 0.0)
 
     def finish(self) -> None:
         """Report the end of the search."""
-        self._report(self._stage, 1.0)
+        self._report(self._phase, 1.0)
 
 
 class WeightedProgress:
-    """Takes the fraction of each stage and reports that of the whole, which never falls. A stage may be followed by a
+    """Takes the fraction of each phase and reports that of the whole, which never falls. A phase may be followed by a
     colon and what it does."""
 
     def __init__(self, progress: Progress | None, weights: dict[str, float]):
         self._progress, self._reached = progress, 0.0
         total, before = sum(weights.values()) or 1.0, 0.0
         self._ranges = {}
-        for stage, weight in weights.items():
-            self._ranges[stage] = before / total, weight / total
+        for phase, weight in weights.items():
+            self._ranges[phase] = before / total, weight / total
             before += weight
 
-    def __call__(self, stage: str, fraction: float) -> None:
-        start, length = self._ranges.get(stage.partition(":")[0], (1.0, 0.0))
+    def __call__(self, phase: str, fraction: float) -> None:
+        start, length = self._ranges.get(phase.partition(":")[0], (1.0, 0.0))
         self._reached = max(self._reached, min(start + length * fraction, 1.0))
         if self._progress is not None:
-            self._progress(stage, self._reached)
+            self._progress(phase, self._reached)
 
 
-def stage_weights(
+def phase_weights(
     vertices: int,
     segments: list[tuple[int, int]],
     effort: str,
@@ -142,7 +142,7 @@ def stage_weights(
     motion: bool,
     layers: int,
 ) -> dict[str, float]:
-    """Return the estimated work of each stage. samples: segments that a trial codes; branches: whether they have to be
+    """Return the estimated work of each phase. samples: segments that a trial codes; branches: whether they have to be
     found; sizes: whether a target size is to be met; motion: whether motion is coded too."""
     longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
     small = is_small(vertices, segments, effort)

@@ -100,36 +100,36 @@ class ExtrapolationFactors:
     """Factors from a sample to its plant."""
 
     vertices: float
-    rows: np.ndarray  # (levels,) rows of each level's stream.
-    nodes: np.ndarray  # (levels,) nodes that have maps.
+    rows: np.ndarray  # (stages,) rows of each stage's stream.
+    nodes: np.ndarray  # (stages,) nodes that have maps.
     rest_cap: float  # Largest step of the rest pose that is tried, in bounds.
 
     @classmethod
-    def everything(cls, levels: int) -> ExtrapolationFactors:
+    def everything(cls, stages: int) -> ExtrapolationFactors:
         """Return the factors of a plant that is not sampled."""
-        return cls(1.0, np.ones(levels), np.ones(levels), qz.REST_CAP)
+        return cls(1.0, np.ones(stages), np.ones(stages), qz.REST_CAP)
 
     @classmethod
     def of(cls, whole: np.ndarray, sample: np.ndarray) -> ExtrapolationFactors:
         """Return the factors for the branches of a plant and of its sample, (B,) of _native.BRANCH."""
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, sample)]
         rows, nodes = (
-            np.divide(*counts, out=np.ones(plans[0].level_count), where=counts[1] > 0)
+            np.divide(*counts, out=np.ones(plans[0].stage_count), where=counts[1] > 0)
             for counts in zip(*map(_counts, plans))
         )
         return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes, qz.SAFE_REST_CAP)
 
 
 def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows of stems, and the nodes with maps, per level."""
-    pieces, levels = plan.pieces, plan.level_count
-    low = np.bincount(plan.base_stage, pieces["low_modes"], levels)
-    high = np.bincount(pieces["stage"], pieces["count"] - pieces["low_modes"], levels)
-    return low + high, np.bincount(plan.nodes["stage"], plan.nodes["coded"], levels)
+    """Return the rows of stems, and the nodes with maps, per stage."""
+    pieces, stages = plan.pieces, plan.stage_count
+    low = np.bincount(plan.base_stage, pieces["low_modes"], stages)
+    high = np.bincount(pieces["stage"], pieces["count"] - pieces["low_modes"], stages)
+    return low + high, np.bincount(plan.nodes["stage"], plan.nodes["coded"], stages)
 
 
 def sample_plant(source: Source, ath: Ath, effort: str, with_faces: bool = False) -> PlantSample | None:
-    """Return a sample of a large plant with a branch of every level; None: the plant is small, or effort is "best". The
+    """Return a sample of a large plant with a branch of every stage; None: the plant is small, or effort is "best". The
     sample grows with the clip, so that the search keeps its share of the work."""
     frames = -(-source.coded_frames // len(source.segments))
     wanted = sample_vertices(source.clip.vertex_count, len(source.segments), frames, effort)

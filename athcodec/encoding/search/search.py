@@ -20,7 +20,7 @@ from athcodec.encoding.search.choices.node_steps import best_node_steps, cost_wi
 from athcodec.encoding.search.choices.reference import mean_pose
 from athcodec.encoding.search.choices.rest import best_slack, with_slack
 from athcodec.encoding.search.choices.rigid import best_freedom, calm_parts
-from athcodec.encoding.search.choices.steps import best_level_steps, best_steps, finer_steps, walked
+from athcodec.encoding.search.choices.steps import best_stage_steps, best_steps, finer_steps, walked
 from athcodec.encoding.search.progress import ANALYSIS, LEARNING, START, TRIAL, Work, expected_trials
 from athcodec.encoding.search.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.search.segment_samples import samples_of, spread_samples
@@ -40,7 +40,7 @@ SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
-OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each level are taken, which layers cannot have.
+OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
 CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first moves from which on the mean pose is better.
 TURNED_LEAST_SHARE = 0.5  # Least share of its bytes in waves that time bases have brought a turning root down to.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
@@ -83,7 +83,7 @@ def _learned_cost(trials: Trials) -> float:
 
 
 CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
-    best_level_steps: "steps of levels",
+    best_stage_steps: "steps of levels",
     best_freedom: "freedom of rigid parts",
     forms.best_forms: "forms",
     forms.best_forms_again: "forms",
@@ -132,6 +132,7 @@ class Search:
         effort: str,
         work: Work,
         jobs: int | None = None,
+        *,
         ratios: Sequence[int] = (1,),
     ) -> Search:
         """Return the search for a whole plant."""
@@ -176,18 +177,18 @@ class Search:
         usual = 1 << round(math.log2(lengths[best]))
         return [*shorter, (usual, costs[best])] if shorter and usual != lengths[best] else shorter
 
-    def levels_need_own_bases(self) -> bool:
-        """Return whether a file is much smaller if each level learns a time basis of its own, as only a single layer
+    def stages_need_own_bases(self) -> bool:
+        """Return whether a file is much smaller if each stage learns a time basis of its own, as only a single layer
         can."""
         trials = (self.of_sample or self).trials
         start, in_bases = trials.start, trials.start.in_learned_bases()
-        if not trials.is_layered or trials.levels <= 2 or trials.without(Feature.TIME_BASES):
+        if not trials.is_layered or trials.stages <= 2 or trials.without(Feature.TIME_BASES):
             return False
         others = start, replace(in_bases, common_basis=True)
         return all(trials.costs([in_bases])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
 
     def keep_work_of_maps(self) -> None:
-        """Leave the work of choosing maps of coarse levels, which comes last and is always done."""
+        """Leave the work of choosing maps of coarse stages, which comes last and is always done."""
         self.trials.work.allowed -= work_of_steps((self.of_sample or self).trials)
 
     def first_cost(self) -> float:
@@ -215,7 +216,7 @@ class Search:
         return sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
-        return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.level_costs(settings).sum()
+        return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
         """Return settings to choose from, and hierarchy and poses as coded with them."""
@@ -254,12 +255,12 @@ class Search:
     def at_first_step(self) -> Settings:
         """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
         if self.effort == "fast":
-            fast = [best_level_steps, rotations.fast_rotations, learned_bases.best_waves]
+            fast = [best_stage_steps, rotations.fast_rotations, learned_bases.best_waves]
             return self._after(fast, self.trials.start)
         choices = [BY_NAME[name] for name in order.BEFORE_STEPS]
         last = [learned_pieces.best_pieces_in_any_basis, learned_bases.best_waves]
         with self.trials.work.trying("steps", self._share_beside(STEP_TRIALS)):
-            return self._after([best_level_steps, *choices, *last], self.trials.start)
+            return self._after([best_stage_steps, *choices, *last], self.trials.start)
 
     @cached_property
     def at_best_step(self) -> Settings:
@@ -308,7 +309,7 @@ class Search:
                 yield replace(settings, learned_pieces=None)
             return
         factors, least = settings.rotation_step_factors, math.inf
-        main = factors[trials.prelude(settings).plan.main_level]
+        main = factors[trials.prelude(settings).plan.main_stage]
         turned = settings.with_rotations(main) if main else settings.with_turning_roots(max(factors))
         for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
@@ -353,7 +354,7 @@ class Search:
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
         if not self.makes_all_again:
             at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
-            of_rest, of_mean = (np.array([one.cost(first), one.level_costs(first).sum()]) for one, first in at_first)
+            of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
             if (of_rest > CLEAR_RATIO * of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
@@ -421,7 +422,7 @@ class Search:
     def _from_sample(self, sample: Search, chosen: Settings, start: Settings) -> Settings:
         """Return what was chosen for a sample, for all of the plant; start: what does not depend on that."""
         trials, of_sample = self.trials, sample.trials
-        inner, all_inner = (inner_nodes(some.source, some.ath, some.levels) for some in (of_sample, trials))
+        inner, all_inner = (inner_nodes(some.source, some.ath, some.stages) for some in (of_sample, trials))
         fewer = np.sqrt(of_sample.extrapolation.vertices * inner / np.maximum(all_inner, 1))
         settings = replace(
             start,

@@ -38,7 +38,7 @@ def first_settings(
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,
-        rotation_step_factors=first_rotations(source, samples, rigid, settings.levels),
+        rotation_step_factors=first_rotations(source, samples, rigid, settings.stages),
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )
@@ -71,6 +71,6 @@ def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
     settings = rest.with_slack(source, ath, settings, max(slack, least))
     tried = settings, replace(settings, rest_slack=0.0)  # What has detail moves along and may leave the bound.
     settings = min(tried, key=rest.judge(source, ath, poses_size))
-    node_steps = np.full(settings.levels, STILL_STEP * source.seen.diagonal + step)
+    node_steps = np.full(settings.stages, STILL_STEP * source.seen.diagonal + step)
     settings = replace(settings, step=qz.single(step), node_steps=node_steps)
     return Choice(settings, settings.coarser(ratio), None)

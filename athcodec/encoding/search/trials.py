@@ -28,8 +28,8 @@ from athcodec.encoding.segments.segment import (
     analyse_finely,
     basis_ratio,
     code_stems,
-    level_bases,
-    level_streams,
+    stage_bases,
+    stage_streams,
     thread_count,
     time_components,
 )
@@ -56,7 +56,7 @@ class Trials:
     extrapolation: ExtrapolationFactors | None = (
         None  # Factors from the sample to the plant; None: the sample is the plant.
     )
-    map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by level.
+    map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by stage.
     _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
     _components: dict[tuple, Components] = field(init=False, default_factory=dict)
@@ -67,8 +67,8 @@ class Trials:
     _lock: Lock = field(init=False, default_factory=Lock)  # Threads that try candidates share the preludes.
 
     def __post_init__(self) -> None:
-        self.levels = self.start.levels
-        self.extrapolation = self.extrapolation or ExtrapolationFactors.everything(self.levels)
+        self.stages = self.start.stages
+        self.extrapolation = self.extrapolation or ExtrapolationFactors.everything(self.stages)
 
     @property
     def is_layered(self) -> bool:
@@ -120,8 +120,8 @@ class Trials:
         """Return the bytes of a whole file, without maps of nodes; infinite if the bound cannot be kept."""
         return self._tried(settings)[0]
 
-    def level_costs(self, settings: Settings) -> np.ndarray:
-        """Return the bytes of each level's streams in a whole file, (levels,)."""
+    def stage_costs(self, settings: Settings) -> np.ndarray:
+        """Return the bytes of each stage's streams in a whole file, (stages,)."""
         return self._tried(settings)[1]
 
     def costs(self, candidates: Sequence[Settings]) -> list[float]:
@@ -195,8 +195,8 @@ class Trials:
         """Return a sample in its integers. bent: as SegmentMotion.analyse has it."""
         plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
-        levels = level_streams(of_sample, plan.level_count, self._bases(settings, number))
-        segment = SegmentMotion(plan, sample.positions.shape[2], levels, modes, periodic=of_sample.periodic)
+        stages = stage_streams(of_sample, plan.stage_count, self._bases(settings, number))
+        segment = SegmentMotion(plan, sample.positions.shape[2], stages, modes, periodic=of_sample.periodic)
         segment.analyse(sample.positions, of_sample.rounding, bent=bent)
         return segment
 
@@ -227,10 +227,10 @@ class Trials:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)
             coded = [self.coded(settings, number, modes) for number in range(len(self.samples))]
-            levels = sum(self._level_bytes(one, sample) for one, sample in zip(coded, self.samples))
+            stages = sum(self._stage_bytes(one, sample) for one, sample in zip(coded, self.samples))
         except BoundError:
             self._count(progress.TRIAL)
-            return math.inf, np.full(self.levels, math.inf)
+            return math.inf, np.full(self.stages, math.inf)
         coding = sum(
             progress.BYTE * sum(map(len, one.stems.values())) + progress.CORRECTION * len(one.corrections.rows)
             for one in coded
@@ -238,8 +238,8 @@ class Trials:
         each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
         self._count(progress.TRIAL + self.work_of(each) + coding)
         stored = streams.encode_learned_modes(plan, modes)
-        mode_bytes = sum(len(stream) * self.extrapolation.rows[level] for level, stream in stored.items())
-        return levels.sum() + mode_bytes + self.prelude_bytes(settings), levels
+        mode_bytes = sum(len(stream) * self.extrapolation.rows[stage] for stage, stream in stored.items())
+        return stages.sum() + mode_bytes + self.prelude_bytes(settings), stages
 
     def _count(self, work: float) -> None:
         """Count the work of a trial."""
@@ -247,18 +247,18 @@ class Trials:
         with self._lock:
             self._work_done += int(work)
 
-    def _level_bytes(self, coded: Coded, sample: SegmentSample) -> np.ndarray:
-        """Return the bytes of the streams of all that a sample stands for, (levels,)."""
-        levels, heads = np.zeros(self.levels), np.zeros(self.levels)
-        for level, stream in coded.stems.items():
-            levels[level], heads[level] = len(stream), coded.heads[level]
+    def _stage_bytes(self, coded: Coded, sample: SegmentSample) -> np.ndarray:
+        """Return the bytes of the streams of all that a sample stands for, (stages,)."""
+        stages, heads = np.zeros(self.stages), np.zeros(self.stages)
+        for stage, stream in coded.stems.items():
+            stages[stage], heads[stage] = len(stream), coded.heads[stage]
         corrections = len(coded.corrections.chunk) / coded.sample_share
         if corrections:
-            level_of_vertex = np.repeat(coded.segment.plan.base_stage, coded.segment.plan.pieces["count"])
-            counts = np.bincount(level_of_vertex[coded.corrected], minlength=self.levels)
-            levels += corrections * (counts / counts.sum())
-        levels += (levels - heads) * (self.extrapolation.rows - 1)
-        return levels * sample.scale
+            stage_of_vertex = np.repeat(coded.segment.plan.base_stage, coded.segment.plan.pieces["count"])
+            counts = np.bincount(stage_of_vertex[coded.corrected], minlength=self.stages)
+            stages += corrections * (counts / counts.sum())
+        stages += (stages - heads) * (self.extrapolation.rows - 1)
+        return stages * sample.scale
 
     def _keeps_bound(self, settings: Settings) -> bool:
         """Return whether a rest pose keeps the bound; its prelude is there for later calls."""
@@ -269,27 +269,27 @@ class Trials:
         return True
 
     def _bases(self, settings: Settings, number: int) -> dict[int, StreamBasis]:
-        """Return the time bases of the levels that learn theirs."""
+        """Return the time bases of the stages that learn theirs."""
         if not any(settings.learned_bases):
             return {}
         step, learned = self._learn_time(settings)
         plan = self.prelude(settings).plan
-        return level_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
+        return stage_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
 
     def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int | None, TimeComponents]]]:
-        """Return the components of the samples over time, of each level and of all, and the step of the trial that
+        """Return the components of the samples over time, of each stage and of all, and the step of the trial that
         asked first for them: they hardly depend on the step."""
         only_common = self.is_layered and settings.common_basis
-        key = *_before_modes(settings), settings.level_steps.tobytes(), settings.periodic, only_common
+        key = *_before_modes(settings), settings.stage_steps.tobytes(), settings.periodic, only_common
         if key not in self._time_components:
             prelude = self.prelude(settings)  # Layers learn about the coded pose of the last one.
             plan = prelude.plan if self.is_layered else prelude.uncoded_plan
-            levels = [*(level for level in range(self.levels) if plan.has_stems(level) and not only_common), None]
+            stages = [*(stage for stage in range(self.stages) if plan.has_stems(stage) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
-            self.work.add(progress.EIGENVECTOR * longest**3 * len(levels) * len(self.samples))
+            self.work.add(progress.EIGENVECTOR * longest**3 * len(stages) * len(self.samples))
             learned = [
-                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, levels)
+                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, stages)
                 for sample in self.samples
             ]
             self._time_components[key] = settings.step, learned

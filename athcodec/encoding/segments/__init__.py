@@ -1,1 +1,1 @@
-"""How a clip is coded under given settings: segments, time bases, layers, joins, levels."""
+"""How a clip is coded under given settings: segments, time bases, layers, joins, stages."""

@@ -30,17 +30,17 @@ NO_CORRECTIONS = np.empty((0, 6), np.int32)
 SMOOTH = 1.2  # Largest tick that nobody sees.
 ROUGH = 1.4  # Tick from which on each more weighs ROUGH_WORTH.
 ROUGH_WORTH = 30.0  # Cost, in ticks, of a tick beyond ROUGH.
-STILL = 0.05  # Least change of velocity in a usual frame, over the source's: a level that stands still must not jump.
+STILL = 0.05  # Least change of velocity in a usual frame, over the source's: a stage that stands still must not jump.
 ERROR_WORTH = 8.0  # Cost, in ticks, of an error twice as large.
-ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the level before.
-LARGEST_WORTH = 40.0  # Cost, in ticks, of a largest error twice that of the level before: slopes can throw a part far.
+ORDER_WORTH = 400.0  # Cost, in ticks, of an error twice as large as that of the stage before.
+LARGEST_WORTH = 40.0  # Cost, in ticks, of a largest error twice that of the stage before: slopes can throw a part far.
 BYTES_WORTH = 40.0  # Cost, in ticks, of twice as many bytes.
 CORRECTION_BYTES = 0.3  # Bytes of each position beyond the limit: a correction reaches over frames.
 
 
 @dataclass(frozen=True)
 class End:
-    """The end of a segment, from which a level of the next one goes on.
+    """The end of a segment, from which a stage of the next one goes on.
 
     positions, source: (N, 3, END_FRAMES), decoded and wanted. usual: the change of velocity in a usual frame.
     corrections: (K, 6) in the last frame, which stand in the first frame of the next segment as well. shown: the last
@@ -61,7 +61,7 @@ class End:
 def end_of(
     positions: np.ndarray, source: np.ndarray, shown: tuple[np.ndarray, np.ndarray], corrections: np.ndarray
 ) -> End:
-    """Return the end of a level, whose positions are not corrected. source: (N, 3, END_FRAMES) or fewer."""
+    """Return the end of a stage, whose positions are not corrected. source: (N, 3, END_FRAMES) or fewer."""
     if positions.shape[2] <= END_FRAMES:
         return End(np.empty((len(positions), 3, 0)), source[:, :, :0], 0.0, corrections, shown)
     last = positions[:, :, -END_FRAMES:].copy()
@@ -122,8 +122,8 @@ def apply_join(end: End, positions: np.ndarray, join: int) -> None:
 
 
 class ErrorPrice:
-    """Cost, in ticks, of a larger error of a level without corrections. rms: the level's error over so many frames;
-    most_rms: the error of the level before."""
+    """Cost, in ticks, of a larger error of a stage without corrections. rms: the stage's error over so many frames;
+    most_rms: the error of the stage before."""
 
     def __init__(self, rms: float, most_rms: float, frames: int):
         self._rms, self._most_rms, self._frames = rms, most_rms, frames
@@ -140,7 +140,7 @@ class ErrorPrice:
 
 class CorrectionPrice:
     """Cost, in ticks, of correcting positions beyond a limit, one or (N,); bytes_: of those vertices, up to the
-    level."""
+    stage."""
 
     def __init__(self, limit: float | np.ndarray, bytes_: float):
         self._squared_limit, self._bytes = np.reshape(np.square(limit), (-1, 1)), bytes_
@@ -205,7 +205,7 @@ def _usual(changes: np.ndarray) -> float:
 
 
 class SourceStart:
-    """What all levels of a segment are compared with: the source's first frames, and its change of velocity in a usual
+    """What all stages of a segment are compared with: the source's first frames, and its change of velocity in a usual
     frame. positions: (N, 3, T) less an origin."""
 
     def __init__(self, positions: np.ndarray, origin: np.ndarray):
@@ -219,7 +219,7 @@ class SourceStart:
 def best_join(
     end: End, positions: np.ndarray, start: SourceStart, price: ErrorPrice | CorrectionPrice, largest: float
 ) -> int:
-    """Return how to join a level of a segment to the end of the one before: over how many frames, SLOPED more if slopes
+    """Return how to join a stage of a segment to the end of the one before: over how many frames, SLOPED more if slopes
     are joined too; 0: not at all. positions: (N, 3, T) of those vertices that are `seen`, as in the other arguments.
     largest: the largest error that costs nothing."""
     decoded, of_source = _changes(positions), start.usual

@@ -1,6 +1,6 @@
 """Layers of precision: the plant at a coarse step, and refinements of it down to the step of the file's bound.
 
-The first layer has the levels of the branch hierarchy; each further one is one level of the file that refines all of
+The first layer has the stages of the branch hierarchy; each further one is one stage of the file that refines all of
 it, motion, rest pose and learned modes. A refinement is coded about the positions of the layer before (FORMAT.md,
 "Layers"). This is one module because every layer is planned, coded and finished on what the layer before it leaves.
 """
@@ -74,31 +74,31 @@ MOST_RATIO = 1 << 14  # Ratio of the steps of neighbouring layers.
 ROUNDED = 1 + 1e-9  # Factor before rounding down, because errors are rounded numbers themselves.
 MOST_TWITCH = 1.5  # Largest second difference of corrections before the last layer, over the source's largest one.
 MOST_LAYERS = 8  # Layers of a file (FORMAT.md, Limits).
-MOST_LEVELS = 32  # Levels of a file (FORMAT.md, Limits).
-LEVEL_0_STEP = 4  # Step of the rest pose of level 0, over that of the first layer.
+MOST_LEVELS = 32  # Levels of a file (FORMAT.md, Limits); no file has more stages.
+STAGE_0_STEP = 4  # Step of the rest pose of stage 0, over that of the first layer.
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
 LARGEST = MEASURES.index("max")
 RMS = MEASURES.index("rms")
-LEVEL_TOLERANCE = 1.0  # Largest errors of a level, over that of the level before.
+STAGE_TOLERANCE = 1.0  # Largest errors of a stage, over that of the stage before.
 FINER_MAPS = 3  # Half octaves by which steps of maps may become finer for that.
 COARSER_MAPS = 16  # Half octaves by which steps of maps may become coarser for that.
-MOST_POSES = 4  # Largest number of poses for each level by which steps of maps are moved.
+MOST_POSES = 4  # Largest number of poses for each stage by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
-LEVEL_0_SHARE = 1.03  # Bytes of the first layer's rest pose with one of level 0 before it, over those without.
-LEVEL_0_BYTES = 24  # Bytes that it may add besides.
+STAGE_0_SHARE = 1.03  # Bytes of the first layer's rest pose with one of stage 0 before it, over those without.
+STAGE_0_BYTES = 24  # Bytes that it may add besides.
 
 
 @dataclass
 class Layer:
-    """One layer of precision. Without a rest pose it has that of the layer before; the first layer that of level 0."""
+    """One layer of precision. Without a rest pose it has that of the layer before; the first layer that of stage 0."""
 
     plan: Plan  # On the rest pose of the layer.
     settings: Settings  # Settings of the file, with the layer's step and limit.
     modes: LearnedModes | None
     ratio: int = 1  # The layer's step over that of the last layer.
     rest: streams.CodedRest | None = None  # The content of REFINED_REST.
-    holds_error: bool = True  # Whether corrections hold its error even where a level or a part of it jerks with them.
+    holds_error: bool = True  # Whether corrections hold its error even where a stage or a part of it jerks with them.
 
 
 @dataclass
@@ -107,13 +107,13 @@ class Layers:
 
     rest: writing.Rest
     source_rest: bytes
-    level_0: Plan  # On the pose of REST, which level 0 is shown with.
+    stage_0: Plan  # On the pose of REST, which stage 0 is shown with.
     each: list[Layer]
 
     @property
-    def level_count(self) -> int:
-        """Number of levels without that of the source's own numbers."""
-        return self.level_0.level_count + len(self.each) - 1
+    def stage_count(self) -> int:
+        """Number of stages without that of the source's own numbers."""
+        return self.stage_0.stage_count + len(self.each) - 1
 
     def of_segment(self, whole_loop: bool) -> Layers:
         """Return the layers of a segment, which is all of a loop or not."""
@@ -189,7 +189,7 @@ def layers_of(
 ) -> Layers:
     """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as in Layer."""
     settings = choice.settings
-    rest, level_0, rests = _rests(source, prelude, ratios, settings)
+    rest, stage_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
     for i, (ratio, (pose, refined)) in enumerate(zip(ratios, rests)):
         before = layers[-1].plan if layers and pose is not prelude.plan.rest else prelude.plan
@@ -203,7 +203,7 @@ def layers_of(
         modes = _modes(plan, choice, of_layer, ratio)
         layers.append(Layer(plan, of_layer, modes, ratio, refined, hold_errors or ratio == 1))
     source_rest = code_source_rest(source, prelude.plan.branches, layers[-1].plan.rest, settings.bound)
-    return Layers(rest, source_rest, layers[0].plan if level_0 is None else _plan_on(level_0, prelude, None), layers)
+    return Layers(rest, source_rest, layers[0].plan if stage_0 is None else _plan_on(stage_0, prelude, None), layers)
 
 
 def _plan_on(pose: np.ndarray, prelude: CodedPrelude, before: Plan | None, layer: int = 0) -> Plan:
@@ -228,14 +228,14 @@ def _binary_digits(ratio: int) -> int:
 
 
 def _uniform(plan: Plan, settings: Settings) -> Settings:
-    """Return settings for the single stream of a refinement: of the level with the most rows, at the finest step."""
-    main, factors = plan.main_level, settings.rotation_step_factors
-    finest = min(settings.level_steps[level] for level in range(plan.level_count) if plan.has_stems(level))
+    """Return settings for the single stream of a refinement: of the stage with the most rows, at the finest step."""
+    main, factors = plan.main_stage, settings.rotation_step_factors
+    finest = min(settings.stage_steps[stage] for stage in range(plan.stage_count) if plan.has_stems(stage))
     return replace(
         settings,
-        level_steps=np.full(plan.level_count, finest),
-        rotation_step_factors=(factors[main],) * plan.level_count,
-        learned_bases=(settings.learned_bases[main],) * plan.level_count,
+        stage_steps=np.full(plan.stage_count, finest),
+        rotation_step_factors=(factors[main],) * plan.stage_count,
+        learned_bases=(settings.learned_bases[main],) * plan.stage_count,
     )
 
 
@@ -263,9 +263,9 @@ def _rests(
         return rest, None, at_once
     stored, of_layers = coded[0], coded[-len(ratios) :]
     rest = replace(rest, step=stored.step, stream=stored.stream)
-    level_0 = None if of_layers[0] is stored else stored.decoded
-    before = [coded[-len(ratios) - 1] if level_0 is not None else stored, *of_layers[:-1]]
-    return rest, level_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
+    stage_0 = None if of_layers[0] is stored else stored.decoded
+    before = [coded[-len(ratios) - 1] if stage_0 is not None else stored, *of_layers[:-1]]
+    return rest, stage_0, [(pose.decoded, None if pose is last else pose) for pose, last in zip(of_layers, before)]
 
 
 def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
@@ -280,7 +280,7 @@ def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Seq
 
 
 def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: Settings) -> list[streams.CodedRest]:
-    """Return the rest pose at the step of the first layer, and before it that of level 0 if that takes few bytes."""
+    """Return the rest pose at the step of the first layer, and before it that of stage 0 if that takes few bytes."""
     plan, mesh = prelude.plan, prelude.rest_chunk.mesh
 
     def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
@@ -288,32 +288,32 @@ def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: S
         return streams.encode_rest(plan.branches, step, source.rest, before, mesh=mesh, shape_of=shape_of)
 
     at_once = encode(step)
-    is_out = Feature.LEVEL_0_REST in source.without or LEVEL_0_STEP * step > settings.coarsest_rest_step
-    if is_out or not plan.level_0_stands_alone:
+    is_out = Feature.LEVEL_0_REST in source.without or STAGE_0_STEP * step > settings.coarsest_rest_step
+    if is_out or not plan.stage_0_stands_alone:
         return [at_once]
-    level_0 = encode(LEVEL_0_STEP * step)
-    refined = encode(step, level_0)
-    both = len(level_0.stream) + len(refined.stream)
-    takes_little = both <= LEVEL_0_SHARE * len(at_once.stream) + LEVEL_0_BYTES
-    return [level_0, refined] if takes_little else [at_once]
+    stage_0 = encode(STAGE_0_STEP * step)
+    refined = encode(step, stage_0)
+    both = len(stage_0.stream) + len(refined.stream)
+    takes_little = both <= STAGE_0_SHARE * len(at_once.stream) + STAGE_0_BYTES
+    return [stage_0, refined] if takes_little else [at_once]
 
 
 def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
-    """Return what all segments share of the layers: {(level, kind): payload}."""
+    """Return what all segments share of the layers: {(stage, kind): payload}."""
     first, *finer = layers.each
     chunks = {
-        (level, ct.SHAPES): stream for level, stream in streams.encode_learned_modes(first.plan, first.modes).items()
+        (stage, ct.SHAPES): stream for stage, stream in streams.encode_learned_modes(first.plan, first.modes).items()
     }
     before = first
-    for level, layer in enumerate(finer, first.plan.level_count):
+    for stage, layer in enumerate(finer, first.plan.stage_count):
         digits = _binary_digits(before.ratio) - _binary_digits(layer.ratio)
         modes = streams.encode_refined_modes(layer.plan, layer.modes, before.modes, digits)
         if modes is not None:
-            chunks[level, ct.SHAPES] = writing.pack_refined_shapes(digits, modes)
+            chunks[stage, ct.SHAPES] = writing.pack_refined_shapes(digits, modes)
         before = layer
-    for level, layer in [(1, first), *enumerate(finer, first.plan.level_count)]:
+    for stage, layer in [(1, first), *enumerate(finer, first.plan.stage_count)]:
         if layer.rest is not None:
-            chunks[level, ct.REFINED_REST] = writing.pack_refined_rest(layer.rest.step, layer.rest.stream)
+            chunks[stage, ct.REFINED_REST] = writing.pack_refined_rest(layer.rest.step, layer.rest.stream)
     return chunks
 
 
@@ -327,15 +327,15 @@ class _TimeBases:
         self._before: tuple[int, StreamBasis] | None = None
 
     def first(self, layer: Layer) -> dict[int, StreamBasis]:
-        """Return the bases of the levels of the first layer that learn theirs."""
+        """Return the bases of the stages of the first layer that learn theirs."""
         bases: dict[int, StreamBasis] = {}
-        for level, learned in enumerate(layer.settings.learned_bases):
-            if learned and layer.plan.has_stems(level):
-                bases |= self.refined(layer, level, level)
+        for stage, learned in enumerate(layer.settings.learned_bases):
+            if learned and layer.plan.has_stems(stage):
+                bases |= self.refined(layer, stage, stage)
         return bases
 
-    def refined(self, layer: Layer, stream: int, level: int) -> dict[int, StreamBasis]:
-        """Return the basis of a stream of the layer's settings, which stands at a level of the file."""
+    def refined(self, layer: Layer, stream: int, stage: int) -> dict[int, StreamBasis]:
+        """Return the basis of a stream of the layer's settings, which stands at a stage of the file."""
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
         # Rigid parts of a coarse layer may need more rows than a finer one where they are not rigid.
@@ -343,27 +343,27 @@ class _TimeBases:
         stored = self._components.basis(basis_ratio(layer.plan, layer.settings, layer.ratio), least=least)
         if stored is None:
             return {}
-        basis = StreamBasis(stored, level)
+        basis = StreamBasis(stored, stage)
         if self._before is not None:
             base, before = self._before
             basis = StreamBasis(stored, before.root, len(before.stored.rows), base)
-        self._before = level, basis
+        self._before = stage, basis
         return {stream: basis}
 
 
 class Ends:
-    """The ends of the levels of a segment, for which the next segment may wait on another thread."""
+    """The ends of the stages of a segment, for which the next segment may wait on another thread."""
 
-    def __init__(self, levels: int):
-        self._levels: list[Future[End]] = [Future() for _ in range(levels)]
+    def __init__(self, stages: int):
+        self._stages: list[Future[End]] = [Future() for _ in range(stages)]
 
-    def add(self, level: int, end: End) -> None:
-        self._levels[level].set_result(end)
+    def add(self, stage: int, end: End) -> None:
+        self._stages[stage].set_result(end)
 
-    def take(self, level: int) -> End:
-        """Return the end of a level as soon as it is known. Only its one caller holds it then."""
-        end = self._levels[level].result()
-        self._levels[level] = Future()
+    def take(self, stage: int) -> End:
+        """Return the end of a stage as soon as it is known. Only its one caller holds it then."""
+        end = self._stages[stage].result()
+        self._stages[stage] = Future()
         return end
 
     @contextmanager
@@ -372,21 +372,21 @@ class Ends:
         try:
             yield
         except BaseException as error:
-            for level in self._levels:
-                if not level.done():
-                    level.set_exception(error)
+            for stage in self._stages:
+                if not stage.done():
+                    stage.set_exception(error)
             raise
 
 
 class CodedMotion:
-    """The motion of one segment in layers. Each level is joined to the segment before and measured as soon as it is
-    coded, so that the positions of one level are in memory at a time.
+    """The motion of one segment in layers. Each stage is joined to the segment before and measured as soon as it is
+    coded, so that the positions of one stage are in memory at a time.
 
-    chunks: {(level, kind): payload}. errors: those of stopping at each level, by each of MEASURES. joins: those to the
-    segment before. flaws: those of what each level shows (SourceFrames).
+    chunks: {(stage, kind): payload}. errors: those of stopping at each stage, by each of MEASURES. joins: those to the
+    segment before. flaws: those of what each stage shows (SourceFrames).
 
     layers: with the settings of the segment (Layers.of_segment). exact: the source's own numbers (Source.exact), for
-    one more level. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
+    one more stage. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
     source, (2, 3). loops: whether the segment follows itself. before, after: the ends of the segment before, which this
     one is joined to, and those of this one; None: nobody asks for them.
     """
@@ -408,17 +408,17 @@ class CodedMotion:
         self._exact, self._goes_on, self._shown_times = exact, goes_on, shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
-        self._level_0, self._largest_bound = layers.level_0, layers.each[-1].settings.largest_bound
+        self._stage_0, self._largest_bound = layers.stage_0, layers.each[-1].settings.largest_bound
         self._shared_bytes = (len(prelude.hierarchy_stream) + layers.first_rest_bytes) / segment_count
         self._prelude, self._bases = prelude, _TimeBases(layers.each[-1], positions) if self._layered else None
         self.chunks: dict[tuple[int, int], bytes] = {}
         self.errors: list[tuple[float, ...]] = []
         self.flaws: list[tuple[float, float]] = []
-        self._decoded = np.empty(0)  # Positions of the last level.
+        self._decoded = np.empty(0)  # Positions of the last stage.
         self._met = streams.FREE_ENDS  # Met by the corrections of the last layer.
         self._end_corrections = NO_CORRECTIONS  # Corrections of the last frame.
-        self._corrected: dict[int, Corrections] = {}  # What corrects levels.
-        self.joins = [0] * layers.level_count
+        self._corrected: dict[int, Corrections] = {}  # What corrects stages.
+        self.joins = [0] * layers.stage_count
         self._source = SourceFrames(positions, shown_times, None, box, self._largest_bound, self._pool)
         self._source_alone, self._source_end = self._source, self._source.last_shown(positions)
         self._loops, self._before, self._after = loops, before, after
@@ -432,8 +432,8 @@ class CodedMotion:
         segment = self._segment
         del self._segment
         with self._failing():
-            for level, (coarse, layer) in enumerate(pairwise(self._layers), self._level_0.level_count):
-                segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), level)
+            for stage, (coarse, layer) in enumerate(pairwise(self._layers), self._stage_0.stage_count):
+                segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), stage)
         if self.errors[-1][0] > self._largest_bound:
             raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
         if self._exact is not None:
@@ -446,7 +446,7 @@ class CodedMotion:
         return nullcontext() if self._after is None else self._after.failing()
 
     def _first(self, layer: Layer) -> SegmentMotion:
-        """Code the levels of the branch hierarchy."""
+        """Code the stages of the branch hierarchy."""
         plan, settings = layer.plan, layer.settings
         if self._bases:
             bases = self._bases.first(layer)
@@ -454,79 +454,79 @@ class CodedMotion:
             bases = learned_bases(self._prelude.uncoded_plan, settings, self.positions)
         segment, decoded = analyse(plan, self._output, settings, self.positions, layer.modes, bases)
         stems, _ = stem_streams(segment, settings, bases)
-        self.chunks |= {(level, ct.STEMS): data for level, data in stems.items()}
-        last = plan.level_count - 1
+        self.chunks |= {(stage, ct.STEMS): data for stage, data in stems.items()}
+        last = plan.stage_count - 1
         self._correct(decoded, layer, last)
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
         self._room = zeros(self.positions.shape)
-        shown = [self._at_level_0(segment, settings), *[segment] * (plan.level_count - 2)]
-        self.errors = _EvenLevels(self, shown, settings).errors
-        self._keep_last_level_best(layer, last, decoded)
-        del decoded  # Levels with maps are in memory before the last one is posed again.
-        for level, nodes in enumerate(shown):
-            if plan.has_affines(level):
-                self.chunks[level, ct.AFFINES] = streams.encode_affines(nodes, level)
-        for level, nodes in enumerate(shown):
-            self._finish(level, self._pose_to_join(nodes, level))
+        shown = [self._at_stage_0(segment, settings), *[segment] * (plan.stage_count - 2)]
+        self.errors = _EvenStages(self, shown, settings).errors
+        self._keep_last_stage_best(layer, last, decoded)
+        del decoded  # Stages with maps are in memory before the last one is posed again.
+        for stage, nodes in enumerate(shown):
+            if plan.has_affines(stage):
+                self.chunks[stage, ct.AFFINES] = streams.encode_affines(nodes, stage)
+        for stage, nodes in enumerate(shown):
+            self._finish(stage, self._pose_to_join(nodes, stage))
         self._finish(last, self.pose(segment, last), layer)
         segment.forget_nodes()
         del self._room
         return segment
 
-    def _keep_last_level_best(self, layer: Layer, level: int, decoded: np.ndarray) -> None:
+    def _keep_last_stage_best(self, layer: Layer, stage: int, decoded: np.ndarray) -> None:
         """Add cheap corrections if the exact stems are worse than the maps before them."""
-        before, known = self.errors[level - 1][RMS], len(self.chunks.get((level, ct.CORRECTIONS), b""))
-        most = known + EVEN_SHARE * (self._bytes_up_to(level) + known)
+        before, known = self.errors[stage - 1][RMS], len(self.chunks.get((stage, ct.CORRECTIONS), b""))
+        most = known + EVEN_SHARE * (self._bytes_up_to(stage) + known)
         for factor in TIGHTER_LIMITS:
-            if self.errors[level][RMS] <= LEVEL_TOLERANCE * before:
+            if self.errors[stage][RMS] <= STAGE_TOLERANCE * before:
                 break
             corrections = self._corrections(decoded, layer, factor)
             if len(corrections.chunk) > most:
                 break
-            self.errors[level] = self._set_last(layer, level, decoded, corrections)
+            self.errors[stage] = self._set_last(layer, stage, decoded, corrections)
 
-    def _keep_smooth(self, layer: Layer, level: int, positions: np.ndarray) -> None:
-        """Leave out corrections without which a level before the last layer's does not jerk. It is then shown, with an
+    def _keep_smooth(self, layer: Layer, stage: int, positions: np.ndarray) -> None:
+        """Leave out corrections without which a stage before the last layer's does not jerk. It is then shown, with an
         error that is above that of its layer. positions: not corrected."""
-        if level not in self._corrected or layer.holds_error:
+        if stage not in self._corrected or layer.holds_error:
             return
-        with self._corrected_as_shown(level, positions):
+        with self._corrected_as_shown(stage, positions):
             jerk = self._source_alone.flaws(positions, None, 0.0)[1]
         if jerk > MOST_JERK and self._source_alone.flaws(positions, None, 0.0)[1] <= MOST_JERK:
-            self.errors[level] = self._set_last(layer, level, positions, Corrections.none(positions.shape))
+            self.errors[stage] = self._set_last(layer, stage, positions, Corrections.none(positions.shape))
 
-    def _at_level_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
-        """Return the segment as level 0 shows it, which may have a rest pose of its own."""
-        if self._level_0 is segment.plan:
+    def _at_stage_0(self, segment: SegmentMotion, settings: Settings) -> SegmentMotion:
+        """Return the segment as stage 0 shows it, which may have a rest pose of its own."""
+        if self._stage_0 is segment.plan:
             return segment
-        shown = SegmentMotion(self._level_0, segment.frames, segment.streams, periodic=settings.periodic)
-        shown.analyse_nodes(self.positions, settings.node_steps, settings.rounding, level=0)
+        shown = SegmentMotion(self._stage_0, segment.frames, segment.streams, periodic=settings.periodic)
+        shown.analyse_nodes(self.positions, settings.node_steps, settings.rounding, stage=0)
         return shown
 
-    def _refine(self, layer: Layer, before: SegmentMotion, ratio: int, level: int) -> SegmentMotion:
-        """Code one further level; ratio: the step of the layer before over that of this one."""
-        settings, last = layer.settings, layer.plan.level_count - 1
-        self._corrected.clear()  # Levels before are finished.
+    def _refine(self, layer: Layer, before: SegmentMotion, ratio: int, stage: int) -> SegmentMotion:
+        """Code one further stage; ratio: the step of the layer before over that of this one."""
+        settings, last = layer.settings, layer.plan.stage_count - 1
+        self._corrected.clear()  # Stages before are finished.
         release_memory()
-        bases = self._bases.refined(layer, last, level)
+        bases = self._bases.refined(layer, last, stage)
         segment, decoded = analyse(
-            layer.plan, self._output, settings, self.positions, layer.modes, bases, before, ratio
+            layer.plan, self._output, settings, self.positions, layer.modes, bases, before=before, ratio=ratio
         )
         if layer.ratio == 1:
             segment.forget_caches()
         head = stems_head(settings, last, bases)
-        self.chunks[level, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
+        self.chunks[stage, ct.STEMS] = writing.pack_refined_stems(ratio, head, streams.encode_refinement(segment, last))
         segment.forget_before()
-        self._correct(decoded, layer, level)
-        self._finish(level, decoded, layer)
+        self._correct(decoded, layer, stage)
+        self._finish(stage, decoded, layer)
         return segment
 
-    def _correct(self, decoded: np.ndarray, layer: Layer, level: int) -> None:
-        """Set corrections and errors of the level that a layer ends with; decoded: positions without corrections."""
+    def _correct(self, decoded: np.ndarray, layer: Layer, stage: int) -> None:
+        """Set corrections and errors of the stage that a layer ends with; decoded: positions without corrections."""
         if layer.ratio == 1 and self._goes_on and decoded.shape[2] >= LEAST_MEETING:
             self._end_corrections = self._corrections_of_end(layer, decoded)
             self._met = streams.MetEnds(streams.LAST, self._end_corrections)
-        self.errors.append(self._finish_level(layer, level, decoded))
+        self.errors.append(self._finish_stage(layer, stage, decoded))
 
     def _corrections_of_end(self, layer: Layer, decoded: np.ndarray) -> np.ndarray:
         """Return corrections of the last frame, except of rigid parts, which keep their shape."""
@@ -535,57 +535,57 @@ class CodedMotion:
         rows = end_corrections(away, limit, correction_step(limit), decoded.shape[2] - 1)
         return rows[~np.repeat(layer.plan.is_rigid, count)[rows[:, 0]]]
 
-    def _finish_level(self, layer: Layer, level: int, decoded: np.ndarray) -> tuple[float, ...]:
-        return self._set_last(layer, level, decoded, self._corrections(decoded, layer))
+    def _finish_stage(self, layer: Layer, stage: int, decoded: np.ndarray) -> tuple[float, ...]:
+        return self._set_last(layer, stage, decoded, self._corrections(decoded, layer))
 
-    def _set_last(self, layer: Layer, level: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
-        """Set the corrections of the level that a layer ends with; return its errors. decoded: positions without."""
-        self.chunks.pop((level, ct.CORRECTIONS), None)
-        self._corrected.pop(level, None)
+    def _set_last(self, layer: Layer, stage: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
+        """Set the corrections of the stage that a layer ends with; return its errors. decoded: positions without."""
+        self.chunks.pop((stage, ct.CORRECTIONS), None)
+        self._corrected.pop(stage, None)
         if corrections.chunk:
-            self.chunks[level, ct.CORRECTIONS] = corrections.chunk
-            self._corrected[level] = corrections
-        with self._corrected_as_shown(level, decoded):
+            self.chunks[stage, ct.CORRECTIONS] = corrections.chunk
+            self._corrected[stage] = corrections
+        with self._corrected_as_shown(stage, decoded):
             if layer.ratio == 1 and self._exact is not None:
                 self._decoded = decoded.copy()
             return self.error(decoded)
 
-    def _bytes_up_to(self, level: int) -> int:
-        """Return the bytes of this level and those before it, without its corrections."""
+    def _bytes_up_to(self, stage: int) -> int:
+        """Return the bytes of this stage and those before it, without its corrections."""
         return sum(
-            len(chunk) for key, chunk in self.chunks.items() if key[0] <= level and key != (level, ct.CORRECTIONS)
+            len(chunk) for key, chunk in self.chunks.items() if key[0] <= stage and key != (stage, ct.CORRECTIONS)
         )
 
-    def _corrected_as_shown(self, level: int, positions: np.ndarray) -> AbstractContextManager[None]:
-        """Return a context in which the positions of a level have its corrections."""
-        return self._corrected[level].applied(positions) if level in self._corrected else nullcontext()
+    def _corrected_as_shown(self, stage: int, positions: np.ndarray) -> AbstractContextManager[None]:
+        """Return a context in which the positions of a stage have its corrections."""
+        return self._corrected[stage].applied(positions) if stage in self._corrected else nullcontext()
 
     def _meet(self, start: np.ndarray) -> None:
-        """Close the start of the last level, in whose first frame the corrections of an end stand."""
+        """Close the start of the last stage, in whose first frame the corrections of an end stand."""
         rows = np.concatenate([start * np.array([1, 0, 1, 1, 1, 1], np.int32), self._end_corrections])
         ordered = rows[np.lexsort(rows[:, 1::-1].T)]
         self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
 
-    def _finish(self, level: int, positions: np.ndarray, layer: Layer | None = None) -> None:
-        """Add a level's end, join the level to the segment before if that is better, and add its flaws. positions: not
-        corrected, which change; layer: the one that ends with the level."""
+    def _finish(self, stage: int, positions: np.ndarray, layer: Layer | None = None) -> None:
+        """Add a stage's end, join the stage to the segment before if that is better, and add its flaws. positions: not
+        corrected, which change; layer: the one that ends with the stage."""
         if layer is not None and layer.ratio > 1:
-            self._keep_smooth(layer, level, positions)
+            self._keep_smooth(layer, stage, positions)
         if self._after is not None:
-            with self._corrected_as_shown(level, positions):
+            with self._corrected_as_shown(stage, positions):
                 shown = self._source.last_shown(positions)
             ends = end_of(positions, self._wanted_end, (shown, self._source_end), self._end_corrections)
-            self._after.add(level, ends)
-        end = None if self._before is None else self._before.take(level)
-        if level == 0:
+            self._after.add(stage, ends)
+        end = None if self._before is None else self._before.take(stage)
+        if stage == 0:
             known = self._source_end if self._loops else None
             self._source = replace(self._source, before=known if end is None else end.shown[1])
         if end is not None and self._may_join and positions.shape[2] > END_FRAMES == end.positions.shape[2]:
-            self._join_level(level, end, positions, layer)
-        with self._corrected_as_shown(level, positions):
+            self._join_stage(stage, end, positions, layer)
+        with self._corrected_as_shown(stage, positions):
             loop_pose = self._source.last_shown(positions) if self._loops else None
             shown = loop_pose if end is None else end.shown[0]
-            self.flaws.append(self._source.flaws(positions, shown, self.errors[level][0]))
+            self.flaws.append(self._source.flaws(positions, shown, self.errors[stage][0]))
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
@@ -595,33 +595,33 @@ class CodedMotion:
     def _wanted_start(self) -> SourceStart:
         return SourceStart(self.positions[seen(len(self.positions))], self._origin)
 
-    def _join_level(self, level: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
-        """Join one level, whose positions change; layer: the one that ends with it."""
+    def _join_stage(self, stage: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
+        """Join one stage, whose positions change; layer: the one that ends with it."""
         some = seen(len(positions))
         if layer is None:
-            most_rms = self.errors[level - 1][RMS] if level > 0 else math.inf
-            price = ErrorPrice(self.errors[level][RMS], most_rms, positions.shape[2])
+            most_rms = self.errors[stage - 1][RMS] if stage > 0 else math.inf
+            price = ErrorPrice(self.errors[stage][RMS], most_rms, positions.shape[2])
         else:
             limit, share = layer.settings.limit, len(positions[some]) / len(positions)
-            bytes_ = share * (self._shared_bytes + self._bytes_up_to(level))
+            bytes_ = share * (self._shared_bytes + self._bytes_up_to(stage))
             price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
-        largest = max(errors[0] for errors in self.errors[level - 1 : level + 1]) if level > 0 else math.inf
+        largest = max(errors[0] for errors in self.errors[stage - 1 : stage + 1]) if stage > 0 else math.inf
         join = best_join(end.of(some), positions[some], self._wanted_start, price, largest)
         if join == 0:
             return
-        self.joins[level] = join
+        self.joins[stage] = join
         apply_join(end, positions, join)
         if layer is None:
             size = np.asarray(max(positions.max(), -positions.min()), self._output[1])
             # A decoder joins maps and rounds what it shows, and slopes make last bits larger.
             last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
-            self.errors[level] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
+            self.errors[stage] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
         else:
             if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
                 self._meet(end.corrections)
-            self.errors[level] = self._finish_level(layer, level, positions)
-        if level == self._level_0.level_count - 1:
-            self._keep_last_level_best(layer, level, positions)
+            self.errors[stage] = self._finish_stage(layer, stage, positions)
+        if stage == self._stage_0.stage_count - 1:
+            self._keep_last_stage_best(layer, stage, positions)
 
     def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:
         """Return corrections that bring the positions within the limit times a factor."""
@@ -644,65 +644,65 @@ class CodedMotion:
         )
         return math.sqrt(max(parts, default=0.0))
 
-    def pose(self, shown: SegmentMotion, level: int) -> np.ndarray:
-        """Return the output of a level, neither joined nor corrected."""
-        return shown.pose(level, *self._output, self._room)
+    def pose(self, shown: SegmentMotion, stage: int) -> np.ndarray:
+        """Return the output of a stage, neither joined nor corrected."""
+        return shown.pose(stage, *self._output, self._room)
 
-    def _pose_to_join(self, shown: SegmentMotion, level: int) -> np.ndarray:
-        """Return a level without corrections as float64, to be joined. What stems place is rounded before and after,
+    def _pose_to_join(self, shown: SegmentMotion, stage: int) -> np.ndarray:
+        """Return a stage without corrections as float64, to be joined. What stems place is rounded before and after,
         what maps place only after."""
         origin, dtype = self._output
-        positions, pieces = shown.pose(level, origin, np.float64, self._room), shown.plan.pieces
-        is_stem = np.repeat(pieces["stage"] <= level, pieces["count"])
+        positions, pieces = shown.pose(stage, origin, np.float64, self._room), shown.plan.pieces
+        is_stem = np.repeat(pieces["stage"] <= stage, pieces["count"])
         for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
             run[:] = run.astype(dtype)
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:
-        shares = self._prelude.shares
-        return position_errors(decoded, self.positions, self._origin, self._pool, self._shown_times, shares, rounding)
+        shown, shares = self._shown_times, self._prelude.shares
+        return position_errors(decoded, self.positions, self._origin, self._pool, shown, shares, rounding=rounding)
 
 
-class _EvenLevels:
-    """Errors of the levels of the first layer. The steps of maps move until no level's RMS or largest error exceeds
-    that of the level before: finer if that helps, else coarser at the level before, which need not be better than what
+class _EvenStages:
+    """Errors of the stages of the first layer. The steps of maps move until no stage's RMS or largest error exceeds
+    that of the stage before: finer if that helps, else coarser at the stage before, which need not be better than what
     follows.
 
-    shown: the segment with its maps, as each level but the last shows it.
+    shown: the segment with its maps, as each stage but the last shows it.
     """
 
     def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
         self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
         self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
-        for level in range(1, len(shown)):
-            self._move(level, level, level, 0.5**0.5, FINER_MAPS)
-        for level in range(len(shown), 0, -1):
-            for coarser in range(level - 1, -1, -1):
-                self._move(coarser, level, len(shown), 2.0**0.5, COARSER_MAPS)
+        for stage in range(1, len(shown)):
+            self._move(stage, stage, stage, 0.5**0.5, FINER_MAPS)
+        for stage in range(len(shown), 0, -1):
+            for coarser in range(stage - 1, -1, -1):
+                self._move(coarser, stage, len(shown), 2.0**0.5, COARSER_MAPS)
 
-    def _is_worse(self, level: int) -> bool:
-        return self._excess(level, level) > 0
+    def _is_worse(self, stage: int) -> bool:
+        return self._excess(stage, stage) > 0
 
     def _excess(self, first: int, last: int) -> float:
-        """Return how far the errors of the levels from `first` to `last` exceed those before them."""
+        """Return how far the errors of the stages from `first` to `last` exceed those before them."""
         pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
-        return sum(float(np.maximum(after - LEVEL_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
+        return sum(float(np.maximum(after - STAGE_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
 
-    def _move(self, level: int, worse: int, last: int, factor: float, most: int) -> None:
-        """Move the steps of the maps of a level while `worse` exceeds the level before it and all levels from there to
+    def _move(self, stage: int, worse: int, last: int, factor: float, most: int) -> None:
+        """Move the steps of the maps of a stage while `worse` exceeds the stage before it and all stages from there to
         `last` gain."""
-        if not self._shown[level].plan.has_affines(level):
+        if not self._shown[stage].plan.has_affines(stage):
             return
         for _ in range(most):
             before = self.errors, self._steps
             excess = self._excess(worse, last)
             if self._poses <= 0 or not self._is_worse(worse):
                 return
-            self._set(level, factor)
+            self._set(stage, factor)
             if not self._excess(worse, last) < excess:
                 self.errors, self._steps = before
-                self._analyse(level)
+                self._analyse(stage)
                 return
 
     def _set(self, moved: int, factor: float) -> None:
@@ -711,9 +711,9 @@ class _EvenLevels:
         self._steps, self.errors = self._steps.copy(), [*self.errors]
         self._steps[moved] *= factor
         self._analyse(moved)
-        for level in range(moved, min(last + 1, len(self._shown))):
-            self.errors[level] = self._coder.error(self._coder.pose(self._shown[level], level))
+        for stage in range(moved, min(last + 1, len(self._shown))):
+            self.errors[stage] = self._coder.error(self._coder.pose(self._shown[stage], stage))
             self._poses -= 1
 
-    def _analyse(self, level: int) -> None:
-        self._shown[level].analyse_nodes(self._coder.positions, self._steps, self._rounding, level)
+    def _analyse(self, stage: int) -> None:
+        self._shown[stage].analyse_nodes(self._coder.positions, self._steps, self._rounding, stage)

@@ -1,6 +1,6 @@
-"""Which levels a file shows: each is better than the one before it, stays near the plant and moves as smoothly.
+"""Which stages are levels of a file: each is better than the one before it, stays near the plant and moves as smoothly.
 
-The others serve finer levels. Positions are vertex-major, (N, 3, T).
+The others serve finer stages. Positions are vertex-major, (N, 3, T).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ ENDS = 2  # Frames of a segment that the second differences at its seams take.
 
 @dataclass(frozen=True)
 class SourceFrames:
-    """What the levels of a segment are compared with.
+    """What the stages of a segment are compared with.
 
     positions: (N, 3, T) of the source, coded frames. shown_times: how many frames of the clip show each. before: the
     last frames of the source before them, (N, 3, ENDS) or fewer; None: nothing is before them. box: (2, 3) low and high
@@ -86,33 +86,33 @@ def chosen_levels(
     exact: bool,
     first_held: int,
 ) -> list[int]:
-    """Return the best chain of levels up to the last in which no RMS and no largest error of any clip exceeds that
-    before: the one with most levels that hold errors, of those the longest, of those the one that begins with a coarser
-    level.
+    """Return the stages that become levels: the best chain of them up to the last in which no RMS and no largest error
+    of any clip exceeds that before. It is the one with most stages that hold errors, of those the longest, of those the
+    one that begins with a coarser stage.
 
-    errors: (levels, segments, 3). clip_frames: the frames of each segment of each clip of the file. flaws: (levels,
-    segments, 2) of SourceFrames.flaws. exact: whether the last level is the source, which goes on from the level
-    before. first_held: the first level that ends a layer of precision, and so holds an error, as all after it do.
+    errors: (stages, segments, 3). clip_frames: the frames of each segment of each clip of the file. flaws: (stages,
+    segments, 2) of SourceFrames.flaws. exact: whether the last stage is the source, which goes on from the stage
+    before. first_held: the first stage that ends a layer of precision, and so holds an error, as all after it do.
     """
 
     def rank(chain: list[int]) -> tuple[int, int, int]:
-        return sum(level >= first_held for level in chain), len(chain), -chain[0]
+        return sum(stage >= first_held for stage in chain), len(chain), -chain[0]
 
     stored = np.vectorize(from_short_float, otypes=[float])(short_floats(errors))
     measures = np.concatenate([_of_clips(table, clip_frames) for table in (errors, stored)], axis=1)
     limits = MOST_AWAY * diagonal, MOST_JERK
     last = len(errors) - 1 - exact
     chains: dict[int, list[int]] = {last: list(range(last, len(errors)))}
-    for level in range(last - 1, -1, -1):
-        if (flaws[level] <= limits).all():
-            better = [chains[after] for after in chains if (measures[after] <= measures[level]).all()]
+    for stage in range(last - 1, -1, -1):
+        if (flaws[stage] <= limits).all():
+            better = [chains[after] for after in chains if (measures[after] <= measures[stage]).all()]
             if better:
-                chains[level] = [level, *max(better, key=rank)]
+                chains[stage] = [stage, *max(better, key=rank)]
     return max(chains.values(), key=rank)
 
 
 def _of_clips(errors: np.ndarray, clip_frames: Sequence[Sequence[int]]) -> np.ndarray:
-    """Return the largest and the RMS error of each level in each clip, and over all clips, (levels, 2 + 2 * clips)."""
+    """Return the largest and the RMS error of each stage in each clip, and over all clips, (stages, 2 + 2 * clips)."""
     stops = np.cumsum([len(frames) for frames in clip_frames])[:-1]
     parts = list(zip(np.split(errors, stops, axis=1), clip_frames))
     everything = errors, [frames for of_clip in clip_frames for frames in of_clip]
@@ -120,6 +120,6 @@ def _of_clips(errors: np.ndarray, clip_frames: Sequence[Sequence[int]]) -> np.nd
 
 
 def _of_all(errors: np.ndarray, frames: Sequence[int]) -> np.ndarray:
-    """Return the largest and the RMS error of each level over all segments, (levels, 2)."""
+    """Return the largest and the RMS error of each stage over all segments, (stages, 2)."""
     largest, rms = errors[:, :, MEASURES.index("max")], errors[:, :, MEASURES.index("rms")]
     return np.stack([largest.max(axis=1), np.sqrt((rms**2 * np.asarray(frames)).sum(axis=1) / sum(frames))], axis=1)

@@ -23,7 +23,7 @@ from athcodec.decoding import container as ct
 from athcodec.encoding.clip.coded_clip import CodedClip
 from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.model import quantise as qz
-from athcodec.encoding.model.motion import LearnedModes, LevelStream, Plan, PlanSample, SegmentMotion, gather, zeros
+from athcodec.encoding.model.motion import LearnedModes, Plan, PlanSample, SegmentMotion, StageStream, gather, zeros
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.options.shape import RestPrecision, finer_than
@@ -37,6 +37,7 @@ from athcodec.files.threads import SERIAL, ThreadPool, default_jobs, ranges
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
+from athcodec.untyped import JsonObject
 
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
@@ -293,11 +294,11 @@ class Source:
         """Return the largest error of the reference pose."""
         return bound if self.has_source_rest else min(bound, self.rest_error)
 
-    def level_weights(self, levels: int, part: float) -> np.ndarray:
-        """Return for each level the weight that such a part of its vertices and those below fall short of, (levels,). A
-        level without vertices has the weight of the one above."""
-        level = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
-        below = [self.weights[level >= first] for first in range(levels)]
+    def stage_weights(self, stages: int, part: float) -> np.ndarray:
+        """Return for each stage the weight that such a part of its vertices and those below fall short of, (stages,). A
+        stage without vertices has the weight of the one above."""
+        stage = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
+        below = [self.weights[stage >= first] for first in range(stages)]
         quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
         return np.maximum.accumulate(quantiles)
 
@@ -381,7 +382,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     return branches
 
 
-def plain_settings(source: Source, levels: int, bound: float, step: float, rest_step: float) -> Settings:
+def plain_settings(source: Source, stages: int, bound: float, step: float, rest_step: float) -> Settings:
     """Return settings in which nothing is chosen."""
     none = np.zeros(source.hierarchy.branch_count, np.int32)
     return Settings(
@@ -389,15 +390,15 @@ def plain_settings(source: Source, levels: int, bound: float, step: float, rest_
         largest_bound=source.largest_bound(bound),
         limit=source.limit(bound),
         step=qz.single(step),
-        level_steps=np.ones(levels),
+        stage_steps=np.ones(stages),
         rest_step=qz.single(rest_step),
         forms=none,
         rigid=none,
         lags=none,
         details=finer_than(source.details, bound),
-        rotation_step_factors=(0,) * levels,
-        learned_bases=(False,) * levels,
-        node_steps=np.full(levels, step),
+        rotation_step_factors=(0,) * stages,
+        learned_bases=(False,) * stages,
+        node_steps=np.full(stages, step),
         without=source.without,
     )
 
@@ -464,7 +465,9 @@ def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> st
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh_for(settings)
-        return streams.encode_rest(branches, step, source.rest, None, settings.rest_slack, mesh, settings.shape_of)
+        return streams.encode_rest(
+            branches, step, source.rest, None, settings.rest_slack, mesh=mesh, shape_of=settings.shape_of
+        )
 
     return _within(source.rest_limit(settings.bound), source.rest, encode, settings.rest_step)
 
@@ -536,7 +539,7 @@ def _thin_branches(source: Source) -> np.ndarray:
 
 @dataclass(frozen=True)
 class StreamBasis:
-    """The learned time basis of a stream, which begins with `known` rows of the stream of level `base`, if any."""
+    """The learned time basis of a stream, which begins with `known` rows of the stream of stage `base`, if any."""
 
     stored: Entries | InWaves
     root: int
@@ -544,30 +547,30 @@ class StreamBasis:
     base: int = ct.NO_LEVEL
 
 
-def level_streams(settings: Settings, levels: int, bases: dict[int, StreamBasis]) -> list[LevelStream]:
-    level_streams = []
-    for level in range(levels):
-        factor = float(settings.rotation_step_factors[level])
-        stream = LevelStream(settings.step_of(level), factor, turn_step=settings.turn_step)
-        if level in bases:
-            stream.temporal, stream.root = bases[level].stored.rows, bases[level].root
-        level_streams.append(stream)
-    return level_streams
+def stage_streams(settings: Settings, stages: int, bases: dict[int, StreamBasis]) -> list[StageStream]:
+    stage_streams = []
+    for stage in range(stages):
+        factor = float(settings.rotation_step_factors[stage])
+        stream = StageStream(settings.step_of(stage), factor, turn_step=settings.turn_step)
+        if stage in bases:
+            stream.temporal, stream.root = bases[stage].stored.rows, bases[stage].root
+        stage_streams.append(stream)
+    return stage_streams
 
 
-def _level_moments(segment: SegmentMotion, level: int | None) -> tuple[np.ndarray, int]:
-    """Return the second moments over time, (T, T), of those tracks of one level's stream, or of all, that do not
+def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarray, int]:
+    """Return the second moments over time, (T, T), of those tracks of one stage's stream, or of all, that do not
     quantise to nothing, in units of their steps, and the number of these tracks. The segment was analysed finely."""
-    if level is None:
+    if stage is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
     few = pieces["low_modes"]
     for low, high, at in ((0 * few, few, pieces["low_stage"]), (few, rows, pieces["stage"])):
-        for piece in np.flatnonzero((at == level) & (rows > 0)):
+        for piece in np.flatnonzero((at == stage) & (rows > 0)):
             slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
-    return _moments(segment, (*parts, segment.tracks[segment.plan.base_stage == level]))
+    return _moments(segment, (*parts, segment.tracks[segment.plan.base_stage == stage]))
 
 
 def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
@@ -585,38 +588,38 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: 
     describes the motion and not its rounding."""
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
     segment = SegmentMotion(
-        plan, positions.shape[2], level_streams(fine, plan.level_count, {}), periodic=settings.periodic
+        plan, positions.shape[2], stage_streams(fine, plan.stage_count, {}), periodic=settings.periodic
     )
     segment.analyse(positions, Rounding(qz.DEAD_ZONE, roots_turn=settings.roots_turn), bent=bent)
     return segment
 
 
 def time_components(
-    plan: Plan, settings: Settings, positions: np.ndarray, levels: Sequence[int | None]
+    plan: Plan, settings: Settings, positions: np.ndarray, stages: Sequence[int | None]
 ) -> dict[int | None, TimeComponents]:
-    """Return the components of some levels, or of all that moves (None), from a finer pass."""
-    if not levels:
+    """Return the components of some stages, or of all that moves (None), from a finer pass."""
+    if not stages:
         return {}
     segment = analyse_finely(plan, settings, positions)
     may_be_in_waves = Feature.WAVE_BASES not in settings.without
-    return {level: TimeComponents(*_level_moments(segment, level), segment.waves, may_be_in_waves) for level in levels}
+    return {stage: TimeComponents(*_stage_moments(segment, stage), segment.waves, may_be_in_waves) for stage in stages}
 
 
-def level_bases(
+def stage_bases(
     plan: Plan, settings: Settings, components: dict[int | None, TimeComponents], ratio: float = 1.0
 ) -> dict[int, StreamBasis]:
-    """Return the time bases of the levels that learn theirs, for steps `ratio` times those of the components: each
-    level's own, or that of all, which lies with the first of them."""
-    levels = [level for level in settings.learning_levels if plan.has_stems(level)]
+    """Return the time bases of the stages that learn theirs, for steps `ratio` times those of the components: each
+    stage's own, or that of all, which lies with the first of them."""
+    stages = [stage for stage in settings.learning_stages if plan.has_stems(stage)]
     if not settings.common_basis:
-        bases = {level: components[level].basis(ratio, ratio) for level in levels}
-        return {level: StreamBasis(basis, level) for level, basis in bases.items() if basis is not None}
+        bases = {stage: components[stage].basis(ratio, ratio) for stage in stages}
+        return {stage: StreamBasis(basis, stage) for stage, basis in bases.items() if basis is not None}
     basis = components[None].basis(ratio, ratio)
     if basis is None:
         return {}
-    first, *others = levels
+    first, *others = stages
     return {first: StreamBasis(basis, first)} | {
-        level: StreamBasis(basis, first, len(basis.rows), first) for level in others
+        stage: StreamBasis(basis, first, len(basis.rows), first) for stage in others
     }
 
 
@@ -632,9 +635,9 @@ def basis_ratio(plan: Plan, settings: Settings, ratio: float) -> float:
 
 
 def learned_bases(plan: Plan, settings: Settings, positions: np.ndarray) -> dict[int, StreamBasis]:
-    """Return the time bases of the levels that learn theirs."""
-    levels = [None] if settings.common_basis and any(settings.learned_bases) else settings.learning_levels
-    return level_bases(plan, settings, time_components(plan, settings, positions, levels))
+    """Return the time bases of the stages that learn theirs."""
+    stages = [None] if settings.common_basis and any(settings.learned_bases) else settings.learning_stages
+    return stage_bases(plan, settings, time_components(plan, settings, positions, stages))
 
 
 @dataclass(frozen=True)
@@ -686,7 +689,7 @@ class Corrections:
 
 @dataclass
 class Coded:
-    """The stems of one segment: integers, streams by level, and corrections of a sample of its vertices."""
+    """The stems of one segment: integers, streams by stage, and corrections of a sample of its vertices."""
 
     segment: SegmentMotion
     stems: dict[int, bytes]
@@ -712,13 +715,14 @@ def analyse(
     positions: np.ndarray,
     learned_modes: LearnedModes | None,
     bases: dict[int, StreamBasis],
+    *,
     before: SegmentMotion | None = None,
     ratio: int = 1,
 ) -> tuple[SegmentMotion, np.ndarray]:
-    """Return the integers of the stems, and the positions at the last level without corrections; output: origin and
-    type of the positions. bases: of the levels that learn theirs; before, ratio: as SegmentMotion has them."""
-    levels = level_streams(settings, plan.level_count, bases)
-    segment = SegmentMotion(plan, positions.shape[2], levels, learned_modes, before, ratio, settings.periodic)
+    """Return the integers of the stems, and the positions at the last stage without corrections; output: origin and
+    type of the positions. bases: of the stages that learn theirs; before, ratio: as SegmentMotion has them."""
+    stages = stage_streams(settings, plan.stage_count, bases)
+    segment = SegmentMotion(plan, positions.shape[2], stages, learned_modes, before, ratio, periodic=settings.periodic)
     origin, dtype = output
     decoded = zeros(positions.shape, dtype)
     segment.analyse(positions, settings.rounding, origin, decoded)
@@ -727,29 +731,31 @@ def analyse(
     return segment, decoded
 
 
-def stems_head(settings: Settings, level: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
-    """Return the head of the stems of a level, whose time basis is among `bases` if it is learned."""
+def stems_head(settings: Settings, stage: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
+    """Return the head of the stems of a stage, whose time basis is among `bases` if it is learned."""
     head = writing.StemsHead(
-        settings.step_of(level), settings.rotation_step_factors[level], turn=qz.turn_of(settings.turn_step)
+        settings.step_of(stage), settings.rotation_step_factors[stage], turn=qz.turn_of(settings.turn_step)
     )
-    if level in bases:
-        basis = bases[level]
+    if stage in bases:
+        basis = bases[stage]
         head.basis_kind, head.rank, head.base = basis.stored.kind, len(basis.stored.rows), basis.base
         head.basis = basis.stored.stream(basis.known)
     return head
 
 
-def stem_streams(segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]) -> tuple[dict, dict]:
-    """Return STEMS of the levels of a first layer, and the bytes of their time bases."""
+def stem_streams(
+    segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]
+) -> tuple[JsonObject, JsonObject]:
+    """Return STEMS of the stages of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 
-    def stem_stream(level: int) -> tuple[bytes, int]:
-        head = stems_head(settings, level, bases)
-        return writing.pack_stems(head, streams.encode_stems(segment, level)), len(head.basis)
+    def stem_stream(stage: int) -> tuple[bytes, int]:
+        head = stems_head(settings, stage, bases)
+        return writing.pack_stems(head, streams.encode_stems(segment, stage)), len(head.basis)
 
-    levels = [level for level in range(plan.level_count) if plan.has_stems(level)]
-    coded = plan.pool.map(stem_stream, [(level,) for level in levels])
-    stems, heads = (dict(zip(levels, column)) for column in zip(*coded))
+    stages = [stage for stage in range(plan.stage_count) if plan.has_stems(stage)]
+    coded = plan.pool.map(stem_stream, [(stage,) for stage in stages])
+    stems, heads = (dict(zip(stages, column)) for column in zip(*coded))
     return stems, heads
 
 
@@ -773,10 +779,20 @@ def find_corrections(
     while True:
         step = qz.single(correction_step(settings.limit) * factor)
         moves = streams.find_rigid_corrections(
-            parts, decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, ends.closed
+            parts,
+            decoded,
+            positions,
+            origin,
+            settings.limit,
+            step,
+            pool=plan.pool,
+            narrow=is_narrow,
+            closed=ends.closed,
         )
         met = ends.with_moves(moves)
-        rows = streams.find_corrections(decoded, positions, origin, settings.limit, step, plan.pool, is_narrow, met)
+        rows = streams.find_corrections(
+            decoded, positions, origin, settings.limit, step, plan.pool, narrow=is_narrow, ends=met
+        )
         if rows is not None:
             return Corrections(rows, step, decoded.shape)
         factor, ends = 0.5 * factor, streams.FREE_ENDS

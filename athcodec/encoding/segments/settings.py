@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,15 +17,17 @@ BEAM = 0  # Form of a branch whose modes are those of a beam; other forms are SH
 # Fields that distinguish settings of a search: by hierarchy and rest pose, and by motion.
 OF_PRELUDE = "rest_step rest_slack connected_rest lags shape_of forms still layer free_rigid".split()
 OF_MOTION = (
-    "step level_steps turn_step rotation_step_factors roots_turn periodic learned_bases common_basis learned_pieces "
+    "step stage_steps turn_step rotation_step_factors roots_turn periodic learned_bases common_basis learned_pieces "
     "learned_coded"
 ).split()
 # Fields that a large plant takes from its sample as they are.
 OF_SAMPLE = (
-    "step level_steps rest_step rotation_step_factors roots_turn free_rigid still learned_bases common_basis periodic "
+    "step stage_steps rest_step rotation_step_factors roots_turn free_rigid still learned_bases common_basis periodic "
     "learned_coded"
 ).split()
 OF_BRANCHES = "forms lags details rigid".split()  # Arrays with an entry for each branch.
+
+Key: TypeAlias = tuple[object, ...]  # Distinguishes settings of one search.
 
 
 @dataclass(frozen=True)
@@ -35,15 +38,15 @@ class Settings:
     largest_bound: float  # The bound of the vertex with the largest weight.
     limit: float | np.ndarray  # Largest error of positions: one distance, or one for each vertex, (N,).
     step: float
-    level_steps: np.ndarray  # (levels,) factors on the step.
+    stage_steps: np.ndarray  # (stages,) factors on the step.
     rest_step: float
     forms: np.ndarray  # (B,) int32: BEAM, SHEET, or the vertices of each ring of a tube.
     rigid: np.ndarray  # (B,) int32: the number of layers, from the first on, in which a branch is rigid.
     lags: np.ndarray  # (B,) int32
     details: np.ndarray  # (B,) int32
-    rotation_step_factors: tuple[int, ...]  # The rotation factor of each level.
-    learned_bases: tuple[bool, ...]  # Whether each level has a learned time basis.
-    node_steps: np.ndarray  # (levels,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
+    rotation_step_factors: tuple[int, ...]  # The rotation factor of each stage.
+    learned_bases: tuple[bool, ...]  # Whether each stage has a learned time basis.
+    node_steps: np.ndarray  # (stages,) steps of the maps of nodes, as SegmentMotion.analyse_nodes takes them.
     roots_turn: bool = False  # Whether roots alone turn, and other branches are only predicted to.
     layer: int = 0  # Number of the layer of precision that the settings are for.
     still: bool = False  # Whether bending of branches turns nothing that they carry.
@@ -53,7 +56,7 @@ class Settings:
     coarsest_rest_step: float = np.inf  # Largest step of layers' rest poses; 0: all have that of the last, unrefined.
     rest_slack: float = 0.0  # Distance by which the rest pose may be off to save bits.
     shape_of: np.ndarray | None = None  # (B,) as streams.find_copies returns it; None: the rest pose has no copies.
-    common_basis: bool = False  # Whether the levels with learned time bases share one.
+    common_basis: bool = False  # Whether the stages with learned time bases share one.
     learned_pieces: np.ndarray | None = None  # (P,) bool: pieces that have learned modes; None: no piece has.
     learned_saving: float | None = None  # Factor by which the bits of pieces had to shrink for learned modes.
     learned_coded: bool = False  # Whether modes are learned about the coded rest pose, and take its rounding back.
@@ -62,28 +65,28 @@ class Settings:
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
 
     @property
-    def key(self) -> tuple:
+    def key(self) -> Key:
         """Return the key that distinguishes these settings from others of the same search."""
         return self.prelude_key + self._values(OF_MOTION)
 
     @property
-    def prelude_key(self) -> tuple:
+    def prelude_key(self) -> Key:
         """The part of the key that decides hierarchy and rest pose."""
         return self._values(OF_PRELUDE)
 
-    def _values(self, names: Sequence[str]) -> tuple:
+    def _values(self, names: Sequence[str]) -> Key:
         values = (getattr(self, name) for name in names)
         return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 
     @property
-    def levels(self) -> int:
-        """The number of levels of the branch hierarchy."""
-        return len(self.level_steps)
+    def stages(self) -> int:
+        """The number of stages of the branch hierarchy."""
+        return len(self.stage_steps)
 
     @property
-    def learning_levels(self) -> list[int]:
-        """Levels that learn their time bases."""
-        return [level for level, learned in enumerate(self.learned_bases) if learned]
+    def learning_stages(self) -> list[int]:
+        """Stages that learn their time bases."""
+        return [stage for stage, learned in enumerate(self.learned_bases) if learned]
 
     @property
     def rounding(self) -> Rounding:
@@ -92,9 +95,9 @@ class Settings:
             qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))), roots_turn=self.roots_turn
         )
 
-    def step_of(self, level: int) -> float:
-        """Return the step of the stems of a level."""
-        return qz.single(self.step * self.level_steps[level])
+    def step_of(self, stage: int) -> float:
+        """Return the step of the stems of a stage."""
+        return qz.single(self.step * self.stage_steps[stage])
 
     def rest_step_of(self, last: float, wanted: float) -> float:
         """Return the step of a layer's rest pose, as near to a wanted one as is allowed; last: of the last layer."""
@@ -105,20 +108,20 @@ class Settings:
         return replace(self, periodic=self.periodic and whole_loop)
 
     def with_rotations(self, factor: int) -> Settings:
-        """Return the settings with one rotation factor for all levels."""
-        return replace(self, rotation_step_factors=(factor,) * self.levels)
+        """Return the settings with one rotation factor for all stages."""
+        return replace(self, rotation_step_factors=(factor,) * self.stages)
 
     def with_turning_roots(self, factor: int) -> Settings:
         """Return the settings with a rotation factor of roots alone, in streams that hold all branches."""
         return replace(self.with_rotations(factor), roots_turn=True)
 
     def in_learned_bases(self) -> Settings:
-        """Return the settings with a learned time basis of its own for each level."""
-        return replace(self, learned_bases=(True,) * self.levels, common_basis=False)
+        """Return the settings with a learned time basis of its own for each stage."""
+        return replace(self, learned_bases=(True,) * self.stages, common_basis=False)
 
     def in_waves(self) -> Settings:
         """Return the settings without learned time bases."""
-        return replace(self, learned_bases=(False,) * self.levels, common_basis=False)
+        return replace(self, learned_bases=(False,) * self.stages, common_basis=False)
 
     def coarser(self, ratio: int) -> Settings:
         """Return the settings of a first layer whose step is `ratio` times as large."""

@@ -1,6 +1,6 @@
 """Time bases learned from the tracks of a segment, which take the place of waves.
 
-The principal components over time of a level's tracks (Lengyel 1999) represent it in fewer rows than waves, at the
+The principal components over time of a stage's tracks (Lengyel 1999) represent it in fewer rows than waves, at the
 price of storing them. FORMAT.md, "Temporal basis stream" and "Basis in waves".
 """
 
@@ -54,8 +54,8 @@ class InWaves:
     @cached_property
     def rows(self) -> np.ndarray:
         """The rows with a decoder's bits, (rank, frames) float64."""
-        rows = np.empty(self.integers.shape)
-        rank, frames = rows.shape
+        rank, frames = self.integers.shape
+        rows = np.empty((rank, frames))
         lib.ath_add_basis_rows(
             self.waves.ctypes.data,
             frames,

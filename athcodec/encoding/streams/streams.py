@@ -48,6 +48,7 @@ def encode_rest(
     rest: np.ndarray,
     coarse: CodedRest | None = None,
     slack: float = 0.0,
+    *,
     mesh: Mesh | None = None,
     shape_of: np.ndarray | None = None,
 ) -> CodedRest:
@@ -154,13 +155,13 @@ def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
 
 
 def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
-    """Return the streams of learned modes by level."""
+    """Return the streams of learned modes by stage."""
     if learned_modes is None:
         return {}
     capacity, arrays = 4096 + 8 * learned_modes.integers.size, _addresses(plan, learned_modes)
     return {
-        level: encode_stream("ath_encode_shapes", capacity, plan.core, *arrays, level)
-        for level in learned_modes.levels(plan).tolist()
+        stage: encode_stream("ath_encode_shapes", capacity, plan.core, *arrays, stage)
+        for stage in learned_modes.stages(plan).tolist()
     }
 
 
@@ -184,23 +185,23 @@ def encode_refined_modes(
     return encode_stream("ath_encode_refined_shapes", 4096 + 8 * modes.integers.size, plan.core, *arrays, shift)
 
 
-def encode_stems(segment: SegmentMotion, level: int) -> bytes:
-    """Code coefficients and tracks of one level."""
-    return _encode_level("ath_encode_stems", segment, level, segment.coefficients.size + segment.tracks.size)
+def encode_stems(segment: SegmentMotion, stage: int) -> bytes:
+    """Code coefficients and tracks of one stage."""
+    return _encode_stage("ath_encode_stems", segment, stage, segment.coefficients.size + segment.tracks.size)
 
 
-def encode_refinement(segment: SegmentMotion, level: int) -> bytes:
+def encode_refinement(segment: SegmentMotion, stage: int) -> bytes:
     """Code coefficients and tracks of a refinement."""
-    return _encode_level("ath_encode_refinement", segment, level, segment.coefficients.size + segment.tracks.size)
+    return _encode_stage("ath_encode_refinement", segment, stage, segment.coefficients.size + segment.tracks.size)
 
 
-def encode_affines(segment: SegmentMotion, level: int) -> bytes:
-    """Code the maps of the nodes of one level."""
-    return _encode_level("ath_encode_affines", segment, level, 4 * segment.node_tracks.size)
+def encode_affines(segment: SegmentMotion, stage: int) -> bytes:
+    """Code the maps of the nodes of one stage."""
+    return _encode_stage("ath_encode_affines", segment, stage, 4 * segment.node_tracks.size)
 
 
-def _encode_level(name: str, segment: SegmentMotion, level: int, size: int) -> bytes:
-    return encode_stream(name, 4096 + size, segment.plan.core, segment.motion, segment.integers, level)
+def _encode_stage(name: str, segment: SegmentMotion, stage: int, size: int) -> bytes:
+    return encode_stream(name, 4096 + size, segment.plan.core, segment.motion, segment.integers, stage)
 
 
 def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) -> bytes:
@@ -216,7 +217,7 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 
 
 def encode_predicted(
-    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype
+    plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype: np.dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Code predicted motion of a segment; return it and the positions that it decodes to, (T, N, 3) of `dtype`. None:
     steps so large cannot keep the limits. source: (T, N, 3) float64 less the origin; limits: (N,)."""
@@ -296,6 +297,7 @@ def find_corrections(
     limit: float | np.ndarray,
     step: float,
     pool: ThreadPool = SERIAL,
+    *,
     narrow: np.ndarray | bool = False,
     ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
@@ -355,6 +357,7 @@ def find_rigid_corrections(
     origin: np.ndarray,
     limit: float | np.ndarray,
     step: float,
+    *,
     pool: ThreadPool = SERIAL,
     narrow: bool = False,
     closed: int = 0,

@@ -1,6 +1,6 @@
 """Chunks as they are written: heads in front of the streams (streams.py), static data, and their order in a file.
 
-Chunks of the prelude come first, those of the motion by (level, segment, kind), other attributes last.
+Chunks of the prelude come first, those of the motion by (stage, segment, kind), other attributes last.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from athcodec.decoding.container import (
 )
 from athcodec.errors import ClipError, FormatError
 from athcodec.motion.clip import ClipRange
+from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:
     from athcodec.encoding.streams.polygons import Mesh
@@ -61,7 +62,7 @@ _IS_DERIVED = 16  # Bit of the first byte of EDGES: they are the sides of the fa
 
 def _order(chunk: Chunk) -> tuple[int, ...]:
     if chunk.is_motion:
-        return (1, chunk.level, chunk.segment, chunk.kind)
+        return (1, NO_LEVEL if chunk.stage is None else chunk.stage, chunk.segment, chunk.kind)
     return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
 
 
@@ -72,10 +73,10 @@ class ChunkStore:
     spool: BinaryIO
     entries: list[tuple[Chunk, int]] = field(default_factory=list)
 
-    def add(self, kind: int, payload: bytes, level: int = NO_LEVEL, segment: int = 0) -> None:
+    def add(self, kind: int, payload: bytes, stage: int = NO_LEVEL, segment: int = 0) -> None:
         place = self.spool.seek(0, 2)
         self.spool.write(payload)
-        self.entries.append((Chunk(kind, level, segment, len(payload), crc32c(payload)), place))
+        self.entries.append((Chunk(kind, NO_LEVEL, segment, len(payload), crc32c(payload), stage=stage), place))
 
     def leave_out(self, is_needless: Callable[[Chunk], bool]) -> None:
         """Drop the chunks of motion that `is_needless` is true of. All other chunks stay."""
@@ -140,8 +141,8 @@ def mesh_checksum(mesh: np.ndarray) -> bytes:
 def pack_steady_time(*times: np.ndarray) -> bytes | None:
     """Return TIME by the rule that gives the very same times in seconds, (T,) for each clip; None: none does."""
     for method, code, find in ((BY_RATE, _RATE, _rate_of), (BY_STEP, _STEADY, _step_of)):
-        rules = [find(time) for time in times]
-        if None not in rules:
+        rules = [rule for time in times if (rule := find(time)) is not None]
+        if len(rules) == len(times):
             return _TIME.pack(method) + b"".join(code.pack(*rule) for rule in rules)
     return None
 
@@ -176,7 +177,8 @@ def pack_clips(
         flags = clip_range.loop | (clip_range.loop and periodic and segments == 1) << 1
         entries.append(_CLIP.pack(clip_range.frame_count, segments, flags, len(name)) + name)
         if clip_range.loop:
-            entries.append(round_up_singles(errors).astype("<f4").tobytes())
+            assert errors is not None  # A loop has a seam.
+            entries.append(round_up_singles(np.asarray(errors)).astype("<f4").tobytes())
     return b"".join(entries)
 
 
@@ -186,7 +188,7 @@ def pack_time(stream: bytes) -> bytes:
 
 @dataclass
 class StemsHead:
-    """Head of STEMS. basis: stream of a learned basis of a rank; base: the level of the stream whose basis it begins
+    """Head of STEMS. basis: stream of a learned basis of a rank; base: the stage of the stream whose basis it begins
     with; turn: half octaves below 1 of the largest step of rigid pieces' rotations (0: there is none)."""
 
     step: float
@@ -271,7 +273,7 @@ def _refusals(subject: str) -> Iterator[None]:
         raise ClipError(f"{subject}: {error}; expected plain data that a file can hold") from None
 
 
-def pack_metadata(metadata: dict) -> bytes:
+def pack_metadata(metadata: JsonObject) -> bytes:
     """Return JSON, compressed if that is shorter. Raises ClipError for what no reader would accept."""
     with _refusals("metadata"):
         text = json.dumps(metadata, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

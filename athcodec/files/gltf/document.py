@@ -12,9 +12,8 @@ import binascii
 import json
 import os
 import struct
-from collections.abc import Mapping
 from os import fspath
-from typing import Any, BinaryIO
+from typing import BinaryIO
 from urllib.parse import unquote
 
 import numpy as np
@@ -26,6 +25,7 @@ from athcodec.files.kinds import HEAD_BYTES, TEXT, kind_of_bytes
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import Budget, FileWatch, closing_on_failure
 from athcodec.options import MAX_MEMORY
+from athcodec.untyped import JsonMapping, JsonObject, JsonValue
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -133,7 +133,7 @@ class GltfFile:
                     + how
                 )
 
-    def item(self, kind: str, index: Any) -> dict:
+    def item(self, kind: str, index: JsonValue) -> JsonObject:
         """Return entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
         every = self.json.get(kind)
         count = len(every) if isinstance(every, list) else 0
@@ -143,16 +143,16 @@ class GltfFile:
             raise ClipError(f"{kind}: entry {index} is {brief(every[index])}, expected an object")
         return every[index]
 
-    def items(self, kind: str) -> list[dict]:
+    def items(self, kind: str) -> list[JsonObject]:
         return entries(self.json, kind)
 
     # ---- accessors ----
 
-    def count(self, index: Any) -> int:
+    def count(self, index: JsonValue) -> int:
         """Return the number of elements of accessor `index`."""
         return integer(self.item("accessors", index), "count", low=1)
 
-    def array(self, index: Any) -> np.ndarray:
+    def array(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` as (count, width) in its component type. Raises ClipError."""
         accessor, where = self.item("accessors", index), f"accessor {index}"
         dtype = looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
@@ -169,7 +169,7 @@ class GltfFile:
             values = self._sparse(entry(accessor, "sparse"), values, where)
         return values
 
-    def floats(self, index: Any) -> np.ndarray:
+    def floats(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` as numbers: float32 unchanged, normalized integers between -1 and 1 (float64)."""
         values = self.array(index)
         if values.dtype.kind == "f":
@@ -178,12 +178,12 @@ class GltfFile:
             return values.astype(np.float64)
         return np.maximum(values / float(np.iinfo(values.dtype).max), -1.0)
 
-    def attribute(self, index: Any) -> np.ndarray:
+    def attribute(self, index: JsonValue) -> np.ndarray:
         """Return accessor `index` in the type that it is stored in, normalized integers as float32."""
         is_normalized = self.item("accessors", index).get("normalized")
         return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
 
-    def _strided(self, accessor: Mapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
+    def _strided(self, accessor: JsonMapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
         index = accessor.get("bufferView")
         view = self.item("bufferViews", index)
         item, offset = dtype.itemsize * width, integer(accessor, "byteOffset", 0)
@@ -198,7 +198,7 @@ class GltfFile:
         raw = self._view(index, view, offset, size)
         return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
 
-    def _sparse(self, sparse: Mapping, values: np.ndarray, where: str) -> np.ndarray:
+    def _sparse(self, sparse: JsonMapping, values: np.ndarray, where: str) -> np.ndarray:
         count = integer(sparse, "count", low=1, stop=len(values) + 1)
         indices, changed = entry(sparse, "indices"), entry(sparse, "values")
         dtype = np.dtype(looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
@@ -213,7 +213,7 @@ class GltfFile:
         """Return the bytes of the GLB's internal buffer; none if it has none."""
         return self._binary.read(0, self._binary.size) if self._binary is not None else b""
 
-    def part(self, holder: Mapping, key: str) -> tuple[_Bytes, int, int]:
+    def part(self, holder: JsonMapping, key: str) -> tuple[_Bytes, int, int]:
         """Return where the bytes of the buffer view `key` lie: a buffer to `read`, an offset and a size. Raises
         ClipError."""
         index = integer(holder, key)
@@ -224,7 +224,7 @@ class GltfFile:
             raise ClipError(f"bufferView {index}: got one that is compressed or cut off, expected {size} plain bytes")
         return buffer, offset, size
 
-    def _view(self, index: Any, view: Mapping, offset: int, size: int) -> bytes:
+    def _view(self, index: JsonValue, view: JsonMapping, offset: int, size: int) -> bytes:
         """Return bytes of the buffer view `view`, of number `index`, unpacked if it is compressed. Raises ClipError."""
         extensions = view.get("extensions") or {}
         for name in MESHOPT:
@@ -243,7 +243,7 @@ class GltfFile:
             self._unpacked_views[index] = unpack(raw, packed)
         return self._unpacked_views[index]
 
-    def _slice(self, view: Mapping, offset: int, size: int, where: str) -> bytes:
+    def _slice(self, view: JsonMapping, offset: int, size: int, where: str) -> bytes:
         buffer = self._buffer_of(view)
         if offset + size > buffer.size:
             raise ClipError(
@@ -251,7 +251,7 @@ class GltfFile:
             )
         return buffer.read(offset, size)
 
-    def _buffer_of(self, view: Mapping) -> _Bytes:
+    def _buffer_of(self, view: JsonMapping) -> _Bytes:
         index = integer(view, "buffer")
         if index not in self._buffers:
             self._buffers[index] = self._buffer(index)
@@ -309,7 +309,7 @@ class _FilePart(_Bytes):
         return data
 
 
-def _parsed(text: bytes) -> dict:
+def _parsed(text: bytes) -> JsonObject:
     try:
         document = json.loads(text.decode("utf-8-sig"), parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:

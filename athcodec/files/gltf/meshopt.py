@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from athcodec.errors import ClipError, MissingExtra
 from athcodec.files.gltf.json import integer
+from athcodec.untyped import JsonMapping
 
 STRIDES = {"OCTAHEDRAL": (4, 8), "QUATERNION": (8,), "EXPONENTIAL": range(4, 257, 4), "NONE": range(1, 257)}
 MOST_PER_BYTE = 2048  # Bytes that the codec makes of one at most; more is refused before memory is allocated.
 
 
-def unpacked_size(packed: Mapping) -> int:
+def unpacked_size(packed: JsonMapping) -> int:
     """Return the number of bytes of the buffer view. Raises ClipError."""
     return integer(packed, "count", low=1) * integer(packed, "byteStride", low=1, stop=257)
 
 
-def unpack(raw: bytes, packed: Mapping) -> bytes:
+def unpack(raw: bytes, packed: JsonMapping) -> bytes:
     """Return the bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
     try:
         import meshoptimizer as library

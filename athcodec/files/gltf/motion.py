@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from contextlib import closing
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -19,20 +18,21 @@ from athcodec.files.gltf.json import BROKEN, brief, entries, entry, extension, i
 from athcodec.files.gltf.primitives import triangles
 from athcodec.files.plain import FilePath, open_plain
 from athcodec.files.reading import closing_on_failure, naming
+from athcodec.untyped import JsonObject
 
 EXTENSION = "ATH_motion"
 VERTEX_ATTRIBUTE = "_ATH_VERTEX"
 MAGIC = b"glTF"
-GltfPlace = tuple[dict, np.ndarray]
+GltfPlace = tuple[JsonObject, np.ndarray]
 """A primitive, and the motion's vertex of each of its vertices."""
 
 
-def extension_of(holder: dict) -> dict | None:
+def extension_of(holder: JsonObject) -> JsonObject | None:
     """Return the extension object of a part of the file, or None. Raises ClipError."""
     return extension(holder, EXTENSION)
 
 
-def motion_names(gltf: dict) -> list[str]:
+def motion_names(gltf: JsonObject) -> list[str]:
     """Return the names of a file's motions, which differ. Raises ClipError."""
     names: list[str] = []
     for number, motion in enumerate(entries(extension_of(gltf) or {}, "motions")):
@@ -154,9 +154,9 @@ def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
     return places
 
 
-def _vertices(file: GltfFile, primitive: dict, binding: dict) -> np.ndarray:
+def _vertices(file: GltfFile, primitive: JsonObject, binding: JsonObject) -> np.ndarray:
     """Return the motion's vertex of each vertex of a primitive, (n,)."""
-    attributes: dict[str, Any] = entry(primitive, "attributes")
+    attributes: JsonObject = entry(primitive, "attributes")
     count = len(file.array(integer(attributes, "POSITION")))  # The file may have bytes for fewer vertices.
     if VERTEX_ATTRIBUTE not in attributes:
         return integer(binding, "firstVertex", 0) + np.arange(count)

@@ -7,16 +7,17 @@ import numpy as np
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
 from athcodec.files.gltf.json import integer
+from athcodec.untyped import JsonObject
 
 
-def triangles(file: GltfFile, primitive: dict, count: int) -> np.ndarray:
+def triangles(file: GltfFile, primitive: JsonObject, count: int) -> np.ndarray:
     """Return a primitive's triangles of its `count` vertices, (F, 3); none if it draws points or lines. Raises
     ClipError."""
     mode = integer(primitive, "mode", 4, stop=7)
     return rows_of(corners(file, primitive, count, "primitive"), mode) if mode >= 4 else np.zeros((0, 3), np.int64)
 
 
-def corners(file: GltfFile, primitive: dict, count: int, name: str) -> np.ndarray:
+def corners(file: GltfFile, primitive: JsonObject, count: int, name: str) -> np.ndarray:
     if primitive.get("indices") is None:
         return np.arange(count)
     values = file.array(primitive["indices"])
@@ -35,12 +36,11 @@ def rows_of(corners: np.ndarray, mode: int) -> np.ndarray:
     if mode == 4:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
     count = max(len(corners) - 2, 0)
-    if mode == 6:
-        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1) if count else None
-    else:
-        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1) if count else None
-        if count:
-            rows[1::2, 1:] = rows[1::2, :0:-1]
-    if rows is None:
+    if not count:
         return np.zeros((0, 3), np.int64)
+    if mode == 6:
+        rows = np.stack([corners[1:-1], corners[2:], np.broadcast_to(corners[:1], count)], axis=1)
+    else:
+        rows = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+        rows[1::2, 1:] = rows[1::2, :0:-1]
     return rows[(rows[:, 0] != rows[:, 1]) & (rows[:, 1] != rows[:, 2]) & (rows[:, 0] != rows[:, 2])]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import Seen, cheapest_of_each, components, sizes_of_each
 from athcodec.motion.clip import source_stem_index, stem_index_of
+from athcodec.untyped import ScipyObject
 
 NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are sought.
 LONE_PARTS = 64  # Most parts of the plant whose nearest others are sought at any distance.
@@ -126,7 +126,7 @@ def _bases(
 
 def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: np.ndarray) -> _Joints:
     """Return where branches touch the parents that they are known to have."""
-    tree_of: dict[int, Any] = {}
+    tree_of: dict[int, ScipyObject] = {}
     base, order = _stillest(frames, label), np.argsort(label, kind="stable")
     bounds = np.searchsorted(label[order], np.arange(len(parent) + 1))
     for branch in np.flatnonzero(parent >= 0).tolist():
@@ -193,7 +193,7 @@ def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
     return np.concatenate(near_pairs)
 
 
-def _others_nearby(tree: Any, rest: np.ndarray, label: np.ndarray, near: int) -> Iterator[np.ndarray]:
+def _others_nearby(tree: ScipyObject, rest: np.ndarray, label: np.ndarray, near: int) -> Iterator[np.ndarray]:
     """Yield pairs of vertices and those among their `near` nearest that are of other branches, one of each branch."""
     length = max(1, QUERY // near)
     for start in range(0, len(rest), length):

@@ -94,9 +94,9 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
         yield from _distinct(itertools.chain([first], _others(seen, first)))
         return
-    for found in _in_order(seen):
-        yield found
-        if _are_plants(found):
+    for branches in _in_order(seen):
+        yield branches
+        if _are_plants(branches):
             return
     yield single
     if first is not None:
@@ -186,10 +186,10 @@ def _are_even(label: np.ndarray) -> bool:
     return len(sizes) >= COPIES and bool(np.bincount(sizes).max() >= ALIKE_PARTS * len(sizes))
 
 
-def _are_plants(found: Found) -> bool:
+def _are_plants(branches: Found) -> bool:
     """Return whether branches are copies of one plant side by side. Rings of one stem would hang on each other."""
-    roots = np.count_nonzero(found.branch_parent < 0)
-    return _are_even(found.vertex_branch) and bool(roots > PLANTS * len(found.branch_parent))
+    roots = np.count_nonzero(branches.branch_parent < 0)
+    return _are_even(branches.vertex_branch) and bool(roots > PLANTS * len(branches.branch_parent))
 
 
 def _leaves_many_alone(branches: Found) -> bool:

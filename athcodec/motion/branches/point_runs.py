@@ -8,11 +8,11 @@ is looked at: the order of the points does not matter.
 from __future__ import annotations
 
 import importlib
-from typing import Any
 
 import numpy as np
 
 from athcodec.errors import MissingExtra
+from athcodec.untyped import ScipyObject
 
 NEAR = (16, 96)  # Nearest points of each one, at least and at most, among which neighbours are sought.
 PAIRS = 1 << 19  # Pairs in all, if that is more than the least.
@@ -188,7 +188,7 @@ def _parts(links: np.ndarray, count: int) -> np.ndarray:
     return labels
 
 
-def scipy_module(name: str) -> Any:
+def scipy_module(name: str) -> ScipyObject:
     """Return a module of scipy. Raises MissingExtra without it."""
     try:
         return importlib.import_module(f"scipy.{name}")

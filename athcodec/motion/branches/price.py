@@ -10,13 +10,13 @@ branch that would hang on it is charged some.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from athcodec.motion.algebra import rotations_of
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.seen import cheapest_of_each, moments_of_each, sizes_of_each, sums_of_each
+from athcodec.untyped import ScipyObject
 
 STEP = 1e-4  # Of the diagonal: about the steps of quantisation, below which motion costs nothing.
 SHOWN = 3  # Vertices of a branch, far from each other, whose motion stands for its own.
@@ -85,7 +85,7 @@ class Prices:
         return np.column_stack([self._rest / self._diagonal, APART * self._label])
 
     @cached_property
-    def _tree(self) -> Any:
+    def _tree(self) -> ScipyObject:
         return scipy_module("spatial").cKDTree(self._apart)
 
     def _bits(self, tracks: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Time bases: which levels have one learned from their tracks, and whether waves are periodic (FORMAT.md)."""
+"""Time bases: which stages have one learned from their tracks, and whether waves are periodic (FORMAT.md)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
 FINER = 0.5  # Step at which learned time bases are tried too: an error of one of their numbers lasts over all frames.
-PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse levels jump at the seam of others.
+PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse stages jump at the seam of others.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
-    """Return the settings with learned time bases at all levels: each level's own or one for all; layers have one."""
+    """Return the settings with learned time bases at all stages: each stage's own or one for all; layers have one."""
     if trials.without(Feature.TIME_BASES):
         return []
     each = settings.in_learned_bases()
@@ -24,14 +24,14 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
 
 
 def best_bases(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with a learned time basis for all levels, or where it is shorter, or with waves."""
+    """Return the settings with a learned time basis for all stages, or where it is shorter, or with waves."""
     if trials.without(Feature.TIME_BASES):
         return settings
     waves = settings.in_waves()
     each, *common = candidates(settings, trials)
     if math.inf in trials.costs([waves, each, *common]):
         return trials.cheapest([settings, waves, each, *common])
-    shorter = trials.level_costs(each) < trials.level_costs(waves)
+    shorter = trials.stage_costs(each) < trials.stage_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
     mixes = [each] if each.common_basis else [each, mixed]
     best = trials.cheapest([settings, waves, *mixes, *common])

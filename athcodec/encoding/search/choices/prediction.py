@@ -18,7 +18,7 @@ from athcodec._native import Rounding
 from athcodec.decoding import container as ct
 from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.model import quantise as qz
-from athcodec.encoding.model.motion import LevelStream, SegmentMotion, position_errors
+from athcodec.encoding.model.motion import SegmentMotion, StageStream, position_errors
 from athcodec.encoding.search.choices.rest import with_best_rest
 from athcodec.encoding.search.progress import PREDICTION, REST, Work
 from athcodec.encoding.search.segment_samples import SegmentSample, typical_segments
@@ -49,9 +49,9 @@ UNSEEN = 1e-5  # Bound, in diagonals, below which twitches count for less: a hun
 INVISIBLE = 1e-6  # Bound, in diagonals, below which they count for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
 HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
-MAP_SHARE = 0.02  # Share of the bytes that the maps of level 0 may take.
+MAP_SHARE = 0.02  # Share of the bytes that the maps of stage 0 may take.
 MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
-LESS_ERROR = 0.9  # Largest error of level 0 with maps, over that without, that is worth their bytes.
+LESS_ERROR = 0.9  # Largest error of stage 0 with maps, over that without, that is worth their bytes.
 
 
 def one_map_each(seen: Survey) -> Ath:
@@ -235,10 +235,10 @@ def code_predicted_segment(
     def error(shown: np.ndarray) -> tuple[float, ...]:
         return position_errors(shown, positions, prelude.origin, plan.pool, shown_times, prelude.shares)
 
-    last = plan.level_count - 1
-    chunks, level_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
+    last = plan.stage_count - 1
+    chunks, stage_0 = {(last, ct.PREDICTED): payload}, _still(prelude, positions.shape[2])
     source = SourceFrames(positions, shown_times, None, box, settings.bound, plan.pool)
-    coarse = level_0.pose(0, prelude.origin, prelude.dtype)
+    coarse = stage_0.pose(0, prelude.origin, prelude.dtype)
     errors, away = [error(coarse)], source.flaws(coarse, None)[0]
     for moved in _with_maps(prelude, positions, errors[0][-1]):
         maps = streams.encode_affines(moved, 0)
@@ -260,7 +260,7 @@ def code_predicted_segment(
 
 def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
     """Return a segment that shows the rest pose where no maps move it."""
-    return SegmentMotion(prelude.plan, frames, [LevelStream(1.0)] * prelude.plan.level_count)
+    return SegmentMotion(prelude.plan, frames, [StageStream(1.0)] * prelude.plan.stage_count)
 
 
 def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
@@ -270,5 +270,5 @@ def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> It
         moved = _still(prelude, positions.shape[2])
         step = part * error * (plan.vertex_count / len(plan.nodes)) ** 0.5
         if step > 0:
-            moved.analyse_nodes(positions, np.full(plan.level_count, step), Rounding(qz.DEAD_ZONE), level=0)
+            moved.analyse_nodes(positions, np.full(plan.stage_count, step), Rounding(qz.DEAD_ZONE), stage=0)
             yield moved

@@ -13,7 +13,7 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import SegmentMotion
-from athcodec.encoding.segments.segment import FINER, Source, analyse_finely, level_streams, uncoded_plan
+from athcodec.encoding.segments.segment import FINER, Source, analyse_finely, stage_streams, uncoded_plan
 from athcodec.encoding.segments.settings import Settings
 
 SEGMENTS = 4  # Largest number of segments whose mean is taken.
@@ -32,6 +32,6 @@ def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
         tracks = tracks + of_sum * motion.tracks[:, :, :, 0]
         frames += motion.frames
     fine = replace(settings, step=qz.single(settings.step / FINER), turn_step=settings.turn_step / FINER)
-    mean = SegmentMotion(plan, 1, level_streams(fine, plan.level_count, {}))
+    mean = SegmentMotion(plan, 1, stage_streams(fine, plan.stage_count, {}))
     mean.coefficients[:, :, 0], mean.tracks[:, :, :, 0] = np.rint(coefficients / frames), np.rint(tracks / frames)
-    return mean.pose(plan.level_count - 1, np.zeros(3), np.float64)[:, :, 0]
+    return mean.pose(plan.stage_count - 1, np.zeros(3), np.float64)[:, :, 0]

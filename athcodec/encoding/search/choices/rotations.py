@@ -27,15 +27,15 @@ MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre 
 
 
 def first_rotations(
-    source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray, levels: int
+    source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray, stages: int
 ) -> tuple[int, ...]:
-    """Return the factor of each level that a search starts with: none turn, or the roots do where most of what stands
+    """Return the factor of each stage that a search starts with: none turn, or the roots do where most of what stands
     on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. rigid:
     (B,) of branches that turn in any case if it is not 0."""
     turns = Feature.ROTATIONS not in source.without and not rigid[source.hierarchy.branch_parent < 0].all()
     turns = turns and _turn_as_wholes(source, samples)
-    count = min(2, levels) if turns else 0
-    return (ROTATION_FACTORS[-1],) * count + (0,) * (levels - count)
+    count = min(2, stages) if turns else 0
+    return (ROTATION_FACTORS[-1],) * count + (0,) * (stages - count)
 
 
 def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
@@ -60,7 +60,7 @@ def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
 
 
 def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) -> list[Settings]:
-    """Return the settings with each rotation factor at all levels."""
+    """Return the settings with each rotation factor at all stages."""
     return [settings.with_rotations(factor) for factor in factors]
 
 
@@ -127,24 +127,24 @@ def fast_rotations(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
-    """Return the settings with the best factor: one for all levels, one for each level, or one for the roots alone."""
+    """Return the settings with the best factor: one for all stages, one for each stage, or one for the roots alone."""
     if trials.without(Feature.ROTATIONS):
         return settings
     uniform = candidates(settings, factors)
     unturned, *turned = costs = trials.costs(uniform)
     if max(costs) == math.inf or min(turned) > HOPELESS_RATIO * unturned:
         return trials.cheapest([settings, *uniform])
-    per_level = np.array([trials.level_costs(candidate) for candidate in uniform])
-    mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_level.argmin(axis=0)))
+    per_stage = np.array([trials.stage_costs(candidate) for candidate in uniform])
+    mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_stage.argmin(axis=0)))
     return trials.cheapest([settings, mixed, *_turning_roots(settings, trials, factors), *uniform])
 
 
 def _turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
     """Return the settings with each rotation factor at the roots alone, which turn what turns as a whole. A root has
-    its stem at level 0 if it moves as one, else at level 1."""
-    has_stems = [trials.prelude(settings).plan.has_stems(level) for level in range(settings.levels)]
-    levels = [level for level in (1, 2) if any(has_stems[:level]) and level < settings.levels]
-    tried = [(factor,) * level + (0,) * (settings.levels - level) for level in levels for factor in factors if factor]
+    its stem at stage 0 if it moves as one, else at stage 1."""
+    has_stems = [trials.prelude(settings).plan.has_stems(stage) for stage in range(settings.stages)]
+    stages = [stage for stage in (1, 2) if any(has_stems[:stage]) and stage < settings.stages]
+    tried = [(factor,) * stage + (0,) * (settings.stages - stage) for stage in stages for factor in factors if factor]
     return [replace(settings, rotation_step_factors=factors) for factors in tried]
 
 

@@ -16,16 +16,16 @@ STEP_FACTOR = 1.15  # Ratio of neighbouring steps of motion on the grid.
 REST_STEP_FACTOR = 1.4  # Ratio of neighbouring steps of the rest pose, by which bytes change less.
 FINE_FACTOR = 1.04  # Ratio of steps of motion at effort "best".
 FINE_REST_FACTOR = 1.12  # Ratio of steps of the rest pose at effort "best".
-WEIGHT_PARTS = (0.0, 0.05, 0.2)  # Shares of a level's vertices that may have weights below that of the level's step.
-WEIGHT_POWERS = (0.5, 1.0)  # Powers of a level's weight that are tried as the factor on its step.
+WEIGHT_PARTS = (0.0, 0.05, 0.2)  # Shares of a stage's vertices that may have weights below that of the stage's step.
+WEIGHT_POWERS = (0.5, 1.0)  # Powers of a stage's weight that are tried as the factor on its step.
 
 
-def best_level_steps(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with coarser steps for levels whose vertices and those below have larger weights."""
+def best_stage_steps(settings: Settings, trials: Trials) -> Settings:
+    """Return the settings with coarser steps for stages whose vertices and those below have larger weights."""
     if trials.source.weights is None:
         return settings
-    weights = [trials.source.level_weights(settings.levels, part) for part in WEIGHT_PARTS]
-    tried = [replace(settings, level_steps=least**power) for least in weights for power in WEIGHT_POWERS]
+    weights = [trials.source.stage_weights(settings.stages, part) for part in WEIGHT_PARTS]
+    tried = [replace(settings, stage_steps=least**power) for least in weights for power in WEIGHT_POWERS]
     return trials.cheapest([settings, *tried])
 
 
