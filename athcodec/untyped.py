@@ -26,6 +26,7 @@ ArrayLike: TypeAlias = Any
 # One name for each library without types.
 AlembicObject: TypeAlias = Any  # alembic3d and imath
 DaskObject: TypeAlias = Any  # distributed
+FsspecObject: TypeAlias = Any  # A file system of fsspec.
 H5Object: TypeAlias = Any  # h5py
 PlaywrightObject: TypeAlias = Any
 ScipyObject: TypeAlias = Any

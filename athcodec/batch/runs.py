@@ -33,7 +33,7 @@ from athcodec.errors import AthError, MissingExtra
 from athcodec.files.atomic import is_url, remove_leftovers_of, scratch_folder
 from athcodec.files.plain import FilePath
 from athcodec.files.shown import without_secrets
-from athcodec.untyped import DaskObject
+from athcodec.untyped import DaskObject, JsonObject
 
 MANIFEST = "athcodec-batch.jsonl"
 SCRATCH = "athcodec-batch"
@@ -394,7 +394,7 @@ def _noted(item: Item, result: Result, output: FilePath, notes: Manifest, outcom
             "failed": f"{without_secrets(item.output)}: a worker has stored it, expected to find it there; "
             "workers need a file system that all share"
         }
-    record = {
+    record: JsonObject = {
         "output": _key(item, output),
         "input": item.shown,
         "status": "done" if "done" in result else "failed",

@@ -19,15 +19,18 @@ import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, TypeGuard
 
 from athcodec.files.kinds import UNKNOWN, kind_by_suffix, kind_of
 from athcodec.files.plain import FilePath
 
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
+
 try:
     import fcntl
 except ImportError:  # Windows lets nobody remove a file that another program has open.
-    fcntl = None
+    fcntl = None  # type: ignore[assignment]
 
 FileId = tuple[int, int]
 # Characters of the target's name in that of the pending file; even the longest name leaves room for the rest.
@@ -99,7 +102,7 @@ def _check_replaceable(path: str, kind: str | None) -> None:
         )
 
 
-def is_url(path: object) -> bool:
+def is_url(path: object) -> TypeGuard[str]:
     """Return whether a path is a URL for remote.py."""
     return isinstance(path, str) and _URL.match(path) is not None
 
@@ -156,7 +159,7 @@ class _Naming(io.FileIO):
         super().__init__(pending.descriptor, "w+", closefd=False)
         self._path = pending.path
 
-    def write(self, data) -> int | None:
+    def write(self, data: ReadableBuffer) -> int:
         try:
             return super().write(data)
         except OSError as error:

@@ -15,11 +15,16 @@ import ipaddress
 import os
 import re
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urljoin, urlsplit
 
 from athcodec.errors import RemoteError
 from athcodec.files.shown import redacted, without_secrets
-from athcodec.untyped import JsonObject
+from athcodec.untyped import FsspecObject, JsonObject
+
+if TYPE_CHECKING:
+    import aiohttp
 
 READ_AHEAD = 64 << 10
 GAP = 16 << 10  # Unwanted bytes that cost less than another request.
@@ -31,6 +36,7 @@ INSTALL = 'pip install "athcodec[remote]"'
 
 _RANGE = re.compile(r"bytes (\d+)-(\d+)/(\d+)")
 
+Answer = TypeVar("Answer")
 Range = tuple[int, int]
 """Offset and size."""
 
@@ -62,10 +68,11 @@ class Remote:
         If the bytes cannot be had, or are no longer those of the file that was opened.
     """
 
-    def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options):
+    def __init__(self, url: str, *, timeout: float = 30.0, retries: int = 3, **options: Any):
         self.url, self.timeout, self.retries = url, timeout, retries
         self.requests = self.bytes = 0
-        self._place, self._kept = 0, OrderedDict()  # Bytes by their offset.
+        self._place = 0
+        self._kept: OrderedDict[int, bytes] = OrderedDict()  # Bytes by their offset.
         self._source = _source(self, options)
         self.size = self._source.size()
 
@@ -132,7 +139,7 @@ class Remote:
     def __enter__(self) -> Remote:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -147,7 +154,7 @@ def _joined(ranges: list[Range]) -> list[Range]:
     return joined
 
 
-def _source(remote: Remote, options: JsonObject):
+def _source(remote: Remote, options: JsonObject) -> _Http | _AnySystem:
     """Return the transport of a URL: HTTP with checks of its answers, or any other file system."""
     shown = without_secrets(remote.url)
     try:
@@ -176,7 +183,9 @@ def guarded(url: str, options: JsonObject) -> JsonObject:
 
     first = urlsplit(url).hostname or ""
 
-    async def check(session, context, params) -> None:
+    async def check(
+        session: aiohttp.ClientSession, context: object, params: aiohttp.TraceRequestRedirectParams
+    ) -> None:
         place = params.response.headers.get("Location") or params.response.headers.get("URI") or ""
         target = urlsplit(urljoin(str(params.response.url), place)).hostname or ""
         if await is_private(target) and not await is_private(first):
@@ -194,7 +203,7 @@ async def is_private(host: str) -> bool:
         addresses = await asyncio.get_running_loop().getaddrinfo(host, None)
     except (OSError, UnicodeError):
         return False  # A name without an address leads nowhere.
-    return any(not ipaddress.ip_address(address[0].partition("%")[0]).is_global for *_, address in addresses)
+    return any(not ipaddress.ip_address(str(address[0]).partition("%")[0]).is_global for *_, address in addresses)
 
 
 def _one_line(error: BaseException) -> str:
@@ -206,7 +215,7 @@ class _AnySystem:
 
     change_hint = ", or the file has been changed since it was opened"
 
-    def __init__(self, remote: Remote, system, path: str, shown: str):
+    def __init__(self, remote: Remote, system: FsspecObject, path: str, shown: str):
         self._remote, self._system, self._path, self._shown = remote, system, path, shown
 
     def size(self) -> int:
@@ -231,7 +240,7 @@ class _AnySystem:
                 )
         return list(zip(starts, parts))
 
-    def _try(self, ask, requests: int = 1):
+    def _try(self, ask: Callable[[], Answer], requests: int = 1) -> Answer:
         self._remote.requests += requests
         try:
             return ask()
@@ -249,7 +258,7 @@ class _Again(Exception):
 class _Http:
     """Byte ranges over HTTP, on the session of fsspec's file system."""
 
-    def __init__(self, remote: Remote, system, shown: str):
+    def __init__(self, remote: Remote, system: FsspecObject, shown: str):
         self._remote, self._system, self._shown = remote, system, shown
         self._length: int | None = None
         self._tags: dict[str, str] = {}
@@ -265,6 +274,7 @@ class _Http:
         except BaseException:
             self.close()
             raise
+        assert self._length is not None  # The first answer has set it.
         return self._length
 
     def fetch(self, ranges: list[Range]) -> list[tuple[int, bytes]]:
@@ -323,7 +333,7 @@ class _Http:
         except (aiohttp.ClientError, ConnectionError) as error:
             raise _Again(f"the connection failed ({type(error).__name__}: {_one_line(error)})") from error
 
-    async def _answered(self, answer, offset: int, size: int) -> tuple[int, bytes]:
+    async def _answered(self, answer: aiohttp.ClientResponse, offset: int, size: int) -> tuple[int, bytes]:
         if answer.status == 206:
             return offset, await self._part(answer, offset, size)
         if answer.status == 200:
@@ -334,7 +344,7 @@ class _Http:
             raise _Again(f"the server answers {answer.status} {answer.reason}")
         raise self._refusal(f"the server answers {answer.status} {answer.reason}")
 
-    async def _part(self, answer, offset: int, size: int) -> bytes:
+    async def _part(self, answer: aiohttp.ClientResponse, offset: int, size: int) -> bytes:
         content_range = answer.headers.get("Content-Range", "nothing")
         match = _RANGE.fullmatch(content_range)
         if match is None or answer.headers.get("Content-Encoding", "identity") != "identity":
@@ -349,7 +359,7 @@ class _Http:
             raise self._refusal(f"got bytes {first} to {last}, expected {offset} to {min(offset + size, length) - 1}")
         return await self._body(answer, last + 1 - first)
 
-    async def _whole(self, answer) -> bytes:
+    async def _whole(self, answer: aiohttp.ClientResponse) -> bytes:
         """Return the server ignores ranges: what it sends is taken as a whole where it can be kept."""
         length = None if "Content-Encoding" in answer.headers else answer.content_length
         if length is not None and length > KEPT_BYTES:
@@ -361,7 +371,7 @@ class _Http:
         self._check_same(len(data), answer.headers)
         return data
 
-    def _nothing(self, answer) -> bytes:
+    def _nothing(self, answer: aiohttp.ClientResponse) -> bytes:
         """Raise for a range that begins behind the end, of an empty file or of one that has become shorter."""
         length = int(re.sub(r"\D", "", answer.headers.get("Content-Range", "")) or 0)
         if self._length is None and length > 0:
@@ -369,7 +379,7 @@ class _Http:
         self._check_same(length, answer.headers)
         return b""
 
-    async def _body(self, answer, expected: int | None) -> bytes:
+    async def _body(self, answer: aiohttp.ClientResponse, expected: int | None) -> bytes:
         most = KEPT_BYTES if expected is None else expected
         data = bytearray()
         async for piece in answer.content.iter_chunked(1 << 16):
@@ -381,12 +391,12 @@ class _Http:
             raise _Again(f"the connection ended after {len(data)} of {expected} bytes")
         return bytes(data)
 
-    def _check_same(self, length: int, headers) -> None:
+    def _check_same(self, length: int, headers: Mapping[str, str]) -> None:
         """Raise RemoteError if the file is not the one that was opened."""
         tags = {name: headers[name] for name in ("ETag", "Last-Modified") if name in headers}
         if self._length is None:
             self._length, self._tags = length, tags
-        pairs = [("a length", length, self._length)]
+        pairs: list[tuple[str, object, object]] = [("a length", length, self._length)]
         pairs += [(name, tags[name], self._tags[name]) for name in tags if name in self._tags]
         for name, got, expected in pairs:
             if got != expected:

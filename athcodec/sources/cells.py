@@ -175,7 +175,8 @@ def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
 
 
 def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
-    pairs, rows = [], []
+    pairs: list[np.ndarray] = []
+    rows: list[np.ndarray] = []
     for block in blocks:
         if block.kind == "line":
             pairs.append(block.nodes)
@@ -184,43 +185,49 @@ def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
             pairs.append(block.nodes[:, [0, 2, 2, 1]].reshape(-1, 2))
             rows.append(np.repeat(block.rows, 2))
         elif block.kind == "poly_line":
+            assert block.counts is not None  # Cells of these kinds differ in size.
             ends = np.cumsum(block.counts)
             pairs.append(np.delete(np.stack([block.nodes[:-1], block.nodes[1:]], axis=1), ends[:-1] - 1, axis=0))
             rows.append(np.repeat(block.rows, np.maximum(block.counts - 1, 0)))
     if pairs:
-        rows, pairs = np.concatenate(rows), np.concatenate(pairs)
-        order = np.argsort(rows, kind="stable")
-        topology.edges, topology.edge_rows = pairs[order].astype(np.int32), rows[order]
+        cells = np.concatenate(rows)
+        order = np.argsort(cells, kind="stable")
+        topology.edges, topology.edge_rows = np.concatenate(pairs)[order].astype(np.int32), cells[order]
 
 
 def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
-    counts, corners, rows = [], [], []
+    sizes_of_blocks: list[np.ndarray] = []
+    corners_of_blocks: list[np.ndarray] = []
+    rows: list[np.ndarray] = []
     for block in blocks:
         kind = base_kind(block.kind)
         if kind in _CORNERS:
             chosen = block.nodes[:, _CORNERS[kind]]
-            counts.append(np.full(len(chosen), chosen.shape[1]))
-            corners.append(chosen.reshape(-1))
+            sizes_of_blocks.append(np.full(len(chosen), chosen.shape[1]))
+            corners_of_blocks.append(chosen.reshape(-1))
             rows.append(block.rows)
         elif kind == "polygon":
-            counts.append(block.counts)
-            corners.append(block.nodes)
+            assert block.counts is not None  # Cells of these kinds differ in size.
+            sizes_of_blocks.append(block.counts)
+            corners_of_blocks.append(block.nodes)
             rows.append(block.rows)
         elif kind == "triangle_strip":
+            assert block.counts is not None  # Cells of these kinds differ in size.
             sizes = np.maximum(block.counts - 2, 0)
             places = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
             turned = places % 2  # Every second triangle of a strip has its corners the other way round.
             starts = places + np.repeat(np.cumsum(block.counts) - block.counts, sizes)
-            counts.append(np.full(len(starts), 3))
-            corners.append(
+            sizes_of_blocks.append(np.full(len(starts), 3))
+            corners_of_blocks.append(
                 block.nodes[np.stack([starts, starts + 1 + turned, starts + 2 - turned], axis=1).reshape(-1)]
             )
             rows.append(np.repeat(block.rows, sizes))
+    counts, corners = np.zeros(0, np.int64), np.zeros(0, np.int64)
     if rows:
-        rows, counts, corners = np.concatenate(rows), np.concatenate(counts), np.concatenate(corners)
-        order = np.argsort(rows, kind="stable")
-        corners = _in_order(counts, corners, order)
-        counts, topology.face_rows = counts[order], rows[order]
+        cells, counts = np.concatenate(rows), np.concatenate(sizes_of_blocks)
+        order = np.argsort(cells, kind="stable")
+        corners = _in_order(counts, np.concatenate(corners_of_blocks), order)
+        counts, topology.face_rows = counts[order], cells[order]
     volumes = [block for block in blocks if base_kind(block.kind) in _SIDES]
     if volumes:
         _keep_volumes(topology, volumes)
@@ -252,16 +259,16 @@ def _keep_volumes(topology: Topology, volumes: Sequence[Block]) -> None:
         topology.domains[name] = "constant"
 
 
-def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _outside(volumes: Sequence[Block], counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (counts, corners) of the sides that only one cell has and no face is yet, triangles first."""
     found_counts, found_corners = [], []
     for size in (3, 4):
-        sides = [
+        sides_of_blocks = [
             block.nodes[:, side] for block in volumes for side in _SIDES[base_kind(block.kind)] if len(side) == size
         ]
-        if not sides:
+        if not sides_of_blocks:
             continue
-        sides = np.concatenate(sides)
+        sides = np.concatenate(sides_of_blocks)
         faces = _faces_of_size(counts, corners, size)
         keys = np.sort(np.concatenate([sides, faces]), axis=1)
         _, number, often = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
@@ -272,7 +279,6 @@ def _outside(volumes: Sequence[Block], counts: Sequence[int], corners: Sequence[
     return np.concatenate([none, *found_counts]), np.concatenate([none, *found_corners])
 
 
-def _faces_of_size(counts: Sequence[int], corners: Sequence[int], size: int) -> np.ndarray:
-    counts, corners = np.asarray(counts, np.int64), np.asarray(corners, np.int64)
+def _faces_of_size(counts: np.ndarray, corners: np.ndarray, size: int) -> np.ndarray:
     starts = (np.cumsum(counts) - counts)[counts == size]
     return corners[starts[:, None] + np.arange(size)] if len(starts) else np.zeros((0, size), np.int64)

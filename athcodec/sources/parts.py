@@ -30,10 +30,14 @@ class Part(Protocol):
     elsewhere   names of the data of the first step that are neither per point nor per cell, and what they are per
     """
 
-    name: str
-    blocks: Sequence[Block]
-    cell_count: int
-    elsewhere: Mapping[str, str]
+    @property
+    def name(self) -> str: ...
+    @property
+    def blocks(self) -> Sequence[Block]: ...
+    @property
+    def cell_count(self) -> int: ...
+    @property
+    def elsewhere(self) -> Mapping[str, str]: ...
 
     def points(self, step: int) -> np.ndarray:
         """Return (N, 2) or (N, 3) points."""

@@ -225,7 +225,7 @@ class _Scene:
                 raise ClipError(f"Time: got {numbers[2]:g} times, expected {count}, one per grid")
             return numbers[0] + numbers[1] * np.arange(count)
         if kind == "range" and len(numbers) == 2 and count > 1:
-            return np.linspace(*numbers, count)
+            return np.linspace(numbers[0], numbers[1], count)
         if len(numbers) != count:
             raise ClipError(f"Time: got {len(numbers)} times, expected {count}, one per grid")
         return numbers
@@ -343,7 +343,11 @@ class _Selection:
         """Return whether two series are of one mesh, of different grids at the top, at the same times."""
         if one.families & other.families or len(one.steps) != len(other.steps):
             return False
-        if (one.times is None) != (other.times is None) or not np.array_equal(one.times, other.times):
+        if one.times is None or other.times is None:
+            is_at_same_times = one.times is other.times
+        else:
+            is_at_same_times = np.array_equal(one.times, other.times)
+        if not is_at_same_times:
             return False
         return self._same_mesh(one, other)
 
@@ -359,7 +363,11 @@ class _Selection:
             parts = [_Part(self._scene.items, track, None) for track in (one, other)]
             points = [part.points(0) for part in parts]
             blocks = [part.blocks for part in parts]
-            return np.array_equal(*points) and len(blocks[0]) == len(blocks[1]) and all(map(same_block, *blocks))
+            return (
+                np.array_equal(points[0], points[1])
+                and len(blocks[0]) == len(blocks[1])
+                and all(map(same_block, *blocks))
+            )
         return False
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:

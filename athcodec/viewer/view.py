@@ -15,10 +15,10 @@ import os
 import re
 import secrets
 import webbrowser
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlsplit
 
 from athcodec.decoding.decoder import Decoder
@@ -28,6 +28,11 @@ from athcodec.files.atomic import check_target, file_ids, is_url, keeping, new_f
 from athcodec.files.plain import FilePath
 from athcodec.opening import open as open_ath
 from athcodec.viewer.still import still_svg
+
+if TYPE_CHECKING:
+    from aiohttp import web
+
+    Answer = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 WEB = Path(__file__).parent / "web"
 PAGE = WEB / "index.html"
@@ -183,7 +188,7 @@ def self_contained(
             '<script type="module">import "viewer";</script>\n</body>',
         ),
     ):
-        text = re.sub(old, lambda _, new=new: new, text, flags=re.DOTALL)
+        text = re.sub(old, new.replace("\\", r"\\"), text, flags=re.DOTALL)
     return text
 
 
@@ -261,7 +266,7 @@ def serve(
         try:
             site = web.TCPSite(runner, "127.0.0.1", port)
             await site.start()
-            address = f"http://127.0.0.1:{site._server.sockets[0].getsockname()[1]}"
+            address = f"http://127.0.0.1:{runner.addresses[0][1]}"
             more = ("" if clip is None else f"&clip={quote(clip, safe='')}") + (
                 "" if mesh is None else f"&mesh={quote(place)}.mesh"
             )
@@ -289,16 +294,18 @@ def _refuse_other_urls(path: FilePath) -> None:
         raise AthError(f"{path}: got {scheme}://, expected http:// or https://; --export PAGE reads others")
 
 
-def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None = None, still: str | None = None):
-    """Yield the aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which
+def application(
+    path: FilePath, place: str, beside: Mapping[str, bytes] | None = None, still: str | None = None
+) -> web.Application:
+    """Return the aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which
     only the page's address tells; at other such places what goes with it, such as the host's mesh. still: an SVG of the
     plant, for browsers that run no scripts."""
     from aiohttp import ClientSession, web
 
-    def part(data, name):
+    def part(data: bytes, name: str) -> Answer:
         packed = gzip.compress(data, mtime=0)
 
-        async def answer(request):
+        async def answer(request: web.Request) -> web.StreamResponse:
             takes = "gzip" in request.headers.get("Accept-Encoding", "")
             headers = {"Content-Type": TYPES[Path(name).suffix], "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
             return web.Response(
@@ -307,16 +314,16 @@ def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None =
 
         return answer
 
-    def at_once(data):
-        async def answer(request):
+    def at_once(data: bytes) -> Answer:
+        async def answer(request: web.Request) -> web.StreamResponse:
             return web.Response(body=data, content_type="application/octet-stream")
 
         return answer
 
-    async def local(request):
+    async def local(request: web.Request) -> web.StreamResponse:
         return web.FileResponse(path, headers={"Content-Type": "application/octet-stream", "Cache-Control": "no-cache"})
 
-    async def remote(request):
+    async def remote(request: web.Request) -> web.StreamResponse:
         asked = {name: request.headers[name] for name in ("Range",) if name in request.headers}
         async with request.app[session].get(os.fspath(path), headers=asked) as answer:
             passed = {name: answer.headers[name] for name in PASSED_ON if name in answer.headers}
@@ -326,7 +333,7 @@ def application(path: FilePath, place: str, beside: Mapping[str, bytes] | None =
                 await response.write(piece)
             return response
 
-    async def client(app):
+    async def client(app: web.Application) -> AsyncIterator[None]:
         app[session] = ClientSession(auto_decompress=False, headers={"Accept-Encoding": "identity"})
         yield
         await app[session].close()
