@@ -343,9 +343,9 @@ def test_the_frames_of_a_segment_in_turn_read_and_decode_it_once(played, monkeyp
     prepared = []
     prepare = core_file.File.prepare
 
-    def counted(file, work, segment, level, *memory):
+    def counted(file, work, segment, level, *memory, **options):
         prepared.append((segment, level))
-        prepare(file, work, segment, level, *memory)
+        prepare(file, work, segment, level, *memory, **options)
 
     monkeypatch.setattr(core_file.File, "prepare", counted)
     (first, stop), last = decoder.segments[1], decoder.file.level_count - 1

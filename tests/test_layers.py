@@ -9,10 +9,12 @@ import pytest
 from plants import chain_plant, plant
 
 import athcodec
-from athcodec import Thresholds
+from athcodec import Thresholds, encoding
 from athcodec.decoding import container as ct
+from athcodec.encoding import decisions
 from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.segments.layers import layer_ratios
+from athcodec.encoding.segments.levels import MOST_JERK, SourceFrames
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)
@@ -377,3 +379,22 @@ def test_no_part_of_a_slow_plant_twitches_at_a_level_of_the_default_ladder():
     named = athcodec.encode(clip, rel_error=1e-4, effort="fast", ladder=(1e-2, 1e-3))
     with athcodec.open(BytesIO(named)) as decoder:
         assert decoder.levels[1].max_error <= 1e-2 * diagonal
+
+
+def test_layers_are_finer_where_too_few_coarse_ones_move_as_smoothly_as_the_source(monkeypatch, tmp_path):
+    """Such as in a calm between gusts. What jerks here is any stage that strays by more than 8e-4 of the diagonal."""
+    clip, flaws = plant(seed=4, branches=12, longest=9, frames=40), SourceFrames.flaws
+    rough = 8e-4 * float(np.linalg.norm(np.ptp(clip.rest, axis=0)))
+
+    def rougher(source, decoded, before, away=np.inf):
+        outside, jerk = flaws(source, decoded, before, away)
+        return outside, 2 * MOST_JERK if away > rough else jerk
+
+    monkeypatch.setattr(SourceFrames, "flaws", rougher)
+    usual = athcodec.encode(clip, rel_error=1e-4)
+    monkeypatch.setattr(decisions, "LEVELS_BYTES", 0)
+    finer, made = athcodec.encode(clip, rel_error=1e-4), encoding.draft(clip, rel_error=1e-4)
+    with athcodec.open(usual) as before, athcodec.open(finer) as after:
+        assert len(before.levels) < len(after.levels)
+    coded = encoding.code_segments(clip, made, range(made.segment_count))
+    assert encoding.write(clip, made, coded, tmp_path / "parts.ath").path.read_bytes() == finer

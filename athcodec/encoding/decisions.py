@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from athcodec.decoding import container as ct
 from athcodec.encoding.assembly.assembly import FileAssembly
-from athcodec.encoding.assembly.decided import Decided, Draft
+from athcodec.encoding.assembly.decided import CodedSegment, Decided, Draft
 from athcodec.encoding.assembly.segment_coding import SegmentCoder
 from athcodec.encoding.clip.coded_clip import CodedClip
 from athcodec.encoding.clip.survey import Ath, Survey
@@ -60,6 +60,9 @@ PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted
 REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smallest bound that can be kept.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
+FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
+LEAST_LEVELS = 3  # Levels that files have,
+LEVELS_BYTES = 20_000  # from so many bytes on, if finer layers make them.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 
 
@@ -158,9 +161,37 @@ class FileDecisions:
             if len(decided.layers.each) == 1:
                 options = dataclasses.replace(options, ladder=())
             decided = dataclasses.replace(holding, options=options)._of_choice(choice, decided.ath.thresholds)
+        decided = holding._with_levels(decided)
         untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
         decided.choice = dataclasses.replace(decided.choice, untried=untried)
         return decided
+
+    def _with_levels(self, decided: Decided) -> Decided:
+        """Return what is decided with finer layers where motion moves less smoothly in coarse ones than in the source,
+        as in calms between gusts, so that too few stages are fit for levels."""
+        if not self._has_usual_ladder or len(decided.layers.each) == 1 or self._estimated_bytes(decided) < LEVELS_BYTES:
+            return decided
+        options = dataclasses.replace(self.options, segment_frames=decided.source.segment_frames)
+        decisions, most = dataclasses.replace(self, options=options), self._level_count(decided)
+        best, choice = decided, decided.choice
+        for part in FINER_LADDERS:
+            if most >= LEAST_LEVELS:
+                break
+            finer = dataclasses.replace(choice, ladder=tuple(part * error for error in options.ladder))
+            other = decisions._of_choice(finer, decided.ath.thresholds)
+            count = self._level_count(other)
+            best, most = (other, count) if count > most else (best, most)
+        return best
+
+    def _level_count(self, decided: Decided) -> int:
+        """Return the number of levels of a file, as far as typical segments tell."""
+        coded = [self._tried_segment(decided, segment) for segment, _ in typical_segments(decided.source)]
+        return len(FileAssembly(decided, self.options).levels_of(coded))
+
+    def _tried_segment(self, decided: Decided, segment: int) -> CodedSegment:
+        if segment not in decided.tried:
+            decided.tried[segment] = SegmentCoder(decided, self.options).one(segment)
+        return decided.tried[segment]
 
     def _split(self, bound: float, thresholds: Thresholds) -> SplitSource | None:
         """Return what moves and what stands still, each as a source; None: one of them is missing. What stands still
@@ -187,7 +218,7 @@ class FileDecisions:
 
     def _decide(self, bound: float, work: Work) -> Decided:
         ath = self.seen.ath(self.thresholds(bound))
-        ratios = self._layer_ratios(ath, bound)
+        ratios = self._layer_ratios(ath, bound, self.options.ladder)
         ratio = ratios[0]
         if self.source.still:
             choice = still_choice(self.source, ath, bound, ratio)
@@ -308,33 +339,28 @@ class FileDecisions:
         """Return the bytes of the motion of a file whose segments are like typical ones."""
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(decided.source):
-            if segment not in decided.tried:
-                decided.tried[segment] = SegmentCoder(decided, self.options).one(segment)
-            coded = decided.tried[segment]
+            coded = self._tried_segment(decided, segment)
             lossy = [data for (_, kind), data in coded.chunks.items() if kind != ct.EXACT]
             front = CHUNK_BYTES * len(lossy) + LEVEL_BYTES * len(coded.errors)
             total += (front + sum(map(len, lossy))) * frames / decided.source.frames_of(segment)
         return total
 
-    def _layer_ratios(self, ath: Ath, bound: float) -> list[int]:
+    def _layer_ratios(self, ath: Ath, bound: float, ladder: Sequence[float]) -> list[int]:
         """Return the ratios of as many of the last layers as there is room for behind the stages of the hierarchy. A
         still clip has one layer: a rest pose in layers takes up to two thirds more."""
         if self.source.still:
             return [1]
-        ratios = layer_ratios(self.options.ladder, bound, self.seen.diagonal, self._step_factors(bound))
+        ratios = layer_ratios(ladder, bound, self.seen.diagonal, step_factors(self.source, ladder, bound))
         return ratios[-min(MOST_LAYERS, MOST_LEVELS - ath.height - 1 - self.options.lossless) :]
 
     @property
     def _has_usual_ladder(self) -> bool:
         return self.options.ladder == LADDERS[DEFAULT_LADDER]
 
-    def _step_factors(self, bound: float) -> tuple[float, float]:
-        return step_factors(self.source, self.options.ladder, bound)
-
     def _layered(self, ath: Ath, choice: Choice, prelude: CodedPrelude) -> Decided:
         source = self.source.about(choice.reference)
-        bound = choice.settings.bound
-        ratios, factors = self._layer_ratios(ath, bound), self._step_factors(bound)
+        bound, ladder = choice.settings.bound, self.options.ladder if choice.ladder is None else choice.ladder
+        ratios, factors = self._layer_ratios(ath, bound, ladder), step_factors(self.source, ladder, bound)
         layers = layers_of(source, prelude, choice, ratios, factors, hold_errors=not self._has_usual_ladder)
         return Decided(ath, choice, prelude, layers, source)
 

@@ -233,10 +233,20 @@ class FileAssembly:
         if missing:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         frames = [[stop - start for start, stop in clip] for clip in decided.source.clip_range_segments]
-        first_held = decided.layers.stage_0.stage_count - 1
-        shown = chosen_levels(errors, frames, flaws, decided.source.seen.diagonal, self.options.lossless, first_held)
+        shown = self._chosen_levels(errors, frames, flaws)
         store.leave_out(lambda chunk: not decided.layers.stage_0.serves(chunk.kind, chunk.stage, shown))
         return errors[shown], joins[shown], shown
+
+    def levels_of(self, coded: Sequence[CodedSegment]) -> list[int]:
+        """Return which stages become levels, as far as some of the segments tell."""
+        errors, flaws = (np.stack([getattr(one, name) for one in coded], axis=1) for name in ("errors", "flaws"))
+        frames = [self.decided.source.segments[one.index] for one in coded]
+        return self._chosen_levels(errors, [[stop - start for start, stop in frames]], flaws)
+
+    def _chosen_levels(self, errors: np.ndarray, frames: Sequence[Sequence[int]], flaws: np.ndarray) -> list[int]:
+        """Return which stages become levels; frames: of each segment of each clip."""
+        first_held, diagonal = self.decided.layers.stage_0.stage_count - 1, self.decided.source.seen.diagonal
+        return chosen_levels(errors, frames, flaws, diagonal, self.options.lossless, first_held)
 
     def _summary(self, path: Path | None, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:
         decided = self.decided

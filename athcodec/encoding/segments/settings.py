@@ -146,4 +146,5 @@ class Choice:
     reference: np.ndarray | None = None  # (N, 3) pose that motion is coded about, less the origin; None: the rest pose.
     predicted: bool = False  # Whether motion is predicted.
     error_share: float = 1.0  # Share of the limits that the errors of predicted motion may take.
+    ladder: tuple[float, ...] | None = None  # Errors of layers before the last, over the diagonal; None: the options'.
     untried: tuple[str, ...] = ()  # What was left out of the search for these, in words.
