@@ -33,11 +33,11 @@ smallest file of the other codecs, each tuned for the bound, over ours; bold whe
 of a grid, differences in time and along the vertices, zstd at level 19. Processor: seconds of all threads that
 encoding all arrays takes, without other processes that read the source, and that the best other took at this bound
 with its search. Levels: largest ratio of a level's error to that of the level before, of the largest error and of the
-RMS, and ticks: largest second difference over frames near a seam between segments, or a loop's, over that of the
-median frame, at the level where it is largest, with the source's in the same frames; both of the file at 1e-4 in the
-default layers. Commits: those that measured ours / the best others. Side information: where the source names no
-branches, codecs that learn from branches or order vertices by them were given those that athcodec finds, and the time
-for that was not counted; none was given faces.
+RMS. Ticks: largest second difference over frames near a seam, where segments meet or a loop begins again, over that of
+the median frame. It is given at the level where it is largest, with the source's in the same frames. Levels and ticks
+are those of the file at 1e-4 in the default layers. Commits: those that measured ours / the best others. Side
+information: where the source names no branches, codecs that learn from branches or order vertices by them were given
+those that athcodec finds, and the time for that was not counted; none was given faces.
 """
 OVERVIEW = {
     "sample": "finite-element tree in wind, the sample",
@@ -58,9 +58,9 @@ OVERVIEW_CAPTION = """
 Bytes of files within 1e-4 of the diagonal of the bounding box of all frames. *Its file* is the source as its program
 wrote it. *With all arrays* is `athcodec encode SOURCE` at its default options: faces, names, levels of detail, and a
 rest pose in which faces keep their shape. *Positions* is `--attributes none --rest-error bound --ladder none`, which
-is all that the other codecs keep. *Best other* is the smallest file of SZ3, Blosc2, zfp, meshoptimizer, four kinds of
-PCA, skeletal tracks, and differences with zstd, each tuned for the clip, and how many times as large as *positions* it
-is. Commits that measured athcodec / the best others: {} / {}{}.
+is all that the other codecs keep. *Best other* is the smallest file of the other codecs, and how many times as large as
+*positions* it is. The other codecs are SZ3, Blosc2, zfp, meshoptimizer, four kinds of PCA, skeletal tracks, and
+differences with zstd, each tuned for the clip. Commits that measured athcodec / the best others: {} / {}{}.
 """
 
 

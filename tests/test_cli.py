@@ -563,7 +563,9 @@ def test_a_unit_without_one_in_the_clip_is_an_error(tmp_path, capsys):
     with h5py.File(source, "a") as file:
         del file.attrs["unit"]
     assert run("encode", source, tmp_path / "a.ath", "--max-error", "1mm") == 1
-    assert "got 1mm for a clip without a unit" in capsys.readouterr().err
+    refused = capsys.readouterr().err
+    assert "got 1mm for a clip without a unit" in refused and "--unit m" in refused
+    assert run("encode", source, tmp_path / "a.ath", "--max-error", "1mm", "--unit", "m", "--effort", "fast") == 0
     assert run("encode", source, tmp_path / "a.ath", "--max-error", "0.1", "--effort", "fast") == 0
 
 

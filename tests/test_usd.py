@@ -313,7 +313,7 @@ def test_copies_are_written_as_instances_again(tmp_path, capsys):
     kinds = [prim.GetTypeName() for prim in stage.Traverse()]
     assert kinds.count("PointInstancer") == 2 and complaints(tmp_path / "b.usda") == []
     assert cli.main(["decode", str(tmp_path / "a.ath"), str(tmp_path / "c.usdc"), "--instances"]) == 0
-    assert "As instances that is off the level by up to" in capsys.readouterr().out
+    assert "Written as instances, the motion is off this level by up to" in capsys.readouterr().out
     with athcodec.open(tmp_path / "a.ath") as decoder, athcodec.read(tmp_path / "c.usdc") as again:
         off = np.linalg.norm(again.block(0, 10).astype(float) - decoder.positions(slice(0, 10)), axis=2).max()
         assert again.attributes["part_copies"].tolist() == [1, 20, 20] and off <= 1.01 * decoder.file.max_error_bound

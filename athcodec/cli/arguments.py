@@ -32,10 +32,10 @@ DEMO_FLOOR = {"fern": 4.0, "grass": 9.0}
 """Samples on the floor of the demo's forest, and how many of each around a tree."""
 
 SHELLS = ("bash", "zsh", "tcsh")
-WORDS = "The words that are printed: docs/command-line.md#words."
+WORDS = "docs/command-line.md#words explains the words that it prints."
 TRACEBACK = "show the traceback of an error"
 WRITTEN = (
-    "file to write, which replaces an older one of its kind when it is complete, and never an input or any other file; "
+    "file to write; once complete it replaces an older file of its kind, but never an input or any other file; "
     "- is standard output, with encode and decode"
 )
 READ = 'a file or a URL, http://, https:// or another that fsspec knows (pip install "athcodec[remote]")'
@@ -107,8 +107,7 @@ def make_parser() -> argparse.ArgumentParser:
         verb(
             "encode",
             "compress a motion into an .ath file",
-            "Without --max-error, --rel-error and --target-size it is --rel-error "
-            f"{DEFAULT_REL_ERROR:g}, with --lossless {LOSSLESS_REL_ERROR:g}.",
+            f"The error bound is --rel-error {DEFAULT_REL_ERROR:g} by default, with --lossless {LOSSLESS_REL_ERROR:g}.",
         )
     )
     _batch_arguments(
@@ -116,7 +115,7 @@ def make_parser() -> argparse.ArgumentParser:
             "batch",
             "compress many motions, by several processes",
             "An interrupted run goes on where it ended when the command is given again. "
-            "Exit code 1 where a clip failed; the others are done all the same.",
+            "Exit code 1 if a clip failed; the others are done all the same.",
         )
     )
     _decode_arguments(
@@ -131,7 +130,7 @@ def make_parser() -> argparse.ArgumentParser:
         verb(
             "verify",
             "check that an .ath file is whole and undamaged, and how far off its source it is",
-            f"Exit code 1 where a checksum fails, the file is cut off, or a level is further off than it says. {WORDS}",
+            f"Exit code 1 if a checksum fails, the file is cut off, or a level is further off than it says. {WORDS}",
         )
     )
     _truncate_arguments(verb("truncate", "leave out the levels beyond one, without decoding"))
@@ -312,7 +311,7 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="LENGTH",
         type=_argument(_positive_length),
         help="largest distance of any vertex in any frame from the source: in scene units, or 1mm, 0.5cm, "
-        f"2in ({', '.join(METRES)}) where the clip says its unit",
+        f"2in ({', '.join(METRES)}) if the clip states its unit, or --unit does",
     )
     bound.add_argument(
         "--rel-error",
@@ -325,15 +324,15 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
         "--target-size",
         metavar="SIZE",
         type=_argument(parse_size),
-        help="largest size of the file, which gets the smallest error that fits: bytes, 50kB, 1.5MB (1 kB = 1,000 "
+        help="largest size of the file, whose error is the smallest that fits: bytes, 50kB, 1.5MB (1 kB = 1,000 "
         "bytes), 48KiB",
     )
     verb.add_argument(
         "--segment-frames",
         metavar="FRAMES",
         type=_argument(_segment_frames),
-        help=f"longest segment, {MIN_SEGMENT} to {MAX_SEGMENT} frames (default {MAX_SEGMENT}, of large "
-        f"plants {DEFAULT_SEGMENT}, or shorter if the file is smaller); what is decoded at once, so shorter ones seek "
+        help=f"longest segment, a run of frames that is decoded at once: {MIN_SEGMENT} to {MAX_SEGMENT} (default "
+        f"{MAX_SEGMENT}, for large plants {DEFAULT_SEGMENT}, or shorter if the file is smaller); shorter ones seek "
         "faster and mostly make larger files",
     )
     verb.add_argument(
@@ -415,7 +414,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         metavar="RATE",
         type=_argument(_rate),
         help="frames per second, a number or a fraction such as 24000/1001: the rate at which curves "
-        "are sampled, or that of a source that does not say its own",
+        "are sampled, or the rate of a source that states none",
     )
     source.add_argument("--mesh", metavar="FILE", help="the mesh of a point cache: OBJ, PLY or GLB")
     source.add_argument("--field", metavar="NAME", help="name of the displacement in a finite-element result")
@@ -439,13 +438,13 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
         "--takes",
         metavar="NAME,...",
         type=_argument(_names),
-        help="read these animations of a glTF file, each as a clip of its own; all: every one "
+        help="read these animations of a glTF file, each as a clip; all: every one "
         "(default: the one that players begin with)",
     )
     source.add_argument(
         "--allow-outside",
         action="store_true",
-        help="let XDMF, VTK, .series, HDF5 and USD files name files outside of their own folder",
+        help="let XDMF, VTK, .series, HDF5 and USD files name files outside their folder",
     )
     source.add_argument(
         "--max-memory",
@@ -479,8 +478,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--onto",
         metavar="MESH",
-        help="write this mesh, a file of any format that is read, moved as the plant moves: its rest pose, or else its "
-        "first frame, is the plant's rest pose; it keeps its faces and attributes",
+        help="move this mesh as the plant moves, and write it: a file of any format that is read, whose rest pose, or "
+        "else first frame, lies on the plant's rest pose; it keeps its faces and attributes",
     )
     verb.add_argument(
         "--onto-frame",
@@ -507,7 +506,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     )
     _host_mesh_argument(verb)
     _gltf_motion_argument(
-        verb, "of a GLB with several motions (ATH_motion), the one of this name; to a GLB, by default, all"
+        verb, "name of the motion to decode, in a GLB with several (ATH_motion); to a GLB the default is all"
     )
     _stats_argument(verb)
     shown = verb.add_mutually_exclusive_group()
@@ -545,8 +544,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
         nargs="?",
         type=_argument(_jobs),
         const=RIG_JOINTS,
-        help="write a skeleton for engines to USD or glTF, with so many joints at most (default %(const)s), and say "
-        "how far off it is",
+        help="write a skeleton for engines to USD or glTF, with at most this many joints (default %(const)s), and "
+        "print its error",
     )
     verb.add_argument(
         "--nanite",
@@ -557,8 +556,8 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--instances",
         action="store_true",
-        help="write copies of one shape, such as leaves of an instancer, to USD, Alembic or glTF as instances, where "
-        "that is off by no more than the level is",
+        help="write copies of one shape, such as leaves of an instancer, to USD, Alembic or glTF as instances, if "
+        "their error is no larger than the level's",
     )
     verb.add_argument(
         "--velocities",
@@ -585,19 +584,19 @@ def _host_mesh_argument(verb: argparse.ArgumentParser, more: str = "") -> None:
     verb.add_argument(
         "--host-mesh",
         metavar="FILE",
-        help="the mesh that the file was made for, of a file without a rest pose (encode --rest host): its source, or "
-        f"a file of any format that is read, with the same vertices in their order{more}",
+        help="the mesh of a file without a rest pose (encode --rest host): the file's source, or a file of any format "
+        f"that is read, with the same vertices in the same order{more}",
     )
 
 
 def _gltf_motion_argument(
-    verb: argparse.ArgumentParser, text: str = "of a GLB with several motions (ATH_motion), the one of this name"
+    verb: argparse.ArgumentParser, text: str = "name of the motion to use, in a GLB with several (ATH_motion)"
 ) -> None:
     verb.add_argument("--gltf-motion", metavar="NAME", help=text)
 
 
 def _stats_argument(verb: argparse.ArgumentParser) -> None:
-    verb.add_argument("--stats", action="store_true", help="say on stderr how many requests and bytes it took")
+    verb.add_argument("--stats", action="store_true", help="print on stderr how many requests and bytes were needed")
 
 
 def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
@@ -624,10 +623,10 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--motion",
         action="store_true",
-        help="decode every level as well, and say how much more it jerks near the seams between segments, and "
-        "near that of a loop, than in its median frame",
+        help="decode every level as well, and print how much more it jerks near seams, where segments meet or a "
+        "loop begins again, than in its median frame",
     )
-    _host_mesh_argument(verb, ", which --motion takes")
+    _host_mesh_argument(verb, "; --motion needs it")
     _gltf_motion_argument(verb)
     _stats_argument(verb)
 

@@ -121,7 +121,7 @@ def print_written(facts: JsonObject) -> None:
     if "max_error" in facts:
         how += f" and {counted(instances, 'instance')}" if instances and how in ("joints", "morphs") else ""
         unit = f" {facts['unit']}" if facts["unit"] else ""
-        echo(f"As {how} that is off the level by up to {facts['max_error']:.3g}{unit}.")
+        echo(f"Written as {how}, the motion is off this level by up to {facts['max_error']:.3g}{unit}.")
 
 
 def print_verdict(result: JsonObject) -> None:

@@ -98,7 +98,7 @@ def _rest(facts: JsonObject) -> str:
     if facts["host_mesh"]:
         vertices = counted(facts["vertices"], "vertex", "vertices")
         return f"a mesh of {vertices} that the host has, checksum {facts['host_mesh']['checksum']}"
-    return f"{facts['rest_bytes']:,} bytes of these"
+    return f"{facts['rest_bytes']:,} of these bytes"
 
 
 def _clips(facts: JsonObject) -> Table:

@@ -87,7 +87,8 @@ class Length:
             return self.value
         if scene_unit in (None, ""):
             raise BoundError(
-                f"length: got {self} for a clip without a unit, expected a plain number, or a clip that states its unit"
+                f"length: got {self} for a clip without a unit, expected a plain number, or a clip that states its "
+                'unit; --unit m (unit="m") states metres'
             )
         metres = scene_unit if isinstance(scene_unit, float) else METRES.get(unit_symbol(scene_unit))
         if metres is None:
