@@ -162,7 +162,8 @@ def bones(path: Path, mesh: athcodec.MotionClip) -> athcodec.MotionClip:
 
 
 def measured(case: Case, rel_error: float) -> dict[str, Any]:
-    """Return the row of a case."""
+    """Return the row of the table for a case: bytes of the skeleton's file and of the mesh's, how far the mesh that the
+    skeleton drives is from its motion, and how much its edges stretch."""
     from time import perf_counter
 
     with tempfile.TemporaryDirectory() as folder:

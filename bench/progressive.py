@@ -124,6 +124,7 @@ def _ratios(prefixes: list[dict[str, Any]], curve: Curve) -> Iterator[float]:
 
 
 def _at(error: float, kind: str, prefixes: list[dict[str, Any]], curve: Curve) -> tuple[dict[str, Any], float] | None:
-    """Return the shortest prefix of at most this error, and the size of a file of its own of this error."""
+    """Return the shortest prefix whose error is at most `error`, and the size of a file that is encoded at that error;
+    None where either is missing."""
     prefix, size = next((row for row in prefixes if row[kind] <= error), None), curve.size_at(error)
     return (prefix, size) if prefix and size else None

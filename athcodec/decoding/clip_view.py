@@ -91,7 +91,7 @@ class ClipView:
 
     @property
     def clip_ranges(self) -> tuple[ClipRange, ...]:
-        """The clips. Frames of a loop are only a loop if they are all of it."""
+        """The clips. One that loops does not loop here if only some of its frames are shown."""
         return tuple(
             ClipRange(decoder.clip.name, len(frames), decoder.clip.loop and len(frames) == decoder.frame_count)
             for decoder, frames in self._runs

@@ -135,7 +135,8 @@ class FileBytes:
         return NotAnAthFile(message, python=f"athcodec.encode({names}) makes one", shell="use `athcodec encode` first")
 
     def refusal(self, error: core_file.CoreError) -> FormatError:
-        """Return the exception for an error of the core. A bad checksum may be that of a remote file that changed."""
+        """Return the exception for an error of the core. It says so if a checksum is bad because a remote file was
+        changed since it was opened."""
         refused = Truncated if error.code == core_file.MISSING else error_class(error.code)
         if refused is NotAnAthFile:
             return self._no_ath_file()

@@ -229,7 +229,8 @@ def _decided(
 
 
 def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
-    """Return whether two efforts are compared. A target size is met by both."""
+    """Return whether a clip is encoded at the usual effort, too, and the smaller file kept. With a target size both
+    files would be of that size."""
     return options.effort == "best" and option.target_size is None
 
 

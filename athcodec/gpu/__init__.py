@@ -119,9 +119,9 @@ class GpuFile:
 
 
 def corners_of(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Return the corners that vertices.wgsl takes normals from, uint32: where the corners of each vertex begin, and
-    one behind the last; then the two other corners of each triangle at a vertex, in the order of its turn. triangles:
-    (F, 3), file order."""
+    """Return what vertices.wgsl takes normals from, uint32: for each vertex where its pairs begin in this array, and
+    where the last end, (N + 1,); then the pairs, the two other vertices of each triangle at a vertex, counter-clockwise
+    like the triangle. triangles: (F, 3), file order."""
     turns = np.concatenate([np.roll(triangles, -turn, axis=1) for turn in range(3)]).astype(np.uint32)
     turns = turns[np.argsort(turns[:, 0], kind="stable")]
     first = np.searchsorted(turns[:, 0], np.arange(vertex_count + 1))

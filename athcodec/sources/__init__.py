@@ -415,7 +415,7 @@ def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], conte
 
 
 def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
-    """Warn if the suffix of a format of another package is that of further ones, too."""
+    """Warn if the format chosen for a suffix comes from another package, and others have that suffix, too."""
     name = Path(path).name.lower()
     if chosen.package and (same := [other for other in others if other.ends(name)]):
         names = " and ".join(f"{other.name} of {other.package}" for other in same)

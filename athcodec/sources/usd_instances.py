@@ -143,7 +143,8 @@ class Instances:
         return inner @ self.all.places(frame)[self.rows] @ world
 
     def add_arrays(self, obj: PrimObject, codes: np.ndarray) -> None:
-        """Add the static arrays that the instancer has for each of its copies."""
+        """Add to `obj` the arrays of the instancer that have a value for each copy and do not change over `codes`, the
+        times that are read; name those that do."""
         obj.left_out += unread_properties(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), numbers_of(value_at(primvar, codes[0]))

@@ -193,7 +193,8 @@ def self_contained(
 
 
 def _module(file: str) -> str:
-    """Return a module of the page, which names others as the import map of an exported page does."""
+    """Return the text of a module of the page. It imports other modules by the names in the import map of an exported
+    page, not by their files."""
     return _BESIDE.sub(r'\1"\2"', (WEB / file).read_text("utf-8"))
 
 

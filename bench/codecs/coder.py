@@ -330,7 +330,8 @@ class Reader:
         return np.unpackbits(np.frombuffer(self.take(-(-count // 8)), np.uint8), count=count)
 
     def pose(self, branches: np.ndarray, step: float) -> np.ndarray:
-        """Set the lags of the branches."""
+        """Read the lags of branches into `branches`, records of BRANCH, and return their rest pose, (N, 3) float64,
+        whose quantisation step is `step`."""
         branches["lag"] = self.table()[0]
         pose, stream = np.zeros((int(branches["count"].sum()), 3)), self.take(self.count())
         _read("bench_pose", stream, branches.ctypes.data, len(branches), step, pose.ctypes.data)

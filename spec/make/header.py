@@ -59,7 +59,8 @@ def of_memory(vertices: int) -> Draft:
 
 
 def of_range(max_error: int) -> Draft:
-    """Return a draft whose counts make the range 2^38 + 56, and whose first fault behind the front is a checksum."""
+    """Return a draft that tells whether a decoder takes counts whose product is just beyond 38 bits, 2^38 + 56: it then
+    meets a bad checksum, the first fault behind the front."""
     clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
     return (
         lone()

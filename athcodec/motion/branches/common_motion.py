@@ -69,8 +69,8 @@ def _fit(rest: np.ndarray, poses: np.ndarray, weight: np.ndarray) -> tuple[np.nd
 
 
 def _steady(frames: np.ndarray, most: float) -> np.ndarray | None:
-    """Return weights, (N,), of the most vertices that keep their distances to one of them, within `most`; None where
-    these are few, or along a line, as on a stiff branch."""
+    """Return weights, (N,), of the largest set of vertices that keep their distances to one of them, within `most`;
+    None where the set is small, or lies along a line, as on a stiff branch, and so tells no rotation."""
     count = frames.shape[1]
     some = np.arange(0, count, max(1, count // PAIRED))
     least, largest = np.full((2, len(some), count), np.inf)
