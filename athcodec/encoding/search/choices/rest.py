@@ -103,8 +103,8 @@ def best_slack(settings: Settings, trials: Trials) -> Settings:
 
 
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
-    """Return settings whose stems have other lags (FORMAT.md, Lag): at most 1, at least 1, 1 for all, or for short stems
-    as many as they have vertices, so that each is coded about the one before it."""
+    """Return settings whose stems have other lags (FORMAT.md, Lag): at most 1, at least 1, 1 for all, or for short
+    stems as many as they have vertices, so that each is coded about the one before it."""
     if Feature.ADAPTIVE in source.without:
         return []
     best, count = settings.lags, source.hierarchy.stem_count
