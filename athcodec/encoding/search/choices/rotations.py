@@ -136,16 +136,16 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
         return trials.cheapest([settings, *uniform])
     per_stage = np.array([trials.stage_costs(candidate) for candidate in uniform])
     mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_stage.argmin(axis=0)))
-    return trials.cheapest([settings, mixed, *_turning_roots(settings, trials, factors), *uniform])
+    return trials.cheapest([settings, mixed, *_with_turning_roots(settings, trials, factors), *uniform])
 
 
-def _turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
-    """Return the settings with each rotation factor at the roots alone, which turn what turns as a whole. A root has
-    its stem at stage 0 if it moves as one, else at stage 1."""
+def _with_turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
+    """Return the settings with each rotation factor at the first stages alone, where roots have their stems: at stage 0
+    if they move as one, else at stage 1. What stands on a root turns with it."""
     has_stems = [trials.prelude(settings).plan.has_stems(stage) for stage in range(settings.stages)]
     stages = [stage for stage in (1, 2) if any(has_stems[:stage]) and stage < settings.stages]
     tried = [(factor,) * stage + (0,) * (settings.stages - stage) for stage in stages for factor in factors if factor]
-    return [replace(settings, rotation_step_factors=factors) for factors in tried]
+    return [replace(settings, rotation_step_factors=of_stages) for of_stages in tried]
 
 
 def _sums(values: np.ndarray, first: np.ndarray) -> np.ndarray:
