@@ -320,7 +320,7 @@ export class ATHForest extends Group {
 /** Bark and leaves as the viewer draws them, made in the shader from texture coordinates, where the metadata of a file name its
  * `surfaces`; else a plain material in the colour of leaves: `ath.motion.bind(new ATHPlantMaterial(ath.metadata))`. For WebGLRenderer. */
 export class ATHPlantMaterial extends MeshStandardMaterial {
-  constructor(metadata?: { surfaces?: unknown });
+  constructor(metadata?: { surfaces?: unknown; [name: string]: unknown });
 }
 
 /** The branches of a file without faces as round limbs, each edge a strip that faces the camera, lit as a cylinder by a light of its own;
