@@ -15,7 +15,7 @@ can break unseen until then.
 | batches | tools, slow | a worker in this process codes one clip |
 | loader for three.js, GPU form, pages, galleries | web, browser | one file each |
 | plugin for USD, player in raylib | programs | their calls have the arguments that the headers declare |
-| release for other machines, media type | programs | the recipe names the whole core, the type the first bytes |
+| release for other machines, media type | programs | a file of the core is read as for another; the first bytes |
 
 Other tests of the tier `programs` build nothing of ours: they give files to Blender, VTK and programs from npm. Makers
 of clips that need Helios, Blender, MuJoCo, CPlantBox, skeletor or scikit-fem run nowhere in the tests, but by
@@ -348,6 +348,9 @@ def test_the_builder_of_releases_compiles_the_whole_core_and_looks_for_files_tha
     recipe = release["recipe"](tmp_path)
     assert {CORE / word for word in recipe if word.endswith(".c")} >= set(targets.decoder_sources())
     assert "-ffp-contract=off" in recipe and "-O3" in recipe
+    options, one = [word for word in recipe if not word.endswith(".c")], CORE / "container" / "container.c"
+    compiler = sys.executable, "-m", "ziglang", "cc", "-target", "aarch64-linux-gnu"
+    release["run"](*compiler, *options, "-O0", "-c", one, "-o", tmp_path / "container.o")
     assert all((ROOT / "athcodec" / name).exists() for name in release["HELD"])
     # The file for pkg-config and the one for find_package take their version from here.
     assert (
