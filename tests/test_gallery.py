@@ -55,7 +55,8 @@ def shown(opened, sample_ath):
 @pytest.mark.browser
 def test_a_plant_of_a_gallery_starts_when_it_comes_into_view_and_is_given_back_behind(shown):
     shown.wait_for_function("() => plants[0].currentTime > 0.1")
-    assert {name for name, *_ in shown.line.log if name.startswith("tree")} == {"tree0.ath"}
+    fetched = {name for name, *_ in shown.line.log if name.startswith("tree")}
+    assert {"tree0.ath"} <= fetched <= {"tree0.ath", "tree1.ath"}  # The second is just below the view.
     assert shown.evaluate("plants[3].ath") is None
     assert shown.evaluate("plants[3].shadowRoot.querySelector('canvas')") is None
     shown.evaluate("plants[3].scrollIntoView()")

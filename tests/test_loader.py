@@ -403,7 +403,7 @@ def test_shadows_move_with_the_plant_in_every_mode(browser, mode, tmp_path):
         errors = []
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
         page.goto(line.page("tree.ath"))
-        page.wait_for_function("() => athcodecViewer.motion?.complete", timeout=60_000)
+        page.wait_for_function("() => athcodecViewer.motion?.complete && athcodecViewer.modules", timeout=60_000)
         page.evaluate("athcodecViewer.setPlaying(false)")
         found = page.evaluate((NODE / "shadows.js").read_text("utf-8"), mode)
         page.close()
