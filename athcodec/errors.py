@@ -18,8 +18,12 @@ from __future__ import annotations
 import re
 from typing import Self
 
-LONGEST_MESSAGE, MESSAGE_HEAD, MESSAGE_TAIL = 2000, 1500, 450  # Characters; the head and the tail stay of a longer one.
-LONGEST_WORD, WORD_HEAD, WORD_TAIL = 400, 250, 120  # The same for what has no space in it, such as a number or a path.
+LONGEST_MESSAGE = 2000  # Characters of a message, some 20 lines of a terminal; the middle of a longer one is left out.
+MESSAGE_HEAD = 1500  # Characters that stay at its beginning: the subject, and what is wrong.
+MESSAGE_TAIL = 450  # Characters that stay at its end: what was expected, and what to do.
+LONGEST_WORD = 400  # Characters of what has no space in it, such as a number or a path; longer ones are cut alike.
+WORD_HEAD = 250  # Characters that stay at its beginning, enough for most paths.
+WORD_TAIL = 120  # Characters that stay at its end, enough for the name of a file.
 _LONG_WORD = re.compile(rf"[^ ]{{{LONGEST_WORD + 1},}}")
 
 

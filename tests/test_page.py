@@ -498,7 +498,7 @@ def test_the_plant_takes_seventy_per_cent_of_the_free_height_at_every_size_of_th
     page = opened_file(athcodec.sample_path("leafed").read_bytes())
     for width, height in ((1440, 900), (1024, 768), (844, 390), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})
-        if height < 400:  # as it opens there
+        if height < 400:  # Low windows open without the panel.
             page.click("#toggle-panel")
         for _ in range(50):  # cards are measured when the browser has laid them out
             tall = page.evaluate(PLACED)["tall"]

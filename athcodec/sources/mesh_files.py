@@ -14,7 +14,8 @@ from athcodec.sources.mesh import Mesh, kind_of
 from athcodec.sources.obj import parse_obj
 from athcodec.sources.ply import parse_ply
 
-WORD_ENDS, WORD_BYTES = b" \t\n\r\f\v/", 128  # Bytes that a word of text and the value made of it take.
+WORD_ENDS = b" \t\n\r\f\v/"  # What ends a word of text.
+WORD_BYTES = 128  # Bytes of memory that a word and the value made of it take.
 MESSAGE = 300  # characters of what Python says of a number
 
 

@@ -63,7 +63,7 @@ FLAGS = [
     "-std=c11",
     "-fno-unroll-loops",  # unrolled it is larger, and no faster
     "-mllvm",
-    "-inline-threshold=20",  # of LLVM's 225: the module is 2 % smaller packed, and decodes as fast
+    "-inline-threshold=20",  # LLVM has 225; with less the module is 2 % smaller packed, and decodes as fast.
     "-DATH_STATIC",
     "-DATH_AT_ONCE",  # without the code of slices, which no worker of the page asks for
     # the bits of positions are part of the format, as in core/CMakeLists.txt

@@ -37,7 +37,6 @@ from athcodec.files.threads import SERIAL, ThreadPool, default_jobs, ranges
 from athcodec.motion.algebra import largest_distance, length, multiply
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
-from athcodec.untyped import JsonObject
 
 FINER = 32  # Step of a layer over the step at which bases and modes are learned.
 REST_ROUNDS = 16  # Steps of a rest pose that are tried until one keeps the bound; the last is 1/28 of the first.
@@ -745,7 +744,7 @@ def stems_head(settings: Settings, stage: int, bases: dict[int, StreamBasis]) ->
 
 def stem_streams(
     segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]
-) -> tuple[JsonObject, JsonObject]:
+) -> tuple[dict[int, bytes], dict[int, int]]:
     """Return STEMS of the stages of a first layer, and the bytes of their time bases."""
     plan = segment.plan
 
