@@ -61,8 +61,8 @@ REFUSAL_ROUNDS = 12  # Largest number of files that are coded to find the smalle
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 HELD_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from the pose that is shown in its place.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
-LEAST_LEVELS = 3  # Levels that files have,
-LEVELS_BYTES = 20_000  # from so many bytes on, if finer layers make them.
+LEAST_LEVELS = 3  # Levels of a file below which finer layers are tried.
+LEVELS_BYTES = 20_000  # Bytes of motion from which on a file is streamed, and needs levels.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 
 

@@ -69,14 +69,13 @@ class SplitSource:
         stillness, source = self._still_settings(bound), self.about(chosen.reference)
         may_be_coarser = not chosen.predicted
         settings = self._settings(chosen.settings, stillness, may_be_coarser)
-        connected = [replace(settings, connected_rest=flag) for flag in (False, True)]
         if chosen.settings.connected_rest != stillness.connected_rest:
+            connected = [replace(settings, connected_rest=flag) for flag in (False, True)]
             settings = min(connected, key=lambda one: poses_size(source, self.ath, one))
         if may_be_coarser and source.has_source_rest:  # Details hold for that pose, too, which may be far coarser.
             alike = self._settings(chosen.settings, stillness, may_be_coarser=False)
             alike = replace(alike, connected_rest=settings.connected_rest)
-            tried = settings, alike
-            settings = min(tried, key=lambda one: prelude_size(source, self.ath, one))
+            settings = min((settings, alike), key=lambda one: prelude_size(source, self.ath, one))
             may_be_coarser = settings is not alike
         first = self._settings(chosen.first_layer, stillness, may_be_coarser)
         first = replace(first, connected_rest=settings.connected_rest)
