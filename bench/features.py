@@ -79,32 +79,35 @@ USES: Mapping[Feature, str] = {  # Uses that bytes do not judge.
 LEAST_BYTES = 500  # Smallest file in the table: a few bytes of smaller ones are many per cent.
 
 NOTE = f"""
-How many per cent larger files are without the feature: the mean of all files, the mean of those that use it, the least
-and the most; makers: of how many makers a clip is {LEAST:g} % larger or more. A file that does not use a feature counts
-as 0; below 0 the search ends in a smaller file without. Files have no attributes, a rest pose of the bound and, unless
-they are named as such, no layers. Those for {Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value}
-have rest poses that keep faces, those for {Feature.CONNECTED.value}, {Feature.SIDES.value} and
-{Feature.ATTRIBUTES.value} all attributes, those for {Feature.JOINS.value} and {GONE["straight"]} segments of
-{SHORT_SEGMENT} frames; where several are left out at once, all of these. Files below {LEAST_BYTES} bytes, of which a
-byte is many per cent, are left out. A feature stays that serves clips of {MAKERS} makers, or a use that bytes do not
-judge.
+The columns with % say how many per cent larger files are without the feature: the mean of all files, the mean of
+those that use the feature, the least and the most. The column "makers" says for how many makers a clip is {LEAST:g} %
+larger or more. A file that does not use a feature counts as 0. If a number is below 0, the encoder's search ends in a
+smaller file without the feature. Files have no attributes, a rest pose within the bound and, unless they are named as
+such, no layers. Files for {Feature.RIGID.value}, {Feature.FREE_RIGID.value} and {Feature.TURN.value} have rest poses
+that keep the shape of faces. Files for {Feature.CONNECTED.value}, {Feature.SIDES.value} and
+{Feature.ATTRIBUTES.value} have all attributes. Files for {Feature.JOINS.value} and {GONE["straight"]} have segments
+of {SHORT_SEGMENT} frames. Where several features are left out at once, all of this holds. Files below {LEAST_BYTES}
+bytes are left out, because one byte is many per cent of them. A feature stays if it serves clips of {MAKERS} makers,
+or a use that bytes do not judge.
 """
 
 NOTE_ALONE = """
-How many per cent larger files without any of these features are than files with one of them alone: what a feature saves
-where no other stands in for it. Features that it needs are in both. Clips are cut to their first frames.
+The columns with % say how many per cent larger files without any of these features are than files with one of them
+alone. This is what a feature saves if no other feature stands in for it. If a feature needs other features, both
+files have these. Clips are cut to their first frames.
 """
 
 DECISIONS = f"""
-Left out, alone: the most that a feature saves on clips of {MAKERS} makers, in per cent, by the two tables above. It
-stays for its bytes if both are {LEAST:g} % or more in one of them, or else for a use that bytes do not judge.
+"Left out" and "alone" are the most that a feature saves on clips of {MAKERS} makers, in per cent, by the two tables
+above. A feature stays for its bytes if both numbers of one column are {LEAST:g} % or more. Otherwise it stays for a
+use that bytes do not judge.
 """
 
 NOT_JUDGED = """
-Not judged by bytes: lossless levels, uneven times, loops, weights, joins, which smooth motion over seams, leaves that
-fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest pose for level 0
-alone, by which the first picture comes early. Not to be left out by an encoder alone: modes of a free beam for maps,
-gaps in bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
+Bytes do not judge these features: lossless levels, uneven times, loops, weights, joins, which smooth motion over
+seams, leaves that fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest
+pose for level 0 alone, which brings the first picture early. An encoder alone cannot leave out these: modes of a free
+beam for maps, gaps in bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """
 
 
