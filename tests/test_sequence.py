@@ -307,6 +307,24 @@ def test_whatever_a_ply_file_says_and_is_not_read_is_named(tmp_path, more):
         assert clip.not_read == PLY_SAYS[more]
 
 
+@pytest.mark.parametrize("element, named", [("vertex", "x"), ("edge", "vertex1"), ("vertex", "red")])
+def test_a_list_where_ply_has_one_number_is_refused_or_named(tmp_path, element, named):
+    columns = {"vertex": ["x", "y", "z", "red", "green", "blue"], "edge": ["vertex1", "vertex2"]}
+    header, rows = "ply\nformat ascii 1.0\n", ""
+    for name, count in (("vertex", 2), ("edge", 1)):
+        is_list = [name == element and column == named for column in columns[name]]
+        kinds = ["list uchar int" if listed else "int" for listed in is_list]
+        header += f"element {name} {count}\n" + "".join(f"property {k} {c}\n" for k, c in zip(kinds, columns[name]))
+        rows += count * (" ".join("1 0" if listed else "0" for listed in is_list) + "\n")
+    (tmp_path / "a.ply").write_text(f"{header}end_header\n{rows}")
+    if named == "x":
+        with pytest.raises(ClipError, match=r"a\.ply: got no vertices with x, y and z"):
+            athcodec.read(tmp_path / "a.ply")
+        return
+    with athcodec.read(tmp_path / "a.ply") as clip:
+        assert any(named in name for name in clip.not_read["attribute"])
+
+
 def test_normals_and_faces_without_known_corners_of_a_ply_file_are_named(tmp_path):
     normals = "".join(f"property float n{axis}\n" for axis in "xyz")
     faces = "element face 1\nproperty list int int corners\nproperty int organ\n"

@@ -8,7 +8,7 @@ import os
 import shlex
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext, suppress
 from dataclasses import asdict
 from functools import partial
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from athcodec.binding import OntoMesh
     from athcodec.encoding.assembly.summary import Summary
     from athcodec.exporters import Written
+    from athcodec.viewer.view import Floor
 
 ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what float32 adds to it.
 
@@ -261,8 +262,11 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         decoders = [opened.enter_context(open_file(args.input, args.stats, gltf_motion=name, **how)) for name in names]
         motions = [view_to_decode(decoder, args) for decoder in decoders]
         moving = None if args.onto is None else opened.enter_context(mesh_onto(motions[0], args))
-        shown = motions if moving is None else [moving.clip]
-        written = _write_decoded(shown, args) if moving is None or not args.bind else _bound(moving, args.output)
+        shown: Sequence[ClipView | MotionClip] = motions if moving is None else [moving.clip]
+        if moving is None:
+            written = _write_views(motions, args)
+        else:
+            written = _bound(moving, args.output) if args.bind else _write_clip(moving.clip, args)
         for decoder, motion in zip(decoders, motions):
             if decoder.file.missing:
                 say("warning", f"{args.input}: decoded to level {motion.level}; {what_is_missing(decoder)}")
@@ -309,17 +313,23 @@ def _blurs(args: argparse.Namespace) -> bool:
     return args.samples > 1 or args.velocities
 
 
-def _write_decoded(motions: Sequence[ClipView | MotionClip], args: argparse.Namespace) -> Written:
-    """Write a decoder in the format that is asked for. Several decoders are those of a GLB, into which they go back."""
-    from athcodec import exporters
+def _write_views(motions: Sequence[ClipView], args: argparse.Namespace) -> Written:
+    """Write what decoders show, in the format that is asked for. Several go back into a GLB."""
     from athcodec.files.gltf.motion import GltfMotion
 
-    motion = motions[0]
-    if _goes_back(args) and isinstance(motion.decoder.file.source, GltfMotion):
+    if _goes_back(args) and isinstance(motions[0].decoder.file.source, GltfMotion):
+        from athcodec.exporters import Written
         from athcodec.exporters.gltf_into import write_back
 
         write_back(args.input, motions, args.output)
-        return exporters.Written((Path(args.output),))
+        return Written((Path(args.output),))
+    return _write_clip(motions[0], args)
+
+
+def _write_clip(motion: ClipView | MotionClip, args: argparse.Namespace) -> Written:
+    """Write a clip in the format that is asked for."""
+    from athcodec import exporters
+
     name = exporters.format_to_write(args.output, args.format).name
     options = ("gzip", "animation", "instances", "rig", "nanite", "samples", "velocities")
     how = {option: getattr(args, option) for option in options}
@@ -373,7 +383,7 @@ def _verified(args: argparse.Namespace, name: str | None) -> JsonObject:
             decoder.file.check(result["decoded"])
             result |= {"max_error_bound": decoder.file.max_error_bound, "unit": decoder.metadata.get("unit")}
             for played, source, clip in with_sources(decoder, args, opened):
-                measured = {"name": played.clip.name, "against": source}
+                measured: JsonObject = {"name": played.clip.name, "against": source}
                 measured["levels"] = measure_against(played, source, clip)
                 result["clips"].append(measured)
                 refuse_broken_promises(result, measured)
@@ -499,9 +509,9 @@ def demo(args: argparse.Namespace) -> int:
                         shown = decoder.at_level(level["level"])
                         athcodec.write(shown, encoded.with_name(f"{encoded.stem}_level_{shown.level}.h5"))
         page = Path(args.keep or ".", DEMO_PAGE).resolve()
-        floor = (
-            {athcodec.sample_path(name): each for name, each in DEMO_FLOOR.items()} if args.sample == "tree" else None
-        )
+        floor: Floor | None = None
+        if args.sample == "tree":
+            floor = {athcodec.sample_path(name): share for name, share in DEMO_FLOOR.items()}
         made = _export_demo(encoded, page, floor)
         if args.json:
             print_json(facts | {"page": str(page) if made else None})
@@ -515,7 +525,7 @@ def demo(args: argparse.Namespace) -> int:
     return 0
 
 
-def _export_demo(encoded: Path, page: Path, floor: Mapping[Path, float] | None) -> bool:
+def _export_demo(encoded: Path, page: Path, floor: Floor | None) -> bool:
     """Write the page, and return whether that could be done."""
     from athcodec.viewer import view
 

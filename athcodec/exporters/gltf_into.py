@@ -499,8 +499,8 @@ def _drop_channels(gltf: JsonObject, moving: set[int], meshes: set[int], needles
         if isinstance(target, str):
             return True
         if target.holder == "meshes":
-            return target.index not in meshes
-        return target.index not in needless and not (target.path == "weights" and target.index in moving)
+            return target.entry not in meshes
+        return target.entry not in needless and not (target.path == "weights" and target.entry in moving)
 
     kept = []
     for animation in gltf.get("animations", []):

@@ -3,6 +3,9 @@ program to read beside the shaders."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+
 import numpy as np
 from numpy import typing as npt
 
@@ -200,7 +203,7 @@ class Passes:
         self.matrices = np.zeros((count, self._of_level["matrix_count"], 3, 4), np.float32)
         self._attach = np.zeros((count, len(self._bodies), 3, 4), np.float32)
         if any(source.head["baked"] for source in sources):
-            self.positions += sum(source.baked(self.positions.shape) for source in sources)
+            self.positions += total([source.baked(self.positions.shape) for source in sources])
             return
         self._modes: dict[int, np.ndarray] = {}  # By piece: (modes, 3, frames).
         for body in section(level, self._of_level["order"], "<u4", len(self._bodies)):
@@ -215,9 +218,9 @@ class Passes:
     def _place(self, b: int) -> None:
         body, sources = self._bodies[b], self._sources
         point, rotation = self._hung(body)
-        point = point + sum(source.shift(b) for source in sources)
-        rotation = rotation @ rotations(sum(source.turn(b) for source in sources))
-        modes = self._modes[b] = sum(source.modes(b, body) for source in sources)
+        point = point + total([source.shift(b) for source in sources])
+        rotation = rotation @ rotations(total([source.turn(b) for source in sources]))
+        modes = self._modes[b] = total([source.modes(b, body) for source in sources])
         local = np.tensordot(modes, self._basis(body["basis"], len(modes), body["count"]), (0, 0)).transpose(1, 2, 0)
         if body["flags"] & NODE:
             matrix = np.swapaxes(np.eye(3, dtype=np.float32) + local, 1, 2)  # its columns are the three positions
@@ -268,6 +271,11 @@ class Passes:
         rest = self._vertices["rest"][moved]
         out[:, moved] = np.einsum("tvij,vj->tvi", matrices[..., :3], rest) + matrices[..., 3]
         return out
+
+
+def total(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the sum of arrays of one shape, added in their order."""
+    return reduce(np.add, arrays)
 
 
 def rotations(omega: np.ndarray) -> np.ndarray:

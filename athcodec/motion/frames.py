@@ -11,6 +11,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import DTypeLike
 
+from athcodec.untyped import ArrayLike
+
 KEPT_BYTES = 64 << 20  # Bytes of the positions of clips whose frames are kept.
 FAR = 64  # Distance from the origin, in extents of the plant, beyond which float32 loses too many bits of its shape.
 
@@ -48,6 +50,7 @@ class Frames:
     ):
         self._read = read
         self.shape, self.dtype = (frame_count, vertex_count, 3), np.dtype(dtype)
+        self.chunks: ArrayLike = None  # Rows that are best read together, as h5py and dask state them; None: not known.
         keeps &= 3 * frame_count * vertex_count * self.dtype.itemsize <= KEPT_BYTES
         self._kept = np.empty(self.shape, self.dtype) if keeps else None
         self._is_kept = np.zeros(frame_count, bool)

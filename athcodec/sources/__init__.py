@@ -17,7 +17,9 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
+
+import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning, MissingExtra, SourceWarning
 from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
@@ -85,6 +87,13 @@ _VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtp
 FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
 SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
+
+
+class RestFields(TypedDict, total=False):
+    """The fields of a MotionClip that make its rest pose."""
+
+    rest: np.ndarray
+    rest_pose: str
 
 
 @dataclass(frozen=True)
@@ -155,6 +164,13 @@ class ReadOptions:
             raise ValueError(f"max_memory: got {self.max_memory!r}, expected a positive number of bytes")
         if self.axes is not None:
             parse_order(self.axes)
+
+    def rest_fields(self, rest: np.ndarray | None) -> RestFields:
+        """Return the fields of a MotionClip that make its rest pose; `rest` is that of the file (N, 3), or None."""
+        fields: RestFields = {"rest_pose": "mean" if self.rest == "mean" else "first"}
+        if rest is not None and self.rest == "auto":
+            fields["rest"] = rest
+        return fields
 
     @property
     def order(self) -> Order | None:

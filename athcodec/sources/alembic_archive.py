@@ -132,10 +132,9 @@ class _Xform:
     def at(self, time: float) -> np.ndarray:
         if self.still is not None:
             return self.still
-        matrix = sum(
-            weight * np.array(self.schema.getValue(self.track.sample(i)).getMatrix(), np.float64)
-            for i, weight in self.track.at(time)
-        )
+        matrix = np.zeros((4, 4))
+        for i, weight in self.track.at(time):
+            matrix += weight * np.array(self.schema.getValue(self.track.sample(i)).getMatrix(), np.float64)
         if len(self.track.times) < 2:
             self.still = matrix
         return matrix
@@ -161,7 +160,8 @@ class _Place:
     visibilities: list[_Visibility] = field(default_factory=list)
 
     def tracks(self) -> Iterator[_Track]:
-        yield from (each.track for each in (*self.xforms, *self.visibilities))
+        yield from (xform.track for xform in self.xforms)
+        yield from (visibility.track for visibility in self.visibilities)
 
     def shown(self, times: np.ndarray) -> np.ndarray:
         """Return (T,) whether the object is shown: the nearest that says anything decides."""
@@ -173,7 +173,8 @@ class _Place:
     @property
     def is_seen(self) -> bool:
         """Whether it is shown at the time of any sample of its visibility."""
-        return self.shown(np.unique([0.0, *(time for each in self.visibilities for time in each.track.times)])).any()
+        times = np.unique([0.0, *(time for each in self.visibilities for time in each.track.times)])
+        return bool(self.shown(times).any())
 
     def matrix(self, time: float) -> np.ndarray:
         """Return (4, 4) to the world."""
@@ -183,16 +184,16 @@ class _Place:
         return matrix
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Object(SceneObject):
     """An object that is read, where it and its instances hang, and how its points are found. source: its path, of an
     instance that of what it shows."""
 
-    schema: AlembicObject = None
-    places: list[_Place] = field(default_factory=list)
-    source: str = ""
-    points: AlembicObject = None
-    track: _Track | None = None
+    schema: AlembicObject
+    places: list[_Place]
+    source: str
+    points: AlembicObject
+    track: _Track
 
     def tracks(self) -> Iterator[_Track]:
         tracks = (track for place in self.places for track in place.tracks())
@@ -223,8 +224,8 @@ def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
             obj.leave_out("normals")  # They turn with each copy.
             obj.repeat(len(obj.places))
         if obj.kind == "mesh":  # whose corners are clockwise in the file
-            frames = range(len(times) if obj.moves else 1)
-            obj.face_outward(lambda frame, obj=obj: _matrix(obj, times[frame]), frames, is_reversed=True)
+            placed_at = times if obj.moves else times[:1]
+            obj.face_outward((_matrix(obj, float(time)) for time in placed_at), is_reversed=True)
         first += obj.count
     if first == 0:
         raise ClipError(f"{objects[0].path}: got no points, expected at least one")
@@ -256,7 +257,7 @@ def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
 def _find(archive: AlembicObject, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
     """Return all objects that are read, those of instances too; adds the others to not_read, by the names of their
     kinds."""
-    objects, visited, refused = [], 0, list[str]()
+    objects, visited, refused = list[_Object](), 0, list[str]()
     waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
         parent, place, above = waiting.pop()
@@ -553,7 +554,7 @@ def _is_own(schema: AlembicObject) -> bool:
     return _own_properties(schema) is not None
 
 
-def _kept(archive: AlembicObject) -> tuple[str | None, list[tuple[dict[str, str], bytes]]]:
+def _kept(archive: AlembicObject) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]:
     """Return the metadata as JSON, and further arrays, that athcodec's writer has kept."""
     top = archive.getTop()
     if top.getNumChildren() != 1:
@@ -593,7 +594,8 @@ def _points(obj: _Object, time: float) -> np.ndarray:
         raise ClipError(f"{obj.path}: got {max(counts)} points in a sample at {time:g} s, expected {obj.count}")
     if len(samples) == 1:
         return samples[0][0]
-    return sum(points.astype(np.float64) * weight for points, weight in samples).astype(np.float32)
+    (before, before_weight), (after, after_weight) = samples
+    return (before.astype(np.float64) * before_weight + after.astype(np.float64) * after_weight).astype(np.float32)
 
 
 def _sample(obj: _Object, number: int) -> np.ndarray:

@@ -104,14 +104,13 @@ def clip_of_steps(
         key for key in steps.left_out if key not in options.skip
     ]
     moving = list(dict.fromkeys(moving))
-    rest = first.astype(frames.dtype) if moved_by and options.rest == "auto" else None
+    rest = first.astype(frames.dtype) if moved_by else None
     return MotionClip(
         frames,
         time,
         faces=topology.faces,
         edges=topology.edges,
-        rest=rest,
-        rest_pose="mean" if options.rest == "mean" else "first",
+        **options.rest_fields(rest),
         attributes=attributes,
         metadata=facts | metadata,
         resource=resource,

@@ -23,7 +23,7 @@ from athcodec.files.plain import FilePath
 from athcodec.files.reading import Budget
 from athcodec.motion.clip import DEFAULT_FPS
 from athcodec.sources import SERIES, ReadOptions, is_pattern
-from athcodec.sources.index_files import index_of, is_index, list_of, read_index
+from athcodec.sources.index_files import Index, index_of, is_index, list_of, read_index
 from athcodec.sources.numbering import NumberedFiles, files_to_read, numbered_files
 from athcodec.sources.timing import numbered_times, plain_number, times_in_seconds
 from athcodec.untyped import JsonObject
@@ -202,6 +202,7 @@ class Series:
 def series_of(path: FilePath, options: ReadOptions) -> Series:
     """Return the frames that an index, a pattern or any one of the files names. Raises ClipError, OSError."""
     path = Path(path)
+    index: Index | None
     if is_index(path):
         index = read_index(path, path.parent, options.allow_outside, Budget(options.max_memory))
     elif options.alone and not is_pattern(path):
@@ -248,6 +249,6 @@ def _place(stated: Sequence[StatedTime | None]) -> str:
     return next(time.place for time in stated if time is not None)
 
 
-def _shown(values: Sequence[float | None]) -> str:
+def _shown(values: Sequence[float | np.float32 | None]) -> str:
     words = ["none" if value is None else f"{value:.10g}" for value in values[:SHOWN]]
     return ", ".join(words) + (" ..." if len(values) > SHOWN else "")

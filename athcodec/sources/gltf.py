@@ -182,12 +182,14 @@ def _clip(
         {} if _chooses(options) else _other_animations(scene)
     )
     clips = {}
+    rest_fields = options.rest_fields(None)
     for name, timing in timings.items():
+        if rest is not None and np.isfinite(rest).all():
+            rest_fields["rest"] = rest
         clips[name] = MotionClip(
             positions=_positions(motions[name], timing.times),
             time=np.arange(len(timing.times)) / timing.fps,
-            rest=rest if rest is not None and np.isfinite(rest).all() else None,
-            rest_pose="mean" if options.rest == "mean" else "first",
+            **rest_fields,
             edges=edges,
             faces=faces,
             attributes=attributes,
@@ -500,7 +502,7 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
     """Return the joints, or nodes, that vertices hang on; None where one node moves them all."""
     movers = moving_nodes(nodes)
     order = [joint for joint in scene.order if joint in movers]
-    copied = [node for node in nodes if node.copies is not None]
+    copied = [(node, len(node.copies)) for node in nodes if node.copies is not None]
     if len(order) < 2 and not copied:
         return None
     place = {joint: number for number, joint in enumerate(order)}
@@ -512,8 +514,8 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
         else:
             vertex_joint[rows] = np.array([place[joint] for joint in node.joints])[node.strongest]
     parents, names = [_above(scene, joint, place) for joint in order], [scene.name(joint) for joint in order]
-    for node in copied:  # each copy hangs on a joint of its own, below the node
-        joints = len(parents) + np.arange(len(node.copies))
+    for node, copy_count in copied:  # Each copy hangs on a joint of its own, below the node.
+        joints = len(parents) + np.arange(copy_count)
         vertex_joint[node.vertices] = np.repeat(joints, node.shape_count)
         parents += [place[node.index]] * len(joints)
         names += [node.name] * len(joints)

@@ -29,7 +29,7 @@ class NodeMotion:
         self.scene, self._nodes, self._from_world = scene, nodes, from_world
         self.count = nodes[-1].first + nodes[-1].count
         self.ancestors = scene.ancestors(moving_nodes(nodes))
-        self.dtype = np.dtype(np.float64)
+        self.dtype: np.dtype = np.dtype(np.float64)
         placed = self.read(None)[0]
         loses = is_far(placed) and not np.array_equal(placed, placed.astype(np.float32))
         self.dtype = np.dtype(np.float64 if loses else np.float32)
@@ -72,9 +72,9 @@ class NodeMotion:
         weights = self.scene.weights(node.index, times, node.weights)
         local = np.repeat(node.base[None].astype(np.float64), len(weights), axis=0)
         for column in np.flatnonzero((weights != 0).any(axis=0)):
-            if node.targets[column] is not None:
+            if (target := node.targets[column]) is not None:
                 rows = np.flatnonzero(weights[:, column])
-                moved = triples(self.scene.file, node.targets[column], node.shape_count, "morph target")
+                moved = triples(self.scene.file, target, node.shape_count, "morph target")
                 local[rows] += weights[rows, column, None, None] * moved
         return local
 

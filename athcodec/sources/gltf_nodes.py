@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -37,11 +37,11 @@ class GltfNode:
     count: int = 0
     kind: str = "points"
     primitives: list[JsonObject] = field(default_factory=list)
-    base: np.ndarray | None = None
+    base: np.ndarray = field(default_factory=lambda: np.zeros((0, 3), np.float32))  # (n, 3) points of one copy
     joints: list[int] = field(default_factory=list)
-    bind: np.ndarray | None = None
+    bind: np.ndarray = field(default_factory=lambda: np.zeros((0, 4, 4)))  # from the mesh to each joint
     influences: list[tuple[int, np.ndarray, np.ndarray]] = field(default_factory=list)
-    strongest: np.ndarray | None = None
+    strongest: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  # (n,) the joint that counts most
     copies: np.ndarray | None = None  # (k, 4, 4) from each instance to the node
     of_copies: dict[str, np.ndarray] = field(default_factory=dict)  # (k, width) by attribute: what each copy has
     is_flipped: bool = False
@@ -194,7 +194,7 @@ def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.nda
 def _load_influences(node: GltfNode, file: GltfFile) -> None:
     """Load for each joint its vertices and their weights, which add up to 1; where a file has none, the first joint
     counts."""
-    vertex, joint, weight = [], [], []
+    influences: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # of a slot: vertices, joints, weights
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
         if names[0] not in node.attributes or names[1] not in node.attributes:
@@ -203,17 +203,16 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
         if joints.shape != (node.count, 4) or joints.shape != weights.shape or joints.dtype.kind not in "iu":
             raise ClipError(f"mesh {node.name!r}: got {names[0]} of shape {joints.shape}, expected ({node.count}, 4)")
         rows, columns = np.nonzero(weights)
-        vertex.append(rows)
-        joint.append(joints[rows, columns].astype(np.int64))
-        weight.append(weights[rows, columns].astype(np.float64))
+        influences.append((rows, joints[rows, columns].astype(np.int64), weights[rows, columns].astype(np.float64)))
         if slot == 0:
             first = joints[:, 0].astype(np.int64)
-    if not vertex:
+    if not influences:
         raise ClipError(f"mesh {node.name!r}: got JOINTS_0 without WEIGHTS_0, expected both")
-    total = np.bincount(np.concatenate(vertex), np.concatenate(weight), node.count)
+    vertex, joint, weight = map(np.concatenate, zip(*influences))
+    total = np.bincount(vertex, weight, node.count)
     bare = np.flatnonzero(~(np.abs(total) > 1e-12))
-    vertex, joint = np.concatenate([*vertex, bare]), np.concatenate([*joint, first[bare]])
-    weight = np.concatenate([*weight, np.ones(len(bare))])
+    vertex, joint = np.append(vertex, bare), np.append(joint, first[bare])
+    weight = np.append(weight, np.ones(len(bare)))
     total[bare] = 1.0
     if not np.isfinite(weight).all() or joint.min() < 0 or joint.max() >= len(node.joints):
         raise ClipError(
@@ -231,7 +230,7 @@ def _load_influences(node: GltfNode, file: GltfFile) -> None:
     node.strongest[vertex[order]] = joint[order]
 
 
-def is_number(value: JsonValue) -> bool:
+def is_number(value: JsonValue) -> TypeGuard[float]:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e15
 
 

@@ -39,16 +39,16 @@ SLOWEST, FASTEST = 10.0, 240.0  # rates of sampled motion: keys further apart ar
 
 
 class Target(NamedTuple):
-    """What a channel animates: a property in PLAYED of an entry of `holder`, "nodes" or "meshes"; of weights the one
-    with the number `weight`, or all by -1."""
+    """What a channel animates: the property `path`, one of PLAYED, of entry number `entry` of `holder`, "nodes" or
+    "meshes". Of weights it is the one with the number `weight`, or all of them if that is -1."""
 
     holder: str
-    index: int
+    entry: int
     path: str
     weight: int = -1
 
     def __str__(self) -> str:
-        return f"/{self.holder}/{self.index}/{self.path}{f'/{self.weight}' if self.weight >= 0 else ''}"
+        return f"/{self.holder}/{self.entry}/{self.path}{f'/{self.weight}' if self.weight >= 0 else ''}"
 
 
 class Channel(NamedTuple):
@@ -70,8 +70,8 @@ def target_of(channel: JsonObject) -> Target | str:
             return f"{brief(path).strip(QUOTES)} of node {brief(node)}"
         return Target("nodes", integer(target, "node"), path)
     pointer = pointed.get("pointer")
-    for pattern in POINTED if isinstance(pointer, str) else ():
-        if match := pattern.fullmatch(pointer):
+    for pattern in POINTED:
+        if isinstance(pointer, str) and (match := pattern.fullmatch(pointer)):
             index, path, *weight = match.groups()
             return Target(pointer.split("/")[1], int(index), path, int(weight[0]) if any(weight) else -1)
     return brief(pointer).strip(QUOTES)
@@ -197,7 +197,8 @@ class Scene:
     def _together(self) -> list[int]:
         """Return the first animation, and every further one that moves no node that those before it move: tools that
         write an animation per object mean them to run at once, one with several takes starts with the default one."""
-        played, moved = [], set()
+        played: list[int] = []
+        moved: set[int] = set()
         for index in range(len(self.file.items("animations"))):
             targets = self.targets(index)
             if targets and not targets & moved:
@@ -224,11 +225,11 @@ class Scene:
                 others.append(target)
                 continue
             count = len(self.file.items(target.holder))
-            if target.index >= count:
+            if target.entry >= count:
                 raise ClipError(
-                    f"animation {index}: got entry {target.index} of {target.holder}, expected one below {count}"
+                    f"animation {index}: got entry {target.entry} of {target.holder}, expected one below {count}"
                 )
-            moved = [target.index] if target.holder == "nodes" else self._showing.get(target.index, [])
+            moved = [target.entry] if target.holder == "nodes" else self._showing.get(target.entry, [])
             channels = [Channel(node, target, integer(channel, "sampler")) for node in moved if node in inside]
             played += channels
             if not channels:
@@ -293,7 +294,7 @@ class Scene:
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
         """Return (path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
         Visibilities remain in _tracks."""
-        alike: dict[tuple, list[int]] = {}
+        alike: dict[tuple[str, str, int], list[int]] = {}
         for (node, path), track in self._tracks.items():
             if path in TRS:
                 alike.setdefault((path, track.interpolation, id(track.times)), []).append(node)
@@ -347,8 +348,10 @@ class Scene:
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
         """Return (k, targets) of a node's mesh; times None: without animation, k = 1."""
-        tracks = () if times is None else self._weights.get(node, ())
-        weights = np.repeat(default[None], len(times) if tracks else 1, axis=0)
+        tracks = self._weights.get(node, ())
+        if times is None or not tracks:
+            return default[None].copy()
+        weights = np.repeat(default[None], len(times), axis=0)
         for target, track in tracks:
             values = track.at(times)
             if target.weight >= len(default) or target.weight < 0 and values.shape[1] != len(default):
@@ -378,9 +381,10 @@ class Scene:
             path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
             for path, default in TRS.items()
         }
-        for path, nodes, track in self._groups if times is not None else ():
-            inside = [i for i, node in enumerate(nodes) if node in place]
-            parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]
+        if times is not None:
+            for path, nodes, track in self._groups:
+                inside = [i for i, node in enumerate(nodes) if node in place]
+                parts[path][:, [place[nodes[i]] for i in inside]] = track.at(times)[:, inside]
         matrices = np.zeros((frames, len(place), 4, 4))
         matrices[..., :3, :3] = rotation_matrices(parts["rotation"]) * parts["scale"][..., None, :]
         matrices[..., :3, 3] = parts["translation"]

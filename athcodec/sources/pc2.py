@@ -86,7 +86,7 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
             faces=mesh.faces,
             edges=mesh.edges,
             attributes=mesh.attributes,
-            rest_pose="mean" if options.rest == "mean" else "first",
+            **options.rest_fields(None),
             resource=file,
             unchanged=FileWatch(file.fileno(), *([] if mesh_path is None else [mesh_path])),
         )

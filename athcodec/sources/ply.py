@@ -7,9 +7,9 @@ clip's `not_read` names these and whatever else a file holds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from athcodec.motion.clip import RESERVED_NAMES
 from athcodec.sources.mesh import Mesh, add_face_rows, checked_indices, comments, with_polygons
 from athcodec.sources.scene_objects import FACE_MATERIAL, OWN, scene_fields, scene_of_json
 from athcodec.untyped import JsonObject
+
+Column: TypeAlias = np.ndarray | tuple[np.ndarray, np.ndarray]
+"""Values of a property: (rows,) numbers or, of a list, (rows,) lengths and the numbers of all rows in one array."""
 
 STRIPS = "tristrips"
 PLY_ELEMENTS = ("vertex", "face", "edge")
@@ -57,7 +60,7 @@ class PlyElement:
 
     def row(self, order: str, lengths: dict[str, int]) -> np.dtype:
         """Return a row whose lists have these lengths."""
-        fields: list[tuple] = []
+        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         for name, dtype, counted_by in self.properties:
             if counted_by:
                 fields += [(f"{name} count", order + counted_by), (name, order + dtype, (lengths[name],))]
@@ -158,8 +161,8 @@ class _Binary:
         return len(self._data) - self._at
 
 
-def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, np.ndarray]:
-    """Return {property: (count,) values, or (counts, values) of a list}."""
+def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, Column]:
+    """Return the values of each property of all rows, by its name."""
     none = dict.fromkeys(element.lists, 0)
     if not element.properties or not element.count:
         return {}
@@ -168,7 +171,7 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, n
     if not element.lists:
         rows = source.rows(element, element.count, none)
         source.skip(element, none, element.count)
-        return {name: rows[name] for name in rows.dtype.names}
+        return {name: rows[name] for name, *_ in element.properties}
     lengths = _first_lengths(source, element)
     with_same = _uniform(source, element, lengths)
     if with_same is not None:
@@ -203,8 +206,8 @@ def _uniform(source: _Text | _Binary, element: PlyElement, lengths: dict[str, in
     return rows if all((rows[f"{name} count"] == length).all() for name, length in lengths.items()) else None
 
 
-def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, np.ndarray]:
-    parts: dict[str, list] = {name: [] for name, *_ in element.properties}
+def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, Column]:
+    parts: dict[str, list[np.ndarray]] = {name: [] for name, *_ in element.properties}
     counts: dict[str, list[int]] = {name: [] for name in element.lists}
     for _ in range(element.count):
         lengths = _first_lengths(source, element)
@@ -225,27 +228,29 @@ def parse_ply(data: bytes) -> Mesh:
     """Return the mesh in the bytes of a PLY file. Raises ClipError."""
     header = ply_header(data)
     source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length :])
-    values: dict[str, dict[str, np.ndarray]] = {}
+    values: dict[str, dict[str, Column]] = {}
     for element in header.elements:
         if element.name in values:
             raise ClipError(f"header: got the element {element.name} twice")
         values[element.name] = _element_values(source, element)
     if not header.order and source.rest():  # Lines longer than the header says: what was read is shifted.
         raise ClipError(f"header: got {source.rest()} more words behind the last element, expected it to name them all")
-    vertices = values.get("vertex", {})
+    columns = values.get("vertex", {})
+    vertices = _numbers(columns)
     if not {"x", "y", "z"} <= vertices.keys():
         raise ClipError("got no vertices with x, y and z, expected a PLY file with some")
     metadata, attributes = scene_fields(header.scene, len(vertices["x"]))
     mesh = Mesh(ply_points(vertices), metadata={"domains": dict.fromkeys(attributes, "constant")} | metadata)
     mesh.attributes |= attributes
-    _add_ply_vertex_values(mesh, vertices)
+    _add_ply_vertex_values(mesh, columns)
     _add_ply_faces(mesh, values.get("face", {}))
     _add_ply_materials(mesh, header.scene.get(FACE_MATERIAL))
-    edges = values.get("edge", {})
-    if {"vertex1", "vertex2"} <= edges.keys():
-        ends = np.stack([edges.pop("vertex1"), edges.pop("vertex2")], axis=1).astype(np.int64)
+    edges, unread = _numbers(values.get("edge", {})), list(values.get("edge", {}))
+    if edges.keys() >= {*_EDGE_ENDS}:
+        ends = np.stack([edges[name] for name in _EDGE_ENDS], axis=1).astype(np.int64)
         mesh.edges = checked_indices("edges", ends.reshape(-1), len(mesh.points)).reshape(-1, 2)
-    _leave_out(mesh, *(f"edge_{name}" for name in edges))
+        unread = [name for name in unread if name not in _EDGE_ENDS]
+    _leave_out(mesh, *(f"edge_{name}" for name in unread))
     if any(comment.startswith(_TEXTURE) for comment in comments(data)):
         mesh.not_read.setdefault("statement", []).append(_TEXTURE)
     others = [element.name for element in header.elements if element.name not in PLY_ELEMENTS and element.count]
@@ -254,7 +259,12 @@ def parse_ply(data: bytes) -> Mesh:
     return mesh
 
 
-def ply_points(vertices: Any) -> np.ndarray:
+def _numbers(columns: Mapping[str, Column]) -> dict[str, np.ndarray]:
+    """Return those columns that have one number in each row."""
+    return {name: column for name, column in columns.items() if not isinstance(column, tuple)}
+
+
+def ply_points(vertices: Mapping[str, np.ndarray] | np.ndarray) -> np.ndarray:
     """Return (N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
     dtype = (
         np.float32
@@ -267,15 +277,16 @@ def ply_points(vertices: Any) -> np.ndarray:
     return np.stack([vertices[axis].astype(dtype) for axis in "xyz"], axis=1)
 
 
+_EDGE_ENDS = ("vertex1", "vertex2")
 _UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 POSITION_COLUMNS = ("x", "y", "z", "nx", "ny", "nz")  # Position and normal, which belong to one pose.
 _TEXTURE = "TextureFile"  # The comment in which MeshLab and others name the picture of a mesh.
 _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
-def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
-    columns_used = set(POSITION_COLUMNS)
-    if not {"nx", "ny", "nz"}.isdisjoint(vertices):
+def _add_ply_vertex_values(mesh: Mesh, columns: Mapping[str, Column]) -> None:
+    columns_used, vertices = set(POSITION_COLUMNS), _numbers(columns)
+    if not {"nx", "ny", "nz"}.isdisjoint(columns):
         _leave_out(mesh, "normals")
     colors = [name for name in _PLY_COLORS if name in vertices]
     if set(_PLY_COLORS[:3]) <= set(colors):
@@ -285,12 +296,12 @@ def _add_ply_vertex_values(mesh: Mesh, vertices: dict[str, np.ndarray]) -> None:
         if "uv" not in mesh.attributes and set(pair) <= vertices.keys():
             mesh.attributes["uv"] = _native(np.stack([vertices[name] for name in pair], axis=1))
             columns_used |= set(pair)
-    for name, column in vertices.items():
+    for name, column in columns.items():
         if name not in columns_used:
             _add_attribute(mesh, name, column)
 
 
-def _add_attribute(mesh: Mesh, name: str, values: Any, prefix: str = "vertex_") -> None:
+def _add_attribute(mesh: Mesh, name: str, values: Column, prefix: str = "vertex_") -> None:
     if isinstance(values, tuple):
         _leave_out(mesh, f"{prefix}{name} (lists)")
         return
@@ -326,18 +337,21 @@ def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
     mesh.metadata["domains"][FACE_MATERIAL] = "face"
 
 
-def _add_ply_faces(mesh: Mesh, face_values: dict[str, np.ndarray]) -> None:
-    name = next((name for name in ("vertex_indices", "vertex_index") if name in face_values), None)
-    if name is None or not isinstance(face_values[name], tuple):
+def _add_ply_faces(mesh: Mesh, face_values: dict[str, Column]) -> None:
+    corner_name = next((name for name in ("vertex_indices", "vertex_index") if name in face_values), "")
+    lists = face_values.get(corner_name)
+    if not isinstance(lists, tuple):
         if face_values:
             mesh.not_read["faces whose corners have no known name"] = list(face_values)
         return
-    counts, corners = face_values.pop(name)
+    del face_values[corner_name]
+    counts, corners = lists
     mesh.faces, attributes = with_polygons(counts, checked_indices("faces", corners.astype(np.int64), len(mesh.points)))
     mesh.attributes |= attributes
     add_face_rows(mesh)
-    if isinstance(face_values.get("texcoord"), tuple):
-        per_face, uv = face_values["texcoord"]
+    texture_corners = face_values.get("texcoord")
+    if isinstance(texture_corners, tuple):
+        per_face, uv = texture_corners
         if np.array_equal(per_face, 2 * counts):
             del face_values["texcoord"]
             mesh.attributes["uv"] = _native(uv).reshape(-1, 2)

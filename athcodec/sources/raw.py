@@ -4,7 +4,8 @@ which becomes shorter gives an error and not a crash. It knows no file format.
 
 from __future__ import annotations
 
-from typing import BinaryIO
+from io import FileIO
+from typing import BinaryIO, cast
 
 import numpy as np
 from numpy import typing as npt
@@ -29,7 +30,8 @@ class RawRows:
     """
 
     def __init__(self, file: BinaryIO, offset: int, shape: tuple[int, ...], dtype: npt.DTypeLike):
-        self._file, self._offset, self._stored = file, offset, np.dtype(dtype)
+        self._file = cast(FileIO, file)  # Files that hold arrays are opened without a buffer.
+        self._offset, self._stored = offset, np.dtype(dtype)
         self.shape, self.dtype = shape, self._stored.newbyteorder("=")
 
     def __len__(self) -> int:
@@ -41,7 +43,7 @@ class RawRows:
         if step != 1:
             raise ValueError(f"rows: got a step of {step}, expected 1")
         block = np.empty((max(stop - start, 0), *self.shape[1:]), self._stored)
-        view, done = memoryview(block).cast("B") if block.size else memoryview(b""), 0
+        view, done = memoryview(block.data).cast("B") if block.size else memoryview(b""), 0
         row_bytes = len(view) // max(stop - start, 1)
         self._file.seek(self._offset + start * row_bytes)
         while done < len(view):

@@ -23,16 +23,14 @@ from typing import BinaryIO
 import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
-from athcodec.files.reading import no_room
+from athcodec.files.reading import FileWatch, no_room
 from athcodec.motion.clip import MotionClip
 from athcodec.sources import ReadOptions
 from athcodec.sources.reader_process import ARRAYS
 from athcodec.untyped import JsonObject
 
-try:
+if sys.platform != "win32":
     import resource
-except ImportError:  # Windows
-    resource = None
 
 THREADS = 256 << 20
 """What the stacks of the threads that libraries start may take besides."""
@@ -59,9 +57,12 @@ def main() -> None:
 def limit_memory(size: int) -> None:
     """Limit the further memory of this process to so many bytes, if the system can."""
     status = Path("/proc/self/status")
-    if resource is None or not status.exists():
+    if sys.platform == "win32" or not status.exists():
         return
-    used = int(re.search(r"VmData:\s+(\d+)", status.read_text())[1]) * 1024
+    stated = re.search(r"VmData:\s+(\d+)", status.read_text())
+    if stated is None:
+        return
+    used = int(stated[1]) * 1024
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     wanted = used + size + THREADS
     resource.setrlimit(resource.RLIMIT_DATA, (wanted if hard < 0 else min(wanted, hard), hard))
@@ -99,7 +100,7 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
         "rest_given": clip.rest_given,
         "metadata": clip.metadata,
         "not_read": {kind: list(names) for kind, names in clip.not_read.items()},
-        "files": clip.unchanged.stamps,
+        "files": clip.unchanged.stamps if isinstance(clip.unchanged, FileWatch) else {},
         "guesses": guesses,
     }
     if clip.skin is not None:
@@ -107,7 +108,7 @@ def _described(clip: MotionClip, guesses: list[str]) -> bytes:
         facts["joint_names"] = list(clip.skin.names)
     arrays["said"] = np.frombuffer(json.dumps(facts).encode(), np.uint8)
     out = io.BytesIO()
-    np.savez(out, **arrays)
+    np.savez(out, allow_pickle=False, **arrays)
     return out.getvalue()
 
 

@@ -51,7 +51,7 @@ def read_apart(path: FilePath, options: ReadOptions, module: str, crashed: str) 
         if "joint_parent" in arrays:
             skin = Skin(arrays["joint_parent"], arrays["vertex_joint"], tuple(facts["joint_names"]))
         clip = MotionClip(
-            Frames(frames, *shape[:2], dtype, keeps=True),
+            Frames(frames, shape[0], shape[1], dtype, keeps=True),
             arrays["time"],
             rest=arrays["rest"],
             attributes=attributes,
@@ -93,12 +93,14 @@ class _Process:
         """Return the answer of the process. Raises ClipError where it reports a fault, or has ended."""
         if not self._end.alive:
             raise ClipError("positions: the clip is closed")
+        questions, answers = self._process.stdin, self._process.stdout
+        assert questions is not None and answers is not None  # Both are pipes.
         with self._lock:
             try:
-                self._process.stdin.write(line.encode() + b"\n")
-                self._process.stdin.flush()
-                answer = json.loads(self._process.stdout.readline() or b"{}")
-                data = self._process.stdout.read(answer.get("size", 0))
+                questions.write(line.encode() + b"\n")
+                questions.flush()
+                answer = json.loads(answers.readline() or b"{}")
+                data = answers.read(answer.get("size", 0))
             except (BrokenPipeError, ValueError):
                 answer, data = {}, b""
         if "error" in answer:
@@ -111,6 +113,6 @@ class _Process:
         self._end()
 
 
-def _stop(process: subprocess.Popen) -> None:
+def _stop(process: subprocess.Popen[bytes]) -> None:
     process.kill()
     process.communicate()

@@ -148,6 +148,7 @@ class SceneObject:
 
     def ordered(self, points: np.ndarray, ids: np.ndarray, where: str) -> np.ndarray:
         """Return the points (n, 3) in the order of `self.ids`. Raises ClipError where their ids are others."""
+        assert self.ids is not None
         rows = rows_by_id(ids, self.ids)
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
             raise ClipError(
@@ -156,12 +157,12 @@ class SceneObject:
             )
         return points[rows]
 
-    def face_outward(self, matrix: Callable[[int], np.ndarray], frames: range, is_reversed: bool) -> None:
+    def face_outward(self, matrices: Iterable[np.ndarray], is_reversed: bool) -> None:
         """Reverse the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
-        of those that none does. matrix(frame) is (4, 4) or (copies, 4, 4)."""
+        of those that none does. matrices: from the object to the world in each frame, (4, 4) or (copies, 4, 4)."""
         facing = Facing()
-        for frame in frames:
-            facing.add(matrix(frame).reshape(1, -1, 4, 4))
+        for matrix in matrices:
+            facing.add(matrix.reshape(1, -1, 4, 4))
         self.is_flipped, turned = facing.changes, facing.mirrored ^ is_reversed
         if not turned.any():
             return
@@ -251,8 +252,7 @@ def clip_of_objects(
         frames,
         time,
         not_read=not_read,
-        rest=rest if options.rest == "auto" else None,
-        rest_pose="mean" if options.rest == "mean" else "first",
+        **options.rest_fields(rest),
         edges=_edges(objects) if links is None else links,
         faces=polygons,
         attributes=attributes,

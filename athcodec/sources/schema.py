@@ -11,8 +11,8 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, TypedDict
 
 import numpy as np
 
@@ -129,6 +129,14 @@ def listing(stored: Mapping[str, Stored]) -> str:
     return f"the file has {', '.join(shown)}{more}" if stored else "the file has no arrays"
 
 
+class BranchFields(TypedDict, total=False):
+    """The fields of a MotionClip that say what its branches are."""
+
+    vertex_branch: np.ndarray | None
+    branch_parent: np.ndarray | None
+    stem_index: np.ndarray | None
+
+
 @dataclass
 class _Clip:
     """What is taken from a file, one after the other."""
@@ -158,8 +166,7 @@ class _Clip:
             clip = MotionClip(
                 positions,
                 time,
-                rest=known["rest"] if self.options.rest == "auto" else None,
-                rest_pose="mean" if self.options.rest == "mean" else "first",
+                **self.options.rest_fields(known["rest"]),
                 edges=known["edges"],
                 faces=known["faces"],
                 attributes=attributes,
@@ -172,7 +179,7 @@ class _Clip:
             if not conflicts(positions.shape, facts):
                 raise
             raise ClipError(f"{error}; {listing(self.arrays.stored)}") from None
-        depths = branch_orders(clip.branch_parent) if clip.has_branches else None
+        depths = None if clip.branch_parent is None else branch_orders(clip.branch_parent)
         if depths is not None and np.array_equal(clip.attributes.get("branch_order", ()), depths):
             del clip.attributes["branch_order"]
         read_clip_metadata(clip)
@@ -469,14 +476,20 @@ def _plain(key: str) -> str:
 
 def _branches(
     positions: ArrayLike, known: Mapping[str, np.ndarray | None], metadata: JsonObject, options: ReadOptions
-) -> dict[str, np.ndarray | None]:
-    """Return the branches of the file, else those that its edges make."""
-    branches = {name: known[name] for name in BRANCHES}
+) -> BranchFields:
+    """Return the branches of the file, else those that its edges make, as fields of a MotionClip."""
+    branches: BranchFields = {
+        "vertex_branch": known["vertex_branch"],
+        "branch_parent": known["branch_parent"],
+        "stem_index": known["stem_index"],
+    }
     edges = known["edges"]
     if branches["vertex_branch"] is not None or branches["branch_parent"] is not None:
         return branches
     if edges is None:
         return {}
-    rest = MotionClip(positions, np.arange(len(positions)), rest=known["rest"]).rest  # checked, as the clip's will be
+    of_file = replace(options, rest="auto").rest_fields(known["rest"])
+    rest = MotionClip(positions, np.arange(len(positions)), **of_file).rest  # Checked, as the clip's will be.
     made = branches_from_edges(edges, len(rest), rest, options.root, metadata.get("up_axis", "y"))
-    return dict(zip(BRANCHES, made, strict=True))
+    vertex_branch, branch_parent, stem_index = made
+    return {"vertex_branch": vertex_branch, "branch_parent": branch_parent, "stem_index": stem_index}

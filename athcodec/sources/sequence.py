@@ -60,7 +60,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
             attributes=attributes,
             metadata=mesh.metadata | metadata,
             not_read=not_read | ({"attribute": left_out} if left_out else {}),
-            rest_pose="mean" if options.rest == "mean" else "first",
+            **options.rest_fields(None),
             unchanged=reader.unchanged,
         )
 

@@ -32,16 +32,17 @@ class Copies:
         self.instancer = instancer
         prim = instancer.GetPrim()
         self.attributes = [prim.GetAttribute(name) for name in PLACES if prim.HasAttribute(name)]
-        self.names: np.ndarray | None = None
+        self.names = np.zeros(0, np.int64)
+        self._is_known = False
 
     def follow(self, codes: np.ndarray) -> None:
         """Find the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
-        if self.names is not None:
+        if self._is_known:
             return
-        schema, times = self.instancer, [float(codes[0])]
+        schema, changes_at = self.instancer, [float(codes[0])]
         for attribute in (schema.GetProtoIndicesAttr(), schema.GetIdsAttr(), schema.GetInvisibleIdsAttr()):
-            times += attribute.GetTimeSamplesInInterval(interval(codes))
-        times = np.unique(times)
+            changes_at += attribute.GetTimeSamplesInInterval(interval(codes))
+        times = np.unique(changes_at)
         used, self._states = np.unique(held_at(times, codes), return_inverse=True)
         self._codes, times = codes, times[used]  # In a frame holds what held at the last of these times.
         protos, ids = (
@@ -72,6 +73,7 @@ class Copies:
                 self.shown[state, there] = mask[rows[there]]
         self.shown = self.shown[self._states]
         self._hold()
+        self._is_known = True
 
     def _refuse(self, state: int, got: str, expected: str) -> None:
         frame = int(np.flatnonzero(self._states == state)[0])

@@ -18,7 +18,8 @@ class Skeleton:
         self.query, self.target = query, target
         self.animation = query.GetAnimQuery()
         self.skins = target.HasJointInfluences()
-        self._shapes = self._mapper = None
+        self._shapes: UsdObject = None
+        self._mapper: UsdObject = None
         if target.HasBlendShapes() and self.animation:
             self._shapes = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(target.GetPrim()))
             self._mapper = target.GetBlendShapeMapper()

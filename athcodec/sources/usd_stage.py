@@ -86,7 +86,7 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
     with quietly() as trap:
         clip = _clip(_Stage(path, options.allow_outside), options)
         if warnings := _warnings(trap):
-            clip.not_read["warning of USD"] = warnings
+            clip.not_read = {**clip.not_read, "warning of USD": warnings}
         return clip
 
 
@@ -384,7 +384,7 @@ def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[Pri
             is_reversed = UsdGeom.Mesh(obj.prim).GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
             is_reversed ^= obj.skeleton is not None and obj.skeleton.mirrors(obj.count, codes[0])
             frames = range(len(codes) if obj.moves else 1)
-            obj.face_outward(lambda frame, obj=obj: matrix(obj, frame), frames, is_reversed)
+            obj.face_outward((matrix(obj, frame) for frame in frames), is_reversed)
         first += obj.count
     if first == 0:
         raise ClipError(f"{objects[0].path}: got no points, expected at least one")

@@ -69,7 +69,7 @@ def visibility(prim: Usd.Prim) -> Usd.Attribute | None:
     return UsdGeom.Imageable(prim).GetVisibilityAttr() if prim.IsA(UsdGeom.Imageable) else None
 
 
-def held_at(times: Sequence[float], codes: np.ndarray) -> np.ndarray:
+def held_at(times: Sequence[float] | np.ndarray, codes: np.ndarray) -> np.ndarray:
     """Return (T,) the number of the time whose sample holds at each time code."""
     return np.maximum(np.searchsorted(times, codes + 1e-6, "right") - 1, 0)
 
@@ -96,7 +96,7 @@ def samples(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> Seque
     if not has_range(attribute.GetStage()):
         return [*attribute.GetSpline().GetKnots().keys()] if attribute.HasSpline() else source.GetTimeSamples()
     if attribute.HasSpline():
-        return codes
+        return [float(code) for code in codes]
     return source.GetTimeSamplesInInterval(interval(codes))
 
 

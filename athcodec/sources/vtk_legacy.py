@@ -323,8 +323,11 @@ class _Legacy:
             self._keep(place, name, _word(words, 3, line), rows, width)
 
     def _keep(self, place: str, name: str, kind: str, count: int, width: int) -> None:
-        is_string = kind.lower() in _STRINGS
-        values = self._skip_strings(count * width) if is_string else self._array(kind, count, width)
+        values = None
+        if kind.lower() in _STRINGS:
+            self._skip_strings(count * width)
+        else:
+            values = self._array(kind, count, width)
         if values is not None and (place != "FIELD" or name.lower() in (*TIME_NAMES, *STEP_NAMES)):
             self._data_of[place][name] = values
         else:

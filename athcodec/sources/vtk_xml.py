@@ -13,7 +13,7 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import numpy as np
@@ -88,9 +88,8 @@ class VtkXml:
                 f"got a VTK file of the type {self._type[:40]!r}, expected {', '.join(_DATA_SETS)} or a list of such "
                 "files; save it as .vtu or .vtp"
             )
-        order = ">" if self._root.get("byte_order") == "BigEndian" else "<"
-        self._order = order
-        self._count = np.dtype(_TYPES[self._root.get("header_type", "UInt32")]).newbyteorder(order)
+        self._order: Literal["<", ">"] = ">" if self._root.get("byte_order") == "BigEndian" else "<"
+        self._count = np.dtype(_TYPES[self._root.get("header_type", "UInt32")]).newbyteorder(self._order)
         name = self._root.get("compressor")
         if name and name not in _UNPACKERS:
             raise ClipError(
@@ -176,8 +175,8 @@ class VtkXml:
             types, stops, nodes = poly_cells({tag: self._cells(piece, tag)[1:] for tag in POLY_CELLS})
         else:
             types, stops, nodes = self._cells(piece, "Cells")
-        data = [self._arrays(piece, tag) for tag in ("PointData", "CellData")]
-        return Grid(coordinates, types, starts_of(stops), stops, nodes, *data)
+        point_data, cell_data = self._arrays(piece, "PointData"), self._arrays(piece, "CellData")
+        return Grid(coordinates, types, starts_of(stops), stops, nodes, point_data, cell_data)
 
     def _lattice(self, piece: ElementTree.Element, point_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         ends = [int(number) for number in (piece.get("Extent") or "").split()]

@@ -122,7 +122,7 @@ class _Part:
         self._is_surface, self._kept = _kind(group) == SURFACE, dict[str, np.ndarray]()
         steps = group.get("Steps")
         self._steps = steps if isinstance(steps, h5py.Group) else None
-        self.times = np.zeros(1) if self._steps is None else self._stored_times()
+        self.times = np.zeros(1) if self._steps is None else self._stored_times(self._steps)
         self.elsewhere: dict[str, str] = {}
         self.left_out = [
             name
@@ -170,8 +170,9 @@ class _Part:
 
     # ---- where things lie ----
 
-    def _stored_times(self) -> np.ndarray:
-        count = int(self._steps.attrs.get("NSteps", 0))
+    def _stored_times(self, steps: H5Object) -> np.ndarray:
+        """Return the times (T,) of the group `Steps`. Raises ClipError."""
+        count = int(steps.attrs.get("NSteps", 0))
         values = self._array("Steps/Values").reshape(-1)
         if count < 1 or len(values) < count:
             raise ClipError(f"Steps: got {len(values)} times, expected NSteps, {count}")

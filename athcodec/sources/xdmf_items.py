@@ -13,7 +13,7 @@ import re
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from xml.etree import ElementTree
 
 import h5py
@@ -28,6 +28,7 @@ from athcodec.sources.xml_tree import TEXT_BYTES
 Element = ElementTree.Element
 _KINDS = {"float": "f", "int": "i", "uint": "u", "char": "i", "uchar": "u", "short": "i", "ushort": "u"}
 _SIZES = {"char": 1, "uchar": 1, "short": 2, "ushort": 2}
+_ORDERS: dict[str, Literal["<", ">"]] = {"big": ">", "little": "<"}
 _UNPACKERS: dict[str, Callable[[], Any]] = {"zlib": zlib.decompressobj, "bzip2": bz2.BZ2Decompressor}
 _FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "abs": np.abs,
@@ -100,8 +101,7 @@ class Items:
 
     def _binary(self, item: Element, shape: tuple[int, ...]) -> np.ndarray:
         path = self._file_named((item.text or "").strip(), item)
-        order = {"big": ">", "little": "<"}.get(item.get("Endian", "").lower(), "=")
-        dtype, count = _dtype(item).newbyteorder(order), math.prod(shape)
+        dtype, count = _dtype(item).newbyteorder(_ORDERS.get(item.get("Endian", "").lower(), "=")), math.prod(shape)
         seek, size = int(item.get("Seek", 0)), path.stat().st_size
         packing = item.get("Compression", "Raw").lower()
         if packing not in ("raw", *_UNPACKERS):

@@ -172,13 +172,15 @@ class _Parser:
         return finders[0] if len(finders) == 1 else lambda document, start: _once(f(document, start) for f in finders)
 
     def _steps(self) -> Finder:
+        steps: list[Finder] = []
+        is_absolute = False
         if self._take("("):
             inside = self._nested(self._union)
             self._expect(")")
             tests = self._predicates()
-            steps, is_absolute = [lambda document, start: _filtered(document, inside(document, start), tests)], False
+            steps.append(lambda document, start: _filtered(document, inside(document, start), tests))
         else:
-            steps, is_absolute = [], self._next in ("/", "//")
+            is_absolute = self._next in ("/", "//")
             if not is_absolute:
                 steps.append(self._step())
             elif self._next == "/" and self._at + 1 == len(self._tokens):

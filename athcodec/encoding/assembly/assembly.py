@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
@@ -75,7 +75,7 @@ class FileAssembly:
             return result.store.size(result.header, result.errors)
 
     def write(
-        self, path: str | PathLike[str] | None, out: BinaryIO, spool: IO[bytes], coded: Iterable[CodedSegment]
+        self, path: str | PathLike[str] | None, out: BinaryIO, spool: writing.Spool, coded: Iterable[CodedSegment]
     ) -> Summary:
         """Write the whole file into `out`, which is to become `path`."""
         result = self._fill(writing.ChunkStore(spool), coded)
@@ -87,7 +87,7 @@ class FileAssembly:
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
         with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # The file gets its name after this check.
-            summary = self._summary(path and Path(path), result, chunks, decoder)
+            summary = self._summary(Path(path) if path else None, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
 
@@ -100,7 +100,7 @@ class FileAssembly:
         errors, joins, stages = self._add_motion(store, coded)
         self._add_static(store)
         if self.clip.motion.clip_ranges:
-            store.add(ct.CLIPS, self._clips([np.zeros(len(errors))] * len(self.clip.motion.clip_ranges)))
+            store.add(ct.CLIPS, self._clips([[0.0] * len(errors)] * len(self.clip.motion.clip_ranges)))
         header = ct.Header(
             self.clip.placed.source.vertex_count,
             self.clip.vertex_count,
@@ -234,7 +234,8 @@ class FileAssembly:
             raise ValueError(f"segments: got {count - len(missing)}, expected all {count}")
         frames = [[stop - start for start, stop in clip] for clip in decided.source.clip_range_segments]
         shown = self._chosen_levels(errors, frames, flaws)
-        store.leave_out(lambda chunk: not decided.layers.stage_0.serves(chunk.kind, chunk.stage, shown))
+        serves = decided.layers.stage_0.serves
+        store.leave_out(lambda chunk: chunk.stage is not None and not serves(chunk.kind, chunk.stage, shown))
         return errors[shown], joins[shown], shown
 
     def levels_of(self, coded: Sequence[CodedSegment]) -> list[int]:

@@ -145,7 +145,7 @@ def clip_of_places(clip: MotionClip, places: Places) -> MotionClip:
     )
     positions.chunks = getattr(clip.positions, "chunks", None)
     stem_index = None
-    if clip.stem_index is not None:
+    if clip.stem_index is not None and clip.vertex_branch is not None:
         stem_index = stem_index_of(clip.vertex_branch[first], clip.stem_index[first])
     skin = clip.skin and Skin(clip.skin.joint_parent, clip.skin.vertex_joint[first], clip.skin.names)
     edges = None if clip.edges is None else of_vertex[clip.edges]
@@ -182,7 +182,7 @@ def _attributes(clip: MotionClip, places: Places) -> dict[str, np.ndarray]:
         else:
             arrays[name] = array
     counts = clip.attributes.get("part_vertex_counts")
-    if parts_of(clip) is not None:
+    if counts is not None and parts_of(clip) is not None:
         part = np.repeat(np.arange(len(counts)), counts)[places.first]
         arrays["part_vertex_counts"] = np.bincount(part, minlength=len(counts)).astype(counts.dtype)
     return arrays
@@ -203,12 +203,13 @@ def _edge_parts(clip: MotionClip) -> list[np.ndarray]:
     leader = _leaders_of_first_frame(clip, [], False)
     ends = leader[clip.edges]
     joined = np.unique(np.sort(ends[ends[:, 0] != ends[:, 1]], axis=1), axis=0)
-    return [] if is_forest(joined, clip.vertex_count) else [_parts_of_edges(clip)]
+    return [] if is_forest(joined, clip.vertex_count) else [_parts_of_edges(clip.edges, clip.vertex_count)]
 
 
-def _parts_of_edges(clip: MotionClip) -> np.ndarray:
-    label = np.arange(clip.vertex_count)
-    ends = clip.edges.astype(np.int64)
+def _parts_of_edges(edges: np.ndarray, vertex_count: int) -> np.ndarray:
+    """Return (N,) the smallest vertex of the connected part that each vertex belongs to, from edges (E, 2)."""
+    label = np.arange(vertex_count)
+    ends = edges.astype(np.int64)
     while (label[ends[:, 0]] != label[ends[:, 1]]).any():
         np.minimum.at(label, label[ends], label[ends].min(axis=1, keepdims=True))
         while not np.array_equal(label, label[label]):

@@ -14,7 +14,7 @@ from ctypes import addressof, c_size_t
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -41,6 +41,10 @@ from athcodec.decoding import container as ct
 from athcodec.decoding.container import from_short_float
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
+CoreOutput: TypeAlias = tuple[int | None, bool, int | None]
+"""Where the core writes positions: pointer to the origin, whether they are float64, pointer to the positions."""
+
+NO_OUTPUT: CoreOutput = (None, False, None)
 NO_ROOT = -1  # Root of streams without a learned basis (core/model/motion.h).
 RANGES = 24  # Parts of a plant of which threads take one at a time; more cost more calls, fewer leave threads idle.
 LEAST_RANGE = 1024  # Vertices of the smallest such part, below which a call costs more than its work.
@@ -87,8 +91,11 @@ class Plan:
     """Pieces, nodes and bases of a plant, from its branches and decoded rest pose.
 
     branches: (B,) of _native.BRANCH in file order. refined: of a refinement. predicted: of predicted motion, without
-    bases. rest: (N, 3) float64, less the origin.
+    bases. rest: (N, 3) float64, less the origin, and bases: once `set_rest` was called.
     """
+
+    rest: np.ndarray
+    bases: np.ndarray
 
     def __init__(
         self,
@@ -123,7 +130,6 @@ class Plan:
             self.pieces["stage"], self.pieces["low_stage"], self.pieces["low_modes"] = self.stage_count - 1, -1, 0
         if predicted:
             lib.ath_without_stems(self.core, self.pieces.ctypes.data, self.nodes.ctypes.data)
-        self.rest = self.bases = None
         self.still_branches: np.ndarray | None = None  # (B,) bool: trees that stand as they are in the rest pose.
         self._samples: dict[int, PlanSample] = {}
 
@@ -149,8 +155,12 @@ class Plan:
         table = np.empty(lib.ath_basis_table_size(pieces), np.int32)
         size = lib.ath_basis_layout(self.pieces.ctypes.data, pieces, at, gaps.ctypes.data, table.ctypes.data)
         shape = ["first", "count", "modes", "basis"]  # Sheets and tubes alone have a basis that is not their modes.
-        is_like = like is not None and like.rest is self.rest and not (like.is_rigid & ~self.is_rigid).any()
-        if is_like and np.array_equal(like.pieces[shape], self.pieces[shape]):
+        if (
+            like is not None
+            and like.rest is self.rest
+            and not (like.is_rigid & ~self.is_rigid).any()
+            and np.array_equal(like.pieces[shape], self.pieces[shape])
+        ):
             self.bases, self.core.bases, self.pieces["rank"] = like.bases, like.core.bases, like.pieces["rank"]
             return
         self.bases = np.empty(size)
@@ -174,7 +184,8 @@ class Plan:
         most = max(LEAST_RANGE, self.vertex_count // RANGES)
         vertices = np.append(self.branches["first"], self.vertex_count).tolist()
         after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
-        carrying, carried, standing, branch = [], [], [], 0
+        carrying, carried, standing = list[tuple[int, int]](), list[tuple[int, int]](), list[tuple[int, int]]()
+        branch = 0
         is_still = np.zeros(len(after), bool) if self.still_branches is None else self.still_branches
         while branch < len(after):
             stop = after[branch]
@@ -191,9 +202,11 @@ class Plan:
                 carried.append((branch, stop))
             branch = stop
         first_piece = np.searchsorted(self.pieces["branch"], np.arange(len(after) + 1)).tolist()
-        return tuple(
-            [(first_piece[start], first_piece[stop]) for start, stop in some] for some in (carrying, carried, standing)
-        )
+
+        def of_pieces(of_branches: list[tuple[int, int]]) -> list[tuple[int, int]]:
+            return [(first_piece[start], first_piece[stop]) for start, stop in of_branches]
+
+        return of_pieces(carrying), of_pieces(carried), of_pieces(standing)
 
     @cached_property
     def node_ranges(self) -> list[tuple[int, int]]:
@@ -316,6 +329,9 @@ class StageStream:
 class SegmentMotion:
     """The quantised motion of one segment."""
 
+    motion: Motion
+    integers: Integers
+
     def __init__(
         self,
         plan: Plan,
@@ -343,9 +359,14 @@ class SegmentMotion:
         self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
         self.node_waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.BEAM)
         self.before, self.ratio = before, ratio
+        self.coarse: Coarse | None = None
+        self.known: np.ndarray | None = None
+        self.predicted: np.ndarray | None = None
+        self.predicted_tracks: np.ndarray | None = None
         if before is not None:
             self.predicted, self.predicted_tracks = (
-                zeros(integers.shape, np.int32) for integers in (self.coefficients, self.tracks)
+                zeros(self.coefficients.shape, np.int32),
+                zeros(self.tracks.shape, np.int32),
             )
             self.known = self._known(before)
             self.turn_steps = np.empty((core.piece_count, 3))
@@ -379,8 +400,8 @@ class SegmentMotion:
             waves=self.node_waves.ctypes.data,
             frames=self.frames,
             ratio=self.ratio,
-            before=None if self.before is None else addressof(self.coarse),
-            known=None if self.before is None else self.known.ctypes.data,
+            before=None if self.coarse is None else addressof(self.coarse),
+            known=None if self.known is None else self.known.ctypes.data,
         )
         self.integers = Integers(
             self.coefficients.ctypes.data,
@@ -389,7 +410,7 @@ class SegmentMotion:
             self.node_steps.ctypes.data,
             first_rows=address(self.plan.first_rows, np.int32, 0),
         )
-        if self.before is not None:
+        if self.predicted is not None and self.predicted_tracks is not None:
             self.integers.predicted = self.predicted.ctypes.data
             self.integers.predicted_tracks = self.predicted_tracks.ctypes.data
         if self.learned_modes is not None:
@@ -403,7 +424,7 @@ class SegmentMotion:
 
     def forget_nodes(self) -> None:
         """Free the maps of nodes."""
-        self.node_tracks = self.integers.node_tracks = None
+        self.node_tracks, self.integers.node_tracks = np.empty(0, np.int32), None
 
     def forget_caches(self) -> None:
         """Free what pieces and maps of nodes are placed by."""
@@ -428,13 +449,13 @@ class SegmentMotion:
         positions: filled with what `pose` returns at the last stage, which the closed loop has at hand. bent: leave
         out rigid pieces on which nothing hangs. Trees that stand still keep the rest pose, whatever the positions are.
         """
-        at, into, place = self._source(source), (bent, None, False, None), None
-        if positions is not None:
+        at, out, place = self._source(source), NO_OUTPUT, None
+        if positions is not None and origin is not None:
             out = _output(origin, positions)
-            into, place = (bent, *out), self._placing(self.plan.stage_count - 1, *out)
+            place = self._placing(self.plan.stage_count - 1, out)
         self._piecewise(
             lambda motion, first, stop: lib.ath_analyse(
-                self.plan.core, motion, self.integers, first, stop, at, rounding, *into
+                self.plan.core, motion, self.integers, first, stop, at, rounding, bent, *out
             ),
             place,
         )
@@ -474,11 +495,11 @@ class SegmentMotion:
         if of_still is not None:
             self.plan.pool.map(self._with_scratch(of_still), standing)
 
-    def _placing(self, *into: Any) -> Callable[[Motion, int, int], None]:
-        """Return what places a range of pieces at a stage; into: the stage, and an `_output`."""
+    def _placing(self, stage: int, out: CoreOutput) -> Callable[[Motion, int, int], None]:
+        """Return what places a range of pieces at a stage into `out`."""
 
         def place(motion: Motion, first: int, stop: int) -> None:
-            lib.ath_pose(self.plan.core, motion, self.integers, first, stop, *into)
+            lib.ath_pose(self.plan.core, motion, self.integers, first, stop, stage, *out)
 
         return place
 
@@ -499,10 +520,10 @@ class SegmentMotion:
 
         return run
 
-    def _source(self, source: np.ndarray) -> int:
+    def _source(self, source: np.ndarray) -> int | None:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
-    def pose(self, stage: int, origin: np.ndarray, dtype, room: np.ndarray | None = None) -> np.ndarray:
+    def pose(self, stage: int, origin: np.ndarray, dtype: DTypeLike, room: np.ndarray | None = None) -> np.ndarray:
         """Return positions at `stage` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
         many float64, whose memory is to hold them."""
         shape = self.plan.vertex_count, 3, self.frames
@@ -510,11 +531,13 @@ class SegmentMotion:
             positions = zeros(shape, dtype)
         else:
             positions = room.reshape(-1).view(dtype)[: math.prod(shape)].reshape(shape)
-        into = stage, *_output(origin, positions)
-        place = self._placing(*into)
+        out = _output(origin, positions)
+        place = self._placing(stage, out)
         self._piecewise(place, place)
         self._nodewise(
-            lambda motion, first, stop: lib.ath_pose_nodes(self.plan.core, motion, self.integers, first, stop, *into)
+            lambda motion, first, stop: lib.ath_pose_nodes(
+                self.plan.core, motion, self.integers, first, stop, stage, *out
+            )
         )
         return positions
 
@@ -542,8 +565,8 @@ def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, poo
     return out
 
 
-def _output(origin: np.ndarray, positions: np.ndarray) -> tuple[Any, bool, int]:
-    """Return where the core writes positions, to which it adds the origin."""
+def _output(origin: np.ndarray, positions: np.ndarray) -> CoreOutput:
+    """Return where the core writes positions, to which it adds the origin (3,)."""
     return address(origin, np.float64, 3), positions.dtype == np.float64, positions.ctypes.data
 
 

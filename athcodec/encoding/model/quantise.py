@@ -107,7 +107,7 @@ def turn_of(turn_step: float) -> int:
 def nearest_singles(values: np.ndarray) -> np.ndarray:
     """Return the nearest numbers of float32, as float64."""
     most = float(np.finfo(np.float32).max)
-    return np.float64(np.float32(np.clip(values, -most, most)))
+    return np.clip(values, -most, most).astype(np.float32).astype(np.float64)
 
 
 def first_step_ratio(relative_bound: float) -> float:

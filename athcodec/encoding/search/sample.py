@@ -61,7 +61,7 @@ class PlantSample:
         some = replace(
             settings,
             **{name: getattr(settings, name)[self.branches] for name in OF_BRANCHES},
-            limit=settings.limit if np.isscalar(settings.limit) else settings.limit[self.vertices],
+            limit=settings.limit_of(self.vertices),
             shape_of=None,
         )
         if settings.shape_of is None:
@@ -114,8 +114,8 @@ class ExtrapolationFactors:
         """Return the factors for the branches of a plant and of its sample, (B,) of _native.BRANCH."""
         plans = [Plan(branches, int(branches["count"].sum())) for branches in (whole, sample)]
         rows, nodes = (
-            np.divide(*counts, out=np.ones(plans[0].stage_count), where=counts[1] > 0)
-            for counts in zip(*map(_counts, plans))
+            np.divide(of_whole, of_sample, out=np.ones(plans[0].stage_count), where=of_sample > 0)
+            for of_whole, of_sample in zip(*map(_counts, plans))
         )
         return cls(plans[0].vertex_count / plans[1].vertex_count, rows, nodes, qz.SAFE_REST_CAP)
 

@@ -138,11 +138,12 @@ class Search:
         """Return the search for a whole plant."""
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
+        everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
-        search = cls(Trials(source, ath, start, samples, jobs, work), effort, ratios)._in_mid_turn()
+        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios)._in_mid_turn()
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
-            other = cls(Trials(source, ath, plain, samples, jobs, work), effort, ratios)
+            other = cls(Trials(source, ath, plain, samples, everything, jobs, work), effort, ratios)
             turned = (search.of_sample or search).trials
             plain_cost = other.first_cost()  # Shapes that turn sum a few, too.
             is_clear = plain_cost <= TURNED_LEAST_SHARE * turned.cost(turned.start)
@@ -390,7 +391,7 @@ class Search:
             learned_pieces=None,
             learned_coded=False,
         )
-        if settings.learned_pieces is None:
+        if settings.learned_pieces is None or settings.learned_saving is None:
             return like
         [(pieces, _)] = learned_pieces.pieces_that_save(like, trials, [settings.learned_saving])
         return learned_pieces.learned_anew(replace(like, learned_pieces=pieces), trials)
@@ -408,7 +409,7 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        of_sample = Trials(sample.source, sample.ath, some, samples, trials.jobs, trials.work, extrapolation)
+        of_sample = Trials(sample.source, sample.ath, some, samples, extrapolation, trials.jobs, trials.work)
         return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:

@@ -19,6 +19,7 @@ from athcodec.encoding.segments.segment import Source, branch_records, poses_siz
 from athcodec.encoding.segments.settings import OF_BRANCHES, Choice, Settings
 from athcodec.motion.branches.still import LEAST_STILL
 from athcodec.motion.thresholds import Thresholds
+from athcodec.untyped import Keywords
 
 STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
 
@@ -106,7 +107,7 @@ class SplitSource:
             of_step = int(detail_of(np.array([own_step]))[0])
             finer = finer_than(moving.details, own_step)
             details[~self.still] = np.where(finer > 0, finer, of_step)
-        arrays = {
+        arrays: Keywords = {
             name: self._joined(getattr(moving, name), getattr(still, name)) for name in OF_BRANCHES if name != "details"
         }
         shape_of = None
@@ -116,7 +117,7 @@ class SplitSource:
             moving,
             **arrays,
             details=details,
-            limit=moving.limit if np.isscalar(moving.limit) else self.source.limit(moving.bound),
+            limit=self.source.limit(moving.bound) if isinstance(moving.limit, np.ndarray) else moving.limit,
             rest_step=step,
             rest_slack=slack,
             coarsest_rest_step=0.0,  # Then what stands still has one pose in all layers, and is never refined.

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,11 +34,14 @@ from athcodec.encoding.segments.segment import (
     thread_count,
     time_components,
 )
-from athcodec.encoding.segments.settings import Settings
+from athcodec.encoding.segments.settings import Key, Settings
 from athcodec.encoding.segments.time_bases import TimeComponents
 from athcodec.encoding.streams import streams
 from athcodec.errors import BoundError
 from athcodec.files.threads import ThreadPool
+
+TimeComponentsOfSamples: TypeAlias = list[dict[int | None, TimeComponents]]
+"""For each sample its components over time by stage; None: those of all stages."""
 
 LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are learned from.
 PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
@@ -51,24 +55,21 @@ class Trials:
     ath: Ath
     start: Settings  # Settings that the search starts with.
     samples: Sequence[SegmentSample]  # From calm to wild.
+    extrapolation: ExtrapolationFactors  # From the part of a plant that is tried to the whole.
     jobs: int | None = None
     work: Work = field(default_factory=Work)  # Work that the whole search may take.
-    extrapolation: ExtrapolationFactors | None = (
-        None  # Factors from the sample to the plant; None: the sample is the plant.
-    )
     map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by stage.
     _work_done: int = field(init=False, default=0)  # Work of all trials.
-    _known: dict[tuple, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
-    _components: dict[tuple, Components] = field(init=False, default_factory=dict)
-    _last_modes: tuple[tuple, LearnedModes] | None = field(init=False, default=None)
-    _time_components: dict[tuple, tuple[float, list]] = field(init=False, default_factory=dict)
-    _preludes: dict[tuple, CodedPrelude] = field(init=False, default_factory=dict)
-    _seen_preludes: set[tuple] = field(init=False, default_factory=set)
+    _known: dict[Key, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)
+    _components: dict[Key, Components] = field(init=False, default_factory=dict)
+    _last_modes: tuple[Key, LearnedModes] | None = field(init=False, default=None)
+    _time_components: dict[Key, tuple[float, TimeComponentsOfSamples]] = field(init=False, default_factory=dict)
+    _preludes: dict[Key, CodedPrelude] = field(init=False, default_factory=dict)
+    _seen_preludes: set[Key] = field(init=False, default_factory=set)
     _lock: Lock = field(init=False, default_factory=Lock)  # Threads that try candidates share the preludes.
 
     def __post_init__(self) -> None:
         self.stages = self.start.stages
-        self.extrapolation = self.extrapolation or ExtrapolationFactors.everything(self.stages)
 
     @property
     def is_layered(self) -> bool:
@@ -143,7 +144,7 @@ class Trials:
             self.work.report()
         return [self._known[key][0] if key in fitting else math.inf for key in keys]
 
-    def _fitting(self, keys: Sequence[tuple]) -> set[tuple]:
+    def _fitting(self, keys: Sequence[Key]) -> set[Key]:
         """Return the keys of those candidates whose cost is known, or whose trials fit the work that is allowed."""
         known = {key for key in keys if key in self._known}
         for key in keys:
@@ -178,11 +179,17 @@ class Trials:
         """Return the bytes of hierarchy and rest pose of the whole plant."""
         return self.prelude(settings).prelude_bytes * self.extrapolation.vertices
 
-    def learned_modes(self, plan: Plan, settings: Settings, everywhere: bool = False) -> LearnedModes | None:
-        """Return the modes of the pieces that the settings name, or of all pieces."""
-        if settings.learned_pieces is None and not everywhere:
-            return None
-        seen, pieces = self._learn_modes(settings), None if everywhere else settings.learned_pieces
+    def learned_modes(self, plan: Plan, settings: Settings) -> LearnedModes | None:
+        """Return the learned modes of the pieces that the settings name; None if they name none."""
+        return None if settings.learned_pieces is None else self._learned(plan, settings, settings.learned_pieces)
+
+    def learned_modes_everywhere(self, plan: Plan, settings: Settings) -> LearnedModes:
+        """Return the learned modes of all pieces."""
+        return self._learned(plan, settings, None)
+
+    def _learned(self, plan: Plan, settings: Settings, pieces: np.ndarray | None) -> LearnedModes:
+        """Return the learned modes of some pieces, (P,) bool, or of all if that is None."""
+        seen = self._learn_modes(settings)
         key = id(seen), settings.step, pieces if pieces is None else pieces.tobytes()
         last = self._last_modes  # Other rest poses are tried with the same modes, by several threads.
         if last is None or last[0] != key:
@@ -227,7 +234,9 @@ class Trials:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)
             coded = [self.coded(settings, number, modes) for number in range(len(self.samples))]
-            stages = sum(self._stage_bytes(one, sample) for one, sample in zip(coded, self.samples))
+            stages = np.zeros(self.stages)
+            for one, sample in zip(coded, self.samples):
+                stages += self._stage_bytes(one, sample)
         except BoundError:
             self._count(progress.TRIAL)
             return math.inf, np.full(self.stages, math.inf)
@@ -239,7 +248,7 @@ class Trials:
         self._count(progress.TRIAL + self.work_of(each) + coding)
         stored = streams.encode_learned_modes(plan, modes)
         mode_bytes = sum(len(stream) * self.extrapolation.rows[stage] for stage, stream in stored.items())
-        return stages.sum() + mode_bytes + self.prelude_bytes(settings), stages
+        return float(stages.sum()) + mode_bytes + self.prelude_bytes(settings), stages
 
     def _count(self, work: float) -> None:
         """Count the work of a trial."""
@@ -276,7 +285,7 @@ class Trials:
         plan = self.prelude(settings).plan
         return stage_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
 
-    def _learn_time(self, settings: Settings) -> tuple[float, list[dict[int | None, TimeComponents]]]:
+    def _learn_time(self, settings: Settings) -> tuple[float, TimeComponentsOfSamples]:
         """Return the components of the samples over time, of each stage and of all, and the step of the trial that
         asked first for them: they hardly depend on the step."""
         only_common = self.is_layered and settings.common_basis
@@ -316,6 +325,6 @@ def distinct(candidates: Iterable[Settings]) -> list[Settings]:
     return list({settings.key: settings for settings in candidates}.values())
 
 
-def _before_modes(settings: Settings) -> tuple:
+def _before_modes(settings: Settings) -> Key:
     """Return what decides the motion that is left for the modes of a piece."""
     return settings.rotation_step_factors, settings.forms.tobytes(), settings.still

@@ -244,7 +244,8 @@ def _rests(
 ) -> tuple[writing.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
     """Return the content of REST, what it decodes to if the first layer refines it, and of each layer the decoded pose
     and what refines the pose before."""
-    rest, at_once = prelude.rest_chunk, [(prelude.plan.rest, None)] * len(ratios)
+    rest = prelude.rest_chunk
+    at_once: list[tuple[np.ndarray, streams.CodedRest | None]] = [(prelude.plan.rest, None)] * len(ratios)
     if source.exact_rest or len(ratios) == 1 or Feature.REFINED_REST in source.without:
         return rest, None, at_once
     wanted = [qz.first_rest_step(rest.step, settings.bound, ratios[0])]
@@ -508,6 +509,7 @@ class CodedMotion:
         settings, last = layer.settings, layer.plan.stage_count - 1
         self._corrected.clear()  # Stages before are finished.
         release_memory()
+        assert self._bases is not None
         bases = self._bases.refined(layer, last, stage)
         segment, decoded = analyse(
             layer.plan, self._output, settings, self.positions, layer.modes, bases, before=before, ratio=ratio
@@ -584,8 +586,8 @@ class CodedMotion:
             self._join_stage(stage, end, positions, layer)
         with self._corrected_as_shown(stage, positions):
             loop_pose = self._source.last_shown(positions) if self._loops else None
-            shown = loop_pose if end is None else end.shown[0]
-            self.flaws.append(self._source.flaws(positions, shown, self.errors[stage][0]))
+            before = loop_pose if end is None else end.shown[0]
+            self.flaws.append(self._source.flaws(positions, before, self.errors[stage][0]))
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
@@ -598,13 +600,13 @@ class CodedMotion:
     def _join_stage(self, stage: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
         """Join one stage, whose positions change; layer: the one that ends with it."""
         some = seen(len(positions))
+        price: ErrorPrice | CorrectionPrice
         if layer is None:
             most_rms = self.errors[stage - 1][RMS] if stage > 0 else math.inf
             price = ErrorPrice(self.errors[stage][RMS], most_rms, positions.shape[2])
         else:
-            limit, share = layer.settings.limit, len(positions[some]) / len(positions)
-            bytes_ = share * (self._shared_bytes + self._bytes_up_to(stage))
-            price = CorrectionPrice(limit if np.isscalar(limit) else limit[some], bytes_)
+            bytes_ = len(positions[some]) / len(positions) * (self._shared_bytes + self._bytes_up_to(stage))
+            price = CorrectionPrice(layer.settings.limit_of(some), bytes_)
         largest = max(errors[0] for errors in self.errors[stage - 1 : stage + 1]) if stage > 0 else math.inf
         join = best_join(end.of(some), positions[some], self._wanted_start, price, largest)
         if join == 0:
@@ -620,7 +622,7 @@ class CodedMotion:
             if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
                 self._meet(end.corrections)
             self.errors[stage] = self._finish_stage(layer, stage, positions)
-        if stage == self._stage_0.stage_count - 1:
+        if layer is not None and stage == self._stage_0.stage_count - 1:
             self._keep_last_stage_best(layer, stage, positions)
 
     def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:

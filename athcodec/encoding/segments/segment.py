@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -93,8 +94,8 @@ class Source:
     _only: list[np.ndarray] = field(init=False, repr=False, compare=False)  # Those of an only segment, once read.
 
     def __post_init__(self) -> None:
-        stays_in_place = self.exact_rest and self.seen.repeats[1:].all()  # Then the error may be 0 to the last bit.
-        is_exact = self.clip.dtype == np.float64 or stays_in_place
+        stays_in_place = self.exact_rest and bool(self.seen.repeats[1:].all())
+        is_exact = self.clip.dtype == np.float64 or stays_in_place  # Then the error may be 0 to the last bit.
         first = self.clip.rest[self.hierarchy.vertex_source[0]]  # The rest pose of a rooted plant begins at 0.
         self.origin = qz.origin_of(first, self.seen.low, self.seen.high, is_exact)
         self.source_rest = self.clip.rest[self.hierarchy.vertex_source] - self.origin
@@ -202,7 +203,8 @@ class Source:
         # Where segments are cut elsewhere, a held frame may stand for others that the same pose stood for.
         return self._changed(held=held, held_error=2 * worst)
 
-    def _changed(self, **fields) -> Source:
+    def _changed(self, **fields: Any) -> Source:
+        """Return the source with other fields; it shares the positions that were read if its segments are the same."""
         source = replace(self, **fields)
         if source.segments == self.segments and source.held is self.held:
             source._held, source._only = self._held, self._only
@@ -297,8 +299,9 @@ class Source:
         """Return for each stage the weight that such a part of its vertices and those below fall short of, (stages,). A
         stage without vertices has the weight of the one above."""
         stage = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
-        below = [self.weights[stage >= first] for first in range(stages)]
-        quantiles = [float(np.quantile(weights, part)) if len(weights) else 0.0 for weights in below]
+        weights = np.ones(len(stage)) if self.weights is None else self.weights
+        below = [weights[stage >= first] for first in range(stages)]
+        quantiles = [float(np.quantile(some, part)) if len(some) else 0.0 for some in below]
         return np.maximum.accumulate(quantiles)
 
     def is_whole_loop(self, segment: int) -> bool:
@@ -351,8 +354,10 @@ class Source:
         """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
         positions = self._held.get(segment)
         if positions is None:
-            of_plant = self.whole and self.whole[0]._held.get(segment)
-            positions = self.relative(self.block(segment)) if of_plant is None else of_plant[self.whole[1]]
+            if self.whole is not None and (of_plant := self.whole[0]._held.get(segment)) is not None:
+                positions = of_plant[self.whole[1]]
+            else:
+                positions = self.relative(self.block(segment))
             positions.setflags(write=False)
             self._held[segment] = positions
         if len(self.segments) == 1:  # A search asks for them again and again.
@@ -834,8 +839,8 @@ def _some_corrections(
     if count >= LEAST_SAMPLED:
         spread = slice(0, None, -(-count // SPREAD))
         errors = decoded[spread] - positions[spread] - prelude.origin[:, None]
-        limit = settings.limit if np.isscalar(settings.limit) else settings.limit[spread, None]
-        beyond = np.mean((np.square(errors).sum(axis=1) > np.square(limit)).sum(axis=1))
+        squared_limit = np.square(settings.limit_of(spread))[..., None]
+        beyond = np.mean((np.square(errors).sum(axis=1) > squared_limit).sum(axis=1))
         most = MANY + MANY_SHARE * decoded[:, 0].size
         while part < SPARSE and beyond * len(plan.sample(part).vertices) > most:
             part *= 2
@@ -849,6 +854,6 @@ def sampled_corrections(
     if part == 1:
         return find_corrections(decoded, positions, origin, settings, plan), np.arange(len(decoded))
     some = plan.sample(part)
-    at, limit = some.vertices, settings.limit
-    of_sample = replace(settings, limit=limit if np.isscalar(limit) else limit[at])
+    at = some.vertices
+    of_sample = replace(settings, limit=settings.limit_of(at))
     return find_corrections(decoded[at], positions[at], origin, of_sample, some), at

@@ -78,6 +78,10 @@ class Settings:
         values = (getattr(self, name) for name in names)
         return tuple(value.tobytes() if isinstance(value, np.ndarray) else value for value in values)
 
+    def limit_of(self, vertices: np.ndarray | slice) -> float | np.ndarray:
+        """Return the limit of some vertices: one distance, or one for each of them."""
+        return self.limit[vertices] if isinstance(self.limit, np.ndarray) else self.limit
+
     @property
     def stages(self) -> int:
         """The number of stages of the branch hierarchy."""

@@ -333,9 +333,8 @@ def find_corrections(
         return rows
 
     parts = pool.map(find, ranges(vertices, 3 * frames))
-    if any(rows is None for rows in parts):
-        return None
-    return np.concatenate(parts)
+    expressed = [rows for rows in parts if rows is not None]
+    return np.concatenate(expressed) if len(expressed) == len(parts) else None
 
 
 def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: float) -> None:
@@ -370,7 +369,7 @@ def find_rigid_corrections(
     first, counts = (np.ascontiguousarray(numbers, np.int32) for numbers in parts)
 
     def find(start: int, stop: int) -> np.ndarray:
-        return _rows(
+        rows = _rows(
             int(counts[start:stop].sum()) * frames,
             lambda rows, capacity: lib.ath_find_rigid_corrections(
                 stop - start,
@@ -389,6 +388,8 @@ def find_rigid_corrections(
                 capacity,
             ),
         )
+        assert rows is not None  # The core leaves a part out that no correction serves.
+        return rows
 
     per_part = 3 * frames * max(1, int(counts.sum()) // max(1, len(counts)))
     corrections = np.concatenate([np.empty((0, 6), np.int32), *pool.map(find, ranges(len(first), per_part))])

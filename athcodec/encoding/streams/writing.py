@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 import numpy as np
 import zstandard
@@ -66,11 +66,19 @@ def _order(chunk: Chunk) -> tuple[int, ...]:
     return (0 if is_prelude(chunk.kind) else 2, chunk.kind & KIND_ID)
 
 
+class Spool(Protocol):
+    """A temporary file."""
+
+    def seek(self, offset: int, whence: int = ..., /) -> int: ...
+    def read(self, size: int = ..., /) -> bytes: ...
+    def write(self, data: bytes, /) -> int: ...
+
+
 @dataclass
 class ChunkStore:
     """Chunks on their way into a file: payloads in a spool, in any order."""
 
-    spool: BinaryIO
+    spool: Spool
     entries: list[tuple[Chunk, int]] = field(default_factory=list)
 
     def add(self, kind: int, payload: bytes, stage: int = NO_LEVEL, segment: int = 0) -> None:

@@ -90,6 +90,7 @@ class GltfFile:
     def _read_json(self, file: BinaryIO) -> bytes:
         self.budget.need(self.size, "file")
         head = file.read(_GLB_HEADER.size)
+        text: bytes | None = None
         if head[:4] != b"glTF":
             text = head + file.read()
             kind = kind_of_bytes(text[:HEAD_BYTES], self.size)
@@ -103,7 +104,7 @@ class GltfFile:
             raise ClipError(f"GLB: got version {version}, expected 2")
         if length > self.size:
             raise ClipError(f"GLB: got {self.size} bytes, expected {length}: the file is cut off")
-        text, place = None, _GLB_HEADER.size
+        place = _GLB_HEADER.size
         while place + _CHUNK_HEADER.size <= length:
             file.seek(place)
             size, kind = _CHUNK_HEADER.unpack(file.read(_CHUNK_HEADER.size))
@@ -136,12 +137,12 @@ class GltfFile:
     def item(self, kind: str, index: JsonValue) -> JsonObject:
         """Return entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
         every = self.json.get(kind)
-        count = len(every) if isinstance(every, list) else 0
-        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
-            raise ClipError(f"{kind}: got index {brief(index)}, expected one below {count}")
-        if not isinstance(every[index], dict):
-            raise ClipError(f"{kind}: entry {index} is {brief(every[index])}, expected an object")
-        return every[index]
+        entries = every if isinstance(every, list) else []
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
+            raise ClipError(f"{kind}: got index {brief(index)}, expected one below {len(entries)}")
+        if not isinstance(entries[index], dict):
+            raise ClipError(f"{kind}: entry {index} is {brief(entries[index])}, expected an object")
+        return entries[index]
 
     def items(self, kind: str) -> list[JsonObject]:
         return entries(self.json, kind)

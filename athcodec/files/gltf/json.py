@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import TypeVar, cast
 
 import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.untyped import JsonMapping, JsonObject, JsonValue
+
+Key = TypeVar("Key", bound=int | str)
+Entry = TypeVar("Entry")
 
 BROKEN = (LookupError, AttributeError, MemoryError, OverflowError, RecursionError, TypeError, ValueError)
 """What a reader may stumble on in a file that keeps to no rule."""
@@ -70,8 +74,8 @@ def brief(value: JsonValue) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def looked_up(table: JsonMapping, key: JsonValue, subject: str) -> JsonValue:
+def looked_up(table: Mapping[Key, Entry], key: JsonValue, subject: str) -> Entry:
     """Return the entry `key` of a table of what glTF allows. Raises ClipError."""
     if not isinstance(key, (int, str)) or key not in table:
         raise ClipError(f"{subject}: got {brief(key)}, expected one of {', '.join(map(str, table))}")
-    return table[key]
+    return table[cast(Key, key)]

@@ -111,7 +111,7 @@ def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -
         positions, time = rest[None].astype(clip.dtype), clip.time[:1]
     else:
         frames = Frames(lambda a, b: clip.block(a, b)[:, vertices], clip.frame_count, len(vertices), clip.dtype)
-        frames.chunks = getattr(clip.positions, "chunks", None)  # type: ignore[attr-defined]
+        frames.chunks = getattr(clip.positions, "chunks", None)
         positions, time = frames, clip.time
     some = MotionClip(
         positions,

@@ -9,6 +9,7 @@ import numpy as np
 
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.learned_modes import estimated_bits
+from athcodec.encoding.model.motion import LearnedModes
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import progress
 from athcodec.encoding.search.choices.forms import in_each_basis
@@ -72,17 +73,19 @@ def pieces_that_save(
     """Return for each required saving the pieces whose estimated bits shrink by that factor, (P,) bool, and what share
     of all bits they save."""
     plan = trials.prelude(plain).plan
-    modes = trials.learned_modes(plan, plain, everywhere=True)
+    modes = trials.learned_modes_everywhere(plan, plain)
     piece_count = len(modes.counts)
     piece_of_row = np.repeat(np.arange(piece_count), plan.ranks)
-    bits_without, bits_with = (
-        sum(
-            estimated_bits(trials.analysed(plain, number, tried, bent=True).coefficients, piece_of_row, piece_count)
-            * sample.scale
-            for number, sample in enumerate(trials.samples)
-        )
-        for tried in (None, modes)
-    )
+
+    def bits(tried: LearnedModes | None) -> np.ndarray:
+        """Return the estimated bits of each piece in the whole file, (P,), with these learned modes."""
+        of_pieces = np.zeros(piece_count)
+        for number, sample in enumerate(trials.samples):
+            integers = trials.analysed(plain, number, tried, bent=True).coefficients
+            of_pieces += estimated_bits(integers, piece_of_row, piece_count) * sample.scale
+        return of_pieces
+
+    bits_without, bits_with = bits(None), bits(modes)
     price = estimated_bits(modes.integers, np.repeat(np.arange(piece_count), modes.counts), piece_count)
     chosen = [(modes.counts > 0) & ((bits_with + price) * saving < bits_without) for saving in required_savings]
     saved = bits_without - bits_with - price

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.search.choices.forms import in_each_basis
@@ -57,20 +59,24 @@ def walked(
     return settings
 
 
-def _walk(settings: Settings, trials: Trials, name: str, factor: float, cap: float, ahead: list[int]) -> Settings:
+def _walk(
+    settings: Settings, trials: Trials, name: Literal["step", "rest_step"], factor: float, cap: float, ahead: list[int]
+) -> Settings:
     """Walk one of the steps, up to a cap. ahead: exponents of the factor that are tried beside the nearest."""
 
     def moved(exponent: int) -> Settings:
-        return replace(settings, **{name: qz.single(min(getattr(settings, name) * factor**exponent, cap))})
+        if name == "step":
+            return replace(settings, step=qz.single(min(settings.step * factor**exponent, cap)))
+        return replace(settings, rest_step=qz.single(min(settings.rest_step * factor**exponent, cap)))
 
-    def costs_at(exponents) -> dict[int, float]:
+    def costs_at(exponents: Sequence[int]) -> dict[int, float]:
         return dict(zip(exponents, trials.costs([moved(exponent) for exponent in exponents])))
 
     costs = costs_at([-1, 0, 1])
-    if min(costs, key=costs.get) == 0:
+    if min(costs, key=costs.__getitem__) == 0:
         costs |= costs_at(ahead)
     while True:
-        best = min(costs, key=costs.get)
+        best = min(costs, key=costs.__getitem__)
         wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= LONGEST_WALK]
         if not wanted:
             return moved(best)
