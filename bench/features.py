@@ -56,7 +56,7 @@ NEEDS: Mapping[Feature, frozenset[Feature]] = {  # Features without which a feat
     Feature.FREE_RIGID: frozenset({Feature.RIGID}),
     Feature.TURN: frozenset({Feature.RIGID}),
     Feature.CONNECTED: frozenset({Feature.ADAPTIVE}),
-    Feature.LEVEL_0_REST: frozenset({Feature.REFINED_REST}),
+    Feature.STAGE_0_REST: frozenset({Feature.REFINED_REST}),
 }
 LEAST = 3.0  # Per cent that a feature has to save on clips of MAKERS makers.
 MAKERS = 2  # Makers of clips that a feature without another use has to serve.
@@ -69,7 +69,7 @@ USES: Mapping[Feature, str] = {  # Uses that bytes do not judge.
     Feature.RIGID: "the shape of leaves",
     Feature.TURN: "the shape of leaves",
     Feature.FREE_RIGID: "leaves that fall",
-    Feature.LEVEL_0_REST: "the first picture",
+    Feature.STAGE_0_REST: "the first picture",
     Feature.REFINED_REST: "the first picture",
     Feature.HOST: "the mesh of the host",
     Feature.JOINS: "seams",
@@ -106,7 +106,7 @@ use that bytes do not judge.
 NOT_JUDGED = """
 Bytes do not judge these features: lossless levels, uneven times, loops, weights, joins, which smooth motion over
 seams, leaves that fall, rigid parts and a largest step of their rotations, which keep the shape of leaves, and a rest
-pose for level 0 alone, which brings the first picture early. An encoder alone cannot leave out these: modes of a free
+pose for stage 0 alone, which brings the first picture early. An encoder alone cannot leave out these: modes of a free
 beam for maps, gaps in bases, the sheet's own rotation, ends first and copies in predicted motion, both kinds of maps.
 """
 
@@ -253,7 +253,7 @@ class _Files:
             Feature.FREE_RIGID: settings.free_rigid,
             Feature.TURN: settings.turn_step > 0,
             Feature.MEAN_POSE: choice.reference is not None,
-            Feature.LEVEL_0_REST: layered,
+            Feature.STAGE_0_REST: layered,
             Feature.REFINED_REST: layered,
             Feature.WIDE: True,
             Feature.JOINS: plan.segment_count > 1,

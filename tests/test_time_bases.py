@@ -109,7 +109,7 @@ def test_a_sum_of_a_few_shapes_takes_less_than_shapes_and_weights_do_as_short_in
     short_integers = 2 * count * (3 * clip.vertex_count + clip.frame_count)
     summary = athcodec.encode(clip, tmp_path / "a.ath", rel_error=bound, ladder="none")
     assert summary.bytes < short_integers
-    assert summary.chunk_bytes["AFFINES"] < 0.05 * summary.bytes, "maps of coarse levels have a small share"
+    assert summary.chunk_bytes["AFFINES"] < 0.05 * summary.bytes, "maps of coarse stages have a small share"
 
 
 def test_branches_whose_bending_turns_nothing_make_a_sum_of_shapes_smaller(tmp_path):

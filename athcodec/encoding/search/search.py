@@ -83,7 +83,7 @@ def _learned_cost(trials: Trials) -> float:
 
 
 CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
-    best_stage_steps: "steps of levels",
+    best_stage_steps: "steps of stages",
     best_freedom: "freedom of rigid parts",
     forms.best_forms: "forms",
     forms.best_forms_again: "forms",
@@ -100,7 +100,7 @@ CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
     finer_steps: "finer steps",
     calm_parts: "calm parts",
     best_slack: "precision of the rest pose",
-    best_node_steps: "maps of coarse levels",
+    best_node_steps: "maps of coarse stages",
     settled: "all choices again",
 }
 BY_NAME = {choose.__name__: choose for choose in CHOICES}

@@ -289,7 +289,7 @@ def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: S
         return streams.encode_rest(plan.branches, step, source.rest, before, mesh=mesh, shape_of=shape_of)
 
     at_once = encode(step)
-    is_out = Feature.LEVEL_0_REST in source.without or STAGE_0_STEP * step > settings.coarsest_rest_step
+    is_out = Feature.STAGE_0_REST in source.without or STAGE_0_STEP * step > settings.coarsest_rest_step
     if is_out or not plan.stage_0_stands_alone:
         return [at_once]
     stage_0 = encode(STAGE_0_STEP * step)
