@@ -68,44 +68,43 @@ def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
     few tracks only in frames that do not turn. Where time bases make a file far smaller than waves do, they stay, so
     that the choices that follow are made in them, and take less work."""
-    best, in_waves = first_move(settings, trials), trials.cheapest(_in_waves(settings, trials))
+    in_waves, best = _first_moves(settings, trials)
     return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(in_waves, still=best.still)
 
 
-def first_move(settings: Settings, trials: Trials) -> Settings:
-    """Return the cheapest of settings in waves and in time bases, on both kinds of branches: where work is short, no
+def _kinds(settings: Settings, trials: Trials) -> list[tuple[Settings, list[Settings]]]:
+    """Return for both kinds of branches, those of the settings first, the settings in waves and in time bases."""
+    kinds = [settings] if trials.without(Feature.STILL) else [settings, _other_kind(settings).in_waves()]
+    return [(in_waves, learned_bases.candidates(in_waves, trials)) for in_waves in kinds]
+
+
+def _first_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
+    """Return the cheapest settings in waves, and the cheapest of all, as far as the work allows: where it is short, no
     other choice saves as much."""
-    in_waves = trials.cheapest(tried := _in_waves(settings, trials))
+    kinds = _kinds(settings, trials)
+    if kinds[1:] and trials.costs([kinds[1][0]])[0] > HOPELESS_STILL * trials.cost(settings):
+        del kinds[1:]
+    tried = [in_waves for in_waves, _ in kinds]
+    in_waves = trials.cheapest(tried)
     if not trials.work.fits(2 * trials.work_of_trial):
-        return in_waves
+        return in_waves, in_waves
     if any(settings.rotation_step_factors):  # What turns steadily is a sum of a few shapes in each kind of branches.
-        return trials.cheapest([*tried, *learned_bases.candidates(in_waves, trials)])
-    tried += learned_bases.candidates(replace(settings, still=True), trials) if tried[1:] else []
-    if not in_waves.still:  # One time basis alone would win against waves.
-        tried += learned_bases.candidates(settings, trials)[:1]
-    return trials.cheapest(tried)
+        tried += next(in_bases for one, in_bases in kinds if one is in_waves)
+    else:
+        tried += [candidate for _, in_bases in kinds[1:] for candidate in in_bases]
+        if not in_waves.still:  # One time basis alone would win against waves.
+            tried += kinds[0][1][:1]
+    return in_waves, trials.cheapest(tried)
 
 
 def typical_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
-    """Return the cheapest of settings in waves, and of those in time bases, whatever work is left."""
-    has_other = not trials.without(Feature.STILL)
-    in_waves = min([settings, *([_other_kind(settings).in_waves()] if has_other else [])], key=trials.cost)
+    """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left."""
+    kinds = _kinds(settings, trials)
+    in_waves = min((in_waves for in_waves, _ in kinds), key=trials.cost)
     if any(settings.rotation_step_factors):
         return in_waves, in_waves
-    kinds = [
-        replace(settings, still=still, learned_pieces=None) for still in ((True, False) if has_other else (False,))
-    ]
-    in_bases = [candidate for kind in kinds for candidate in learned_bases.candidates(kind, trials)]
+    in_bases = [candidate for _, candidates in reversed(kinds) for candidate in candidates]
     return in_waves, min(in_bases, key=trials.cost, default=in_waves)
-
-
-def _in_waves(settings: Settings, trials: Trials) -> list[Settings]:
-    """Return the settings and, unless they are hopeless, those with the other kind of branches, in waves."""
-    if trials.without(Feature.STILL):
-        return [settings]
-    other = _other_kind(settings).in_waves()
-    hopeless = trials.costs([other])[0] > HOPELESS_STILL * trials.cost(settings)
-    return [settings] if hopeless else [settings, other]
 
 
 def _other_kind(settings: Settings) -> Settings:
