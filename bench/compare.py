@@ -131,6 +131,8 @@ def rows(
 
 
 def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict[str, Any]:
+    """Return the row of a clip: its sizes by athcodec and by the best other codec at each bound."""
+
     def size(codec: str, bound: float) -> int | None:
         return sizes[codec, bound]["bytes"] if (codec, bound) in sizes else None
 
@@ -243,6 +245,7 @@ def lost_text(suites: Iterable[Mapping[str, Any]], bounds: Collection[float] = B
 
 
 def _lost_row(kind: str, lost: Sequence[tuple[str, Point, Point]]) -> dict[str, Any]:
+    """Return the row of one kind of motion about the files in which another codec is smaller."""
     savings = [100 * (1 - best["bytes"] / ours["bytes"]) for _, ours, best in lost]
     chunks = [_chunk_bytes(ours) for _, ours, _ in lost]
     motion, rest = (

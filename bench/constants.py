@@ -217,6 +217,7 @@ def changed(some: Iterable[Constant], factor: float) -> Iterator[None]:
 
 @cache
 def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
+    """Return each module and name under which the package knows a constant."""
     places = [(sys.modules[constant.module], constant.name)]
     for name, module in list(sys.modules.items()):
         if name.startswith("athcodec.") and getattr(module, "__file__", None):

@@ -158,6 +158,7 @@ class _Learner:
     def _best_order(
         self, names: Sequence[str], states: list[_State], done: tuple[str, ...]
     ) -> tuple[tuple[str, ...], list[_State]]:
+        """Return the order in which each next choice saves most for its work, and the clips' states after it."""
         left, chosen = list(names), ()
         while left:
             tried = {name: self._applied(states, done + chosen, name) for name in left}
@@ -271,7 +272,8 @@ def _file_rows(
 
 
 def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what a half says of the order learned, and of the default effort."""
+    """Return means over the clips of one half: the learned order against the encoder's, and default effort against
+    best."""
     return {
         "clips": len(rows),
         "files that differ": sum(row["learned / encoder"] != 1 for row in rows),

@@ -66,7 +66,7 @@ def captions() -> Iterator[tuple[str, str]]:
 
 
 def _encoded(folder: Path) -> dict[str, Path]:
-    """Return files of the clips that do not ship as such."""
+    """Encode the gallery's clips that do not ship with the package, and return the files by name."""
     made = {}
     for name, (source, bound) in MADE.items():
         made[name] = folder / f"{name}.ath"
@@ -76,6 +76,7 @@ def _encoded(folder: Path) -> dict[str, Path]:
 
 
 def _forest() -> bytes:
+    """Return a picture of a forest that the viewer draws, as WebP bytes."""
     from PIL import Image
 
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:

@@ -108,7 +108,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _same_nodes(result: Encoded) -> Ath:
-    """Return the paper's ATH with the thresholds of the file."""
+    """Return the hierarchy of the paper for the thresholds of the file. Raises RuntimeError if the file states other
+    nodes."""
     hierarchy = result.decoder.file.hierarchy
     ath = athcodec.build_ath(result.clip, max_error=result.summary.max_error_bound, hierarchy=hierarchy)
     stored, computed = result.decoder.file.table1(), ath.table1()
@@ -125,6 +126,7 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
 
 
 def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
+    """Return errors of one level over the diagonal, beside those of the paper's method with the same nodes."""
     diagonal = error.diagonal
     return {
         "nodes": stored.nodes,
@@ -233,6 +235,7 @@ def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
 
 
 def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str, Any]:
+    """Return how far branches come off their attach points at a level, beside the paper's method."""
     clip = result.clip
     frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])

@@ -86,6 +86,7 @@ def _row(peak: dict[str, int]) -> dict[str, float | int]:
 
 
 def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:
+    """Encode a file, and return its facts and the peak memory of this process before and after, in bytes."""
     imports = peak_bytes()
     with athcodec.read(source) as clip:
         summary = athcodec.encode(clip, target, rel_error=rel_error, segment_frames=segment_frames, attributes="none")

@@ -218,6 +218,7 @@ class _Figures:
         self._gaps = [0.0, 0.0]
 
     def add(self, moved: np.ndarray, direct: np.ndarray) -> None:
+        """Measure frames (k, V, 3) of a mesh bound to the plant against those of the mesh as it was simulated."""
         for meter, some in zip(self._meters, (self._wood, ~self._wood)):
             if some.any():
                 meter.add(direct[:, some], moved[:, some])
@@ -229,6 +230,7 @@ class _Figures:
                 self._gaps[number] = max(self._gaps[number], wider)
 
     def row(self) -> dict[str, Any]:
+        """Return the measured errors, stretches and gaps as a row of the table."""
         wood, leaves = self._meters
         stretch, direct = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
         row: dict[str, Any] = {"wood max": wood.max_error, "wood RMS": wood.rms_error}

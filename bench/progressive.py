@@ -90,6 +90,7 @@ def _bounds(rel_error: float) -> list[float]:
 
 
 def _prefixes(result: Encoded, curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each level: its bytes and errors, and the bytes of a file encoded directly at the same error."""
     scale = _diagonal(result)
     for level in result.decoder.levels:
         row = {"level": level.level, "bytes": level.bytes}

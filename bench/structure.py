@@ -77,13 +77,14 @@ def _bound(scene: Scene, rel_error: float) -> float:
 
 
 def _branches(data: bytes) -> list[int]:
-    """Return roots and branches of a file."""
+    """Return the number of roots and the number of branches of an .ath file."""
     with athcodec.open(data) as decoder:
         parent = decoder.file.hierarchy.branch_parent
         return [int((parent < 0).sum()), len(parent)]
 
 
 def _found_row(scene: Scene, rel_error: float, effort: str, has_parts: bool) -> dict[str, Any]:
+    """Return sizes and times of a scene encoded with the branches that are found, and with its true ones."""
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
     branches, seconds = file_and_seconds(scene.bare(), **options)
     true, true_seconds = file_and_seconds(scene.clip, **options)
@@ -106,6 +107,7 @@ def _found_row(scene: Scene, rel_error: float, effort: str, has_parts: bool) -> 
 
 
 def _parts(scene: Scene, options: dict[str, Any]) -> float:
+    """Return the estimated bytes of a scene if each of its plants were a file of its own, from some of them."""
     plants = np.unique(scene.plant)
     chosen = plants[np.unique(np.linspace(0, len(plants) - 1, PARTS).round().astype(int))]
     still = _still_plants(scene)  # They are few, and unlike plants.
@@ -122,6 +124,7 @@ def _still_plants(scene: Scene) -> set[int]:
 
 
 def _default_row(scene: Scene, rel_error: float, effort: str) -> dict[str, Any]:
+    """Return size, time and the quality of level 0 of a scene encoded with default options."""
     data, seconds = file_and_seconds(scene.bare(), rel_error=rel_error, effort=effort)
     clip = scene.clip
     with athcodec.open(data) as decoder:
@@ -142,6 +145,7 @@ def _default_row(scene: Scene, rel_error: float, effort: str) -> dict[str, Any]:
 
 
 def _turning_row(scene: Scene, turning: int, rel_error: float, effort: str) -> dict[str, Any]:
+    """Return the bytes of a scene of standing plants beside those of the same scene that turns as a whole."""
     options = POSITIONS | {"max_error": _bound(scene, rel_error), "effort": effort}
     standing = len(file_and_seconds(bare(scene.standing), **options)[0])
     return {
@@ -153,6 +157,7 @@ def _turning_row(scene: Scene, turning: int, rel_error: float, effort: str) -> d
 
 
 def _segment_row(scene: Scene, bound: float, effort: str) -> dict[str, Any]:
+    """Return the bytes of a scene by the length of its segments, beside those by the default length."""
     options = POSITIONS | {"rel_error": bound, "effort": effort}
     lengths = [length for length in SEGMENTS if length < 2 * scene.clip.frame_count]
     sizes = {

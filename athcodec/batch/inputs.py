@@ -120,6 +120,8 @@ def find(
 
 
 def _target(output: str, name: str) -> str:
+    """Return the path or URL of the output file `name` in the folder `output`. Raises ClipError for a URL with a
+    query."""
     if not is_url(output):
         return os.path.abspath(os.path.join(output, name))
     if "::" in output or "?" in output:
@@ -139,6 +141,8 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
+    """Yield the name and the path or URL of each clip that files, folders, patterns and URLs stand for. Raises
+    ClipError where one stands for none."""
     for text, called in each_once(os.fspath(each) for each in inputs):
         pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
@@ -199,6 +203,7 @@ def _fixed_part(pattern: str, separator: str) -> str:
 
 
 def _remote(url: str) -> Iterator[tuple[str, str]]:
+    """Yield the name and URL of each clip at a URL: of a single file, or of all that a folder or a pattern has."""
     shown = without_secrets(url)
     is_folder = url.endswith("/")
     if not is_folder and not glob.has_magic(url.partition("?")[0]):
@@ -231,7 +236,7 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def download(url: str, path: str) -> str:
-    """Fetch a file, whole; its SHA-256. Raises RemoteError, OSError."""
+    """Download a file to `path` and return its SHA-256. Raises RemoteError, OSError."""
     system, source = file_system(url)
     try:
         system.get_file(source, path)

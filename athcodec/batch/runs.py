@@ -68,7 +68,7 @@ class Outcome:
 
     @property
     def bytes(self) -> int:
-        """Size of all files that it wrote."""
+        """Bytes of all .ath files that the run wrote."""
         return sum(record["bytes"] for record in self.done)
 
     @property
@@ -210,7 +210,7 @@ def _manifest_path(output: FilePath, manifest: FilePath | None) -> str:
 
 
 def _tidy(outputs: Iterable[str]) -> None:
-    """Remove the unfinished files of workers that were stopped."""
+    """Remove the unfinished files that workers left beside these outputs when they were stopped."""
     folders: dict[str, list[str]] = {}
     for output in outputs:
         folder, name = os.path.split(output)
@@ -227,6 +227,8 @@ def _key(item: Item, output: FilePath) -> str:
 
 
 def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
+    """Return whether a clip has to be encoded and why. record: the manifest's record of its last run, None for a new
+    clip."""
     if redo or record is None:
         return Todo(item, "to be redone" if record else "new")
     if record["status"] != "done":
@@ -238,6 +240,8 @@ def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
 
 
 def _fault_of_output(item: Item, record: Record) -> str:
+    """Return what is wrong with the output of an earlier run, which its record describes: "" if it is as it was
+    written."""
     if is_url(item.output):
         try:
             return "" if remote_identity(item.output) == record.get("stored") else "output was changed"
@@ -250,6 +254,7 @@ def _fault_of_output(item: Item, record: Record) -> str:
 
 
 def _todo_by_input(item: Item, record: Record) -> Todo:
+    """Return whether a clip whose output is intact has to be encoded again because its input is another one now."""
     before = {name: value for name, value in record["source"].items() if name != "sha256"}
     try:
         now = identity(item)
@@ -368,6 +373,8 @@ def _folder(folder: str, item: Item) -> str:
 
 
 def _result(future: DaskObject, item: Item) -> Result:
+    """Return the result of a task. A task that failed, or whose workers died, gives {"failed": reason}. Raises
+    SchedulerError if the scheduler was lost."""
     import distributed
 
     try:

@@ -196,6 +196,8 @@ def _size(value: JsonValue) -> int:
 
 
 def _whole(low: int, high: int) -> Callable[[JsonValue], int]:
+    """Return a check that a setting is a whole number from `low` to `high`, which raises ValueError."""
+
     def check(value: JsonValue) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
             raise ValueError(f"expected a whole number, {low} to {high}")
@@ -205,6 +207,7 @@ def _whole(low: int, high: int) -> Callable[[JsonValue], int]:
 
 
 def _tam(value: JsonValue) -> list[JsonValue]:
+    """Return the four thresholds EPS, ETA, XI and LAMBDA of a list or of text with commas. Raises ValueError."""
     parts = value.split(",") if isinstance(value, str) else list(value)
     if len(parts) != 4:
         raise ValueError("expected four values: EPS, ETA, XI, LAMBDA")
@@ -229,6 +232,8 @@ def _format(value: JsonValue) -> str:
 
 
 def _of_kind(kind: type, words: str) -> Callable[[JsonValue], JsonValue]:
+    """Return a check that a setting has a Python type, which raises ValueError with `words` for what is expected."""
+
     def check(value: JsonValue) -> JsonValue:
         if not isinstance(value, kind):
             raise ValueError(f"expected {words}")
@@ -238,6 +243,8 @@ def _of_kind(kind: type, words: str) -> Callable[[JsonValue], JsonValue]:
 
 
 def _one_of(*names: str) -> Callable[[JsonValue], str]:
+    """Return a check that a setting is one of these names, which raises ValueError."""
+
     def check(value: JsonValue) -> str:
         if value not in names:
             raise ValueError(f"expected one of {', '.join(names)}")

@@ -40,7 +40,7 @@ Result = JsonObject
 
 
 def _task(work: Callable[..., Result]) -> Callable[..., Result]:
-    """Make of `work` a task, which returns what goes wrong as its result."""
+    """Return `work` as a task for a worker: an exception of `work` becomes {"failed": reason}, without keys of URLs."""
 
     @wraps(work)
     def task(item: Item, folder: str, *arguments: Any, **options: Any) -> Result:
@@ -83,7 +83,8 @@ def begin(
 
 @_task
 def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
-    """Return some segments of a long clip."""
+    """Code the segments of a long clip with these numbers, and return the path of the file in `folder` that holds
+    them."""
     start = time.perf_counter()
     path = os.path.join(folder, f"segments_{segments[0]}")
     if os.path.exists(path):
@@ -165,7 +166,8 @@ def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]
 
 
 def _source(item: Item, folder: str) -> JsonObject:
-    """Return the input's identity; of a URL, which is fetched, with its SHA-256."""
+    """Return the record that identifies an input: size and time of a file. A URL is downloaded, and its SHA-256 is
+    added."""
     source = identity(item)
     if is_url(item.input):
         source["sha256"] = download(item.input, _local_path(item, folder))
@@ -184,7 +186,8 @@ def _local_path(item: Item, folder: str) -> str:
 
 
 def _target(item: Item, folder: str) -> str:
-    """Return where the file is made."""
+    """Return the path at which a worker writes the file: the output itself, or one in `folder` if the output is a
+    URL."""
     return os.path.join(folder, os.path.basename(item.output)) if is_url(item.output) else item.output
 
 

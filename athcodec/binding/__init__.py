@@ -278,6 +278,8 @@ class OntoMesh(ArrayLike):
         return {"frame_count": meter.frame_count, "max_error": meter.max_error, "rms_error": meter.rms_error}
 
     def _moved_clip(self) -> MotionClip:
+        """Return the mesh as a clip with the plant's frames and times; its positions are computed when they are asked
+        for."""
         view, mesh = self._view, self._mesh
         of_plant = {name: view.metadata[name] for name in OF_PLANT if name in view.metadata}
         of_mesh = {name: value for name, value in mesh.metadata.items() if name not in (*OF_PLANT, *OF_MESH)}
@@ -485,7 +487,8 @@ def _refuse_far_mesh(
 
 
 def _is_in_last_frame(view: ClipView, rest: np.ndarray) -> bool:
-    """Return whether a mesh lies on the plant as it is in the clip's last frame."""
+    """Return whether a mesh at rest (V, 3) lies on the plant as the clip's last frame shows it, and not as it is at
+    rest."""
     last = view.decoder.at_level(None).positions(-1, dtype=np.float64)
     distance = scipy_module("spatial").cKDTree(last).query(rest)[0]
     return bool((distance > FAR * np.linalg.norm(np.ptp(last, axis=0))).mean() < FITS)

@@ -102,7 +102,8 @@ class Chains:
         return length <= WINDING * np.linalg.norm(high - low, axis=1)
 
     def _make_nodes(self, links: np.ndarray) -> None:
-        """Put the vertices of each branch into nodes, from base to tip."""
+        """Group the vertices of each branch into nodes from its base to its tip. links: pairs of vertices (L, 2) that a
+        surface joins."""
         hierarchy = self.hierarchy
         first, count = hierarchy.first_vertex.astype(np.int64), hierarchy.stem_count.astype(np.int64)
         place = np.arange(hierarchy.vertex_count) - np.repeat(first, count)
@@ -129,6 +130,8 @@ class Chains:
         self._node_of_vertex = node_of  # By the vertex' number in file order.
 
     def _join_nodes(self) -> None:
+        """Set `before` and `after`, (N,) for each node: the neighbour towards the root and towards the tip, -1 for
+        none. The first node of a branch comes after the node of its parent that it hangs on."""
         hierarchy, nodes = self.hierarchy, np.arange(len(self.rest))
         is_first = np.append(True, np.diff(self.node_branch) != 0)
         attach = hierarchy.attach[self.node_branch]
@@ -139,6 +142,8 @@ class Chains:
         self.after = np.where(np.append(is_first[1:], True), -1, nodes + 1)
 
     def _make_elements(self) -> None:
+        """Set the elements, each the part of a chain between two nodes: `start`, `end`, length, branch and tangents at
+        rest."""
         hierarchy = self.hierarchy
         is_first = np.append(True, np.diff(self.node_branch) != 0)
         alone = is_first & (self.before < 0) & (self.after < 0)
@@ -160,6 +165,7 @@ class Chains:
         self._rest_tangent = tangent
 
     def _radii(self, radius: np.ndarray | None) -> np.ndarray | None:
+        """Return the mean radius of the vertices of each node, (N,); None if the plant states no usable radii."""
         if radius is None or radius.size != self.hierarchy.vertex_count or radius.dtype.kind not in "fiu":
             return None
         radius = radius.reshape(-1).astype(np.float64)
@@ -196,7 +202,7 @@ class Chains:
     # ---- the rest pose as a curve ----
 
     def at_rest(self, element: np.ndarray, share: np.ndarray) -> np.ndarray:
-        """Return the places (P, 3) on the chains in the rest pose."""
+        """Return the points (P, 3) at a share, 0 to 1, of the way along elements of the chains in the rest pose."""
         return self.curve(self.rest[None], self._leaves[None], self._arrives[None], element, share)[0]
 
     def curve(
@@ -212,7 +218,8 @@ class Chains:
     # ---- motion ----
 
     def pose(self, frames: np.ndarray) -> Pose:
-        """Return the nodes in frames (k, N, 3), which are in the source's order."""
+        """Return centre, rotation and growth of all nodes in frames (k, V, 3), whose vertices are in the source's
+        order."""
         frames = np.asarray(frames, np.float64)
         centre = self._means(frames)
         turn = np.zeros((*centre.shape[:2], 4))
@@ -258,7 +265,7 @@ class Chains:
 
     @cached_property
     def _generations(self) -> list[np.ndarray]:
-        """The nodes of lines by their distance from the root, in nodes."""
+        """Return the nodes of lines in groups: each holds those that are as many nodes away from the root."""
         depth = np.zeros(len(self.before), np.int64)
         ancestor = np.append(np.where(self.before < 0, len(depth), self.before), len(depth))
         steps = np.append((self.before >= 0).astype(np.int64), 0)
@@ -270,6 +277,8 @@ class Chains:
         return np.split(nodes, np.flatnonzero(np.diff(depth[nodes])) + 1)
 
     def _turn_lines(self, centre: np.ndarray, turn: np.ndarray) -> None:
+        """Fill `turn`, quaternions (k, N, 4), for the nodes of lines, from their centres (k, N, 3): each node turns
+        with the one below it, and then by the smallest turn that takes its tangent there."""
         tangent = self._tangents(centre)
         for nodes in self._generations:
             before = self.before[nodes]
@@ -292,6 +301,8 @@ class Chains:
         return stretch / np.clip(stretch, np.maximum(1 - slack, 1e-30), 1 + slack)
 
     def _fit_surfaces(self, frames: np.ndarray, centre: np.ndarray, turn: np.ndarray, size: np.ndarray) -> None:
+        """Fill `turn` (k, N, 4) and `size` (k, N) for the nodes of surfaces: the rotation and growth that fit their
+        vertices best in each frame (k, V, 3)."""
         nodes = np.flatnonzero(~self.is_line[self.node_branch])
         branch = self.node_branch
         rest, now = self.vertex_rest[self._vertices], frames[:, self._vertices]
@@ -321,7 +332,7 @@ class Chains:
 
     @cached_property
     def _beside(self) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes before and after each node on the same branch, -1 for none."""
+        """Return the nodes (N,) before and after each node on its own branch, -1 where the branch begins or ends."""
         before = np.where(self.node_branch[np.maximum(self.before, 0)] == self.node_branch, self.before, -1)
         return before, self.after
 

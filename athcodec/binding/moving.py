@@ -64,11 +64,13 @@ class MovingPoints:
         return max(1, 4 * BLOCK_NUMBERS // (rows + 24 * self._chains.hierarchy.vertex_count))
 
     def move(self, frames: np.ndarray) -> np.ndarray:
-        """Return the vertices (k, V, 3) float64 for frames (k, N, 3) of the plant."""
+        """Return the vertices (k, V, 3) float64 of the bound mesh in frames (k, N, 3) of the plant."""
         length = self.block_length
         return np.concatenate([self._moved(frames[start : start + length]) for start in range(0, len(frames), length)])
 
     def _moved(self, frames: np.ndarray) -> np.ndarray:
+        """Return the vertices (k, V, 3) of the bound mesh in so few frames (k, N, 3) of the plant that memory
+        suffices."""
         pose = self._chains.pose(frames)
         centre, matrix = self._chains.places(pose, self._element, self._share)
         points = np.zeros((len(frames), self._count, 3))

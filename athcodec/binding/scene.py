@@ -54,7 +54,8 @@ class Fit:
 
 
 def _factors(assumed: str) -> Iterator[tuple[str, float]]:
-    """Yield units, and the factor on a mesh that was taken to be in another one."""
+    """Yield each unit of length, and the factor that brings a mesh into it which was read as if in the unit
+    `assumed`."""
     for unit, length in METRES.items():
         yield unit, length / METRES[assumed]
 

@@ -91,7 +91,7 @@ class Marks:
         return distance.reshape(len(points), -1), self.branch[mark].reshape(len(points), -1)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance (P,) of points from the nearest mark."""
+        """Return the distance (P,) of each point (P, 3) from the nearest mark."""
         return self.tree.query(points)[0]
 
 
@@ -136,7 +136,7 @@ def _onto(chains: Chains, points: np.ndarray, low: int, high: int) -> tuple[np.n
 
 
 def bind(chains: Chains, mesh: MeshPoints, marks: Marks) -> Binding:
-    """Return what moves the points of a mesh in the plant's rest pose."""
+    """Return which elements of the chains move each point of a mesh, by how much, found in the plant's rest pose."""
     return _Search(chains, mesh, marks).result()
 
 
@@ -151,6 +151,7 @@ class _Search:
         self.card_count = 0
 
     def result(self) -> Binding:
+        """Return the binding of all points: of whole pieces of the mesh first, then of cards, then point by point."""
         if self.mesh.piece_count:
             self._look_at_pieces()
         one_by_one = np.flatnonzero((self.branch < 0) & (self.foot < 0))
@@ -161,6 +162,8 @@ class _Search:
     # ---- pieces ----
 
     def _look_at_pieces(self) -> None:
+        """Decide for each connected piece of the mesh, by a sample of its points, whether one branch moves it as a
+        whole, or a foot on a branch carries it as a card."""
         mesh, chains = self.mesh, self.chains
         inside = np.flatnonzero(mesh.piece >= 0)
         # Vertices are in any order within their piece: every n-th one of a tube may lie on one side of it.
@@ -352,7 +355,7 @@ def _flatness(group: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
 
 
 def _modes(group: np.ndarray, label: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the most frequent label of each group, and its share."""
+    """Return the most frequent label of each of `count` groups, and its share of the group's entries."""
     width = int(label.max()) + 1
     key, votes = np.unique(group * width + label, return_counts=True)
     order = np.lexsort((-votes, key // width))

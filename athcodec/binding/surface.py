@@ -50,7 +50,7 @@ class MeshPoints:
         self.links = joined[joined[:, 0] != joined[:, 1]]
 
     def _find_pieces(self, counts: np.ndarray, corners: np.ndarray, piece: np.ndarray) -> None:
-        """Give points to pieces; piece: (F,) of each face."""
+        """Number the connected pieces of the mesh and give each point its piece, from the piece (F,) of each face."""
         face, number = np.repeat(np.arange(len(counts)), counts), int(piece.max()) + 1
         # A point of several pieces belongs to the largest of them, which is written last.
         faces = np.bincount(piece, minlength=number)

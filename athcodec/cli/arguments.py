@@ -581,6 +581,7 @@ def _decode_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _host_mesh_argument(verb: argparse.ArgumentParser, more: str = "") -> None:
+    """Add `--host-mesh` to a verb. more: text behind its help."""
     verb.add_argument(
         "--host-mesh",
         metavar="FILE",
@@ -692,7 +693,7 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _counted(text: str) -> tuple[str, float]:
-    """Return a file and how many of it: FILE or FILE=COUNT."""
+    """Return the path and the number of plants in FILE=COUNT; FILE alone means 4."""
     file, equals, count = text.rpartition("=")
     return (file, _above_zero(count)) if equals else (text, 4.0)
 

@@ -126,7 +126,7 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
 
 
 def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
-    """Return the mesh of --onto as it moves with a plant; close it."""
+    """Return the mesh of `--onto`, bound to the plant and moving with it. The caller closes it."""
     with naming(args.onto), warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below
         warnings.simplefilter("always", GuessWarning)
@@ -197,6 +197,7 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
 
 
 def _say_not_read(clip: MotionClip, path: str) -> None:
+    """Print what of a source was left out of the clip: other animations, and parts that have no place in it."""
     not_read = dict(clip.not_read)
     if others := not_read.pop("animation", None):
         played = ", ".join(clip.metadata.get("animations", ["none"]))
@@ -306,6 +307,8 @@ def _measured(level: Level, meter: MotionMeter) -> JsonObject:
 
 
 def refuse_broken_promises(result: JsonObject, measured: JsonObject) -> None:
+    """Raise AthError if a measured level is further off than the file states. result: facts of the file; measured:
+    those of one of its clips."""
     levels = measured["levels"]
     broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
     if levels[-1]["max_error"] > result["max_error_bound"]:
@@ -346,7 +349,7 @@ def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
 
 
 def _stats(decoder: Decoder) -> str:
-    """Return how much of a file was read, and by how many requests."""
+    """Return the text of `--stats`: how many bytes of a file were read, and by how many requests over the network."""
     requests = getattr(decoder.file.source, "requests", None)
     if requests is None:
         return f"{decoder.file.bytes_read:,} bytes read of {decoder.file.file_length:,}"

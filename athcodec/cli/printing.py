@@ -195,6 +195,8 @@ def print_preview(todo: Sequence[Any], as_json: bool) -> None:
 
 
 def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
+    """Print what a batch did: how many files were encoded, kept and failed, and their bytes; as JSON if `--json` was
+    passed."""
     if args.json:
         failed = [{name: record[name] for name in ("input", "output", "reason")} for record in outcome.failed]
         print_json(
@@ -241,6 +243,7 @@ def say(kind: str, message: str) -> None:
 
 
 def say_seam(seam: Seam, path: str) -> None:
+    """Print how far vertices move over the seam of a loop, and whether it jumps there."""
     jumps = seam.step > JUMP * seam.step_beside + seam.error
     say(
         "loop",

@@ -169,13 +169,14 @@ def batch(args: argparse.Namespace) -> int:
 
 
 def _listed(path: str) -> list[str]:
-    """Return inputs from a file, one per line; "-" is stdin."""
+    """Return the inputs that a text file lists, one in each line; the path "-" is standard input."""
     with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
         return [line.rstrip("\r\n") for line in file if line.strip()]
 
 
 def _batch_settings(args: argparse.Namespace) -> JsonObject:
-    """Return the settings of a clip that options of the command line give."""
+    """Return the settings for the clips of a batch that differ from the defaults, by the options of the command
+    line."""
     from athcodec.batch.settings import BOUNDS, READING
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
@@ -471,6 +472,7 @@ def view(args: argparse.Namespace) -> int:
 
 
 def _say_where(args: argparse.Namespace, address: str) -> None:
+    """Print the address of the viewer's page and open a browser there, unless `--no-browser` was passed."""
     from athcodec.viewer import view
 
     # Printed as it is, with the key that the page asks for.

@@ -127,6 +127,7 @@ def _write(motion: Placed, samples: Iterator[Sample], instanced: dict[int, Copie
 
 
 def _sampling(numbers: np.ndarray, rate: float) -> AlembicObject:
+    """Return Alembic's time sampling for frames of these numbers at a rate: uniform if they follow one another."""
     steps = np.diff(numbers)
     if np.allclose(steps, 1.0, rtol=0, atol=1e-5):
         return AbcCoreAbstract.TimeSampling(1.0 / rate, float(numbers[0]) / rate)
@@ -239,6 +240,8 @@ def _add(obj: SceneObject, values: list[np.ndarray], arrays: Statics | None) -> 
 
 
 def _mesh_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
+    """Return the first sample of a mesh, with the texture coordinates and normals that `arrays` has; these are removed
+    there."""
     further = {}
     for name, row, array, keyword, kind in (
         ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),

@@ -64,6 +64,7 @@ class Parts:
 
     @classmethod
     def over(cls, order: np.ndarray, first: np.ndarray, count: np.ndarray, rest: np.ndarray) -> Parts:
+        """Return parts of the rest pose (N, 3), each a run of `order`, with their middles, axes and extents."""
         rows = np.concatenate([order[a : a + n] for a, n in zip(first, count)])
         starts, points = np.cumsum(count) - count, rest[rows]
         middle = np.add.reduceat(points, starts) / count[:, None]
@@ -116,6 +117,7 @@ class Placed:
         return rotation * scale[:, None, :], (turn, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rotations (k, 3, 3) and scales along three axes (k, 3) that fit cross-covariances (k, 3, 3) best."""
         scale = self._scale  # The scale of the frame before is a close first guess.
         safe = np.where(self._flat, 1.0, self._spread)
         for _ in range(ROUNDS):

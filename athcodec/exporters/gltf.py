@@ -196,6 +196,7 @@ def _offset_count(shape: GltfMesh) -> int:
 
 
 def _smaller(motion: Motion, offset_count: int, joints: Joints | None) -> str:
+    """Return whether "morphs" or "joints" make the smaller file, as far as joints keep the error that is allowed."""
     morphs = motion.frame_count * (12 * offset_count + 4 * motion.frame_count + BYTES_PER_TARGET)
     fits = joints is not None and joints.max_error <= allowed_error(motion)
     if joints is None or not fits and _morphs_fit(motion, offset_count):
@@ -258,6 +259,7 @@ class _Joined:
     def add(
         self, glb: Glb, root: int, transform: JsonObject, shapes: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
+        """Add the meshes, their joints and the animations of these. Returns no further data."""
         joints, movers = self._joints, []
         if joints is not None:
             movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
@@ -280,6 +282,7 @@ class _Joined:
             self._add_mesh(glb, shape, self._joints)
 
     def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
+        """Add the joints as nodes below `root`, and the skin; return the nodes."""
         nodes: list[int] = []
         for i, (place, turn) in enumerate(zip(*joints.rest[:2])):
             above = root if joints.parent is None or joints.parent[i] < 0 else nodes[joints.parent[i]]
@@ -355,6 +358,7 @@ class _Morphed:
     def add(
         self, glb: Glb, root: int, transform: JsonObject, parts: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
+        """Add the meshes with a morph target for each frame; return the data of the targets, part by part."""
         shapes, meshes, channels, movers = [], [], [], []
         for shape in parts:
             if isinstance(shape, GltfCopies):
@@ -396,6 +400,8 @@ class _Morphed:
     def _targets(
         self, glb: Glb, shapes: list[GltfMesh], accessors: list[list[JsonObject]], least: float, report: Progress
     ) -> Iterator[bytes]:
+        """Yield the bytes of the morph targets frame by frame: offsets from the rest pose, and normals. least: a length
+        below which errors do not count."""
         rest = np.asarray(self._motion.rest).astype(np.float32)
         normals = MovingNormals(self._surface, rest)
         largest = least**2

@@ -311,6 +311,7 @@ def takes(motion: Motion) -> list[Take]:
 
 
 def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
+    """Return the animation for a range of frames: its times in seconds from 0, and whether it is a loop."""
     times = np.asarray(motion.time[start:stop], np.float64)
     is_loop = clip_range.loop and len(times) > 1
     extras = {"loop": True} if clip_range.loop else {}
@@ -378,6 +379,7 @@ def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[JsonObject, J
 
 
 def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
+    """Return the semantic of glTF for an array and its values in a type of glTF; None if glTF has none that fits."""
     values = array.reshape(len(array), -1)
     semantic, widths = SEMANTICS.get(name, ("", ()))
     if semantic and values.shape[1] in widths:

@@ -128,6 +128,7 @@ def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
 
 
 def _is_alike(one: SceneObject, other: SceneObject) -> bool:
+    """Return whether two objects are single copies with the same faces, curves and details."""
     return (
         one.copies == other.copies == 1
         and (one.kind, one.count) == (other.kind, other.count)
@@ -137,7 +138,7 @@ def _is_alike(one: SceneObject, other: SceneObject) -> bool:
 
 
 def _together(run: list[SceneObject]) -> SceneObject:
-    """Return objects side by side as copies of the first."""
+    """Return one object in place of a run of objects that are alike, as that many copies of the first."""
     first, last = run[0], run[-1]
     if len(run) == 1:
         return first
@@ -234,5 +235,5 @@ def _same(values: np.ndarray, expected: np.ndarray) -> bool:
 
 
 def _plain(row: np.ndarray) -> Any:
-    """Return as JSON has it."""
+    """Return a row of numbers as JSON holds it: a list, or the number if it is the only one."""
     return row[0].item() if len(row) == 1 else row.tolist()

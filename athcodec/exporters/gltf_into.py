@@ -469,13 +469,15 @@ def _few_twins(kind: np.ndarray) -> bool:
 
 
 def _kinds(kind: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return (N,) from 0 on, the same where `kind` and positions (N, 3) are."""
+    """Return numbers (N,) that are equal where both `kind` (N,) and position (N, 3) are."""
     table = np.concatenate([kind[:, None], positions.astype(np.float32).view("<i4").astype(np.int64)], axis=1)
     rows = np.ascontiguousarray(table).view(f"V{table.dtype.itemsize * table.shape[1]}").ravel()
     return np.unique(rows, return_inverse=True)[1].ravel()
 
 
 def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> MotionClip:
+    """Return the clip with one vertex for each that coincides with others. first: the kept vertices; vertex: the new
+    number of each vertex."""
     source = clip.positions
     skin = clip.skin and clip.skin.__class__(clip.skin.joint_parent, clip.skin.vertex_joint[first], clip.skin.names)
     return clip.replace(

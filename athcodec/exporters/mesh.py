@@ -177,6 +177,7 @@ def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
 
 
 def _switch_names(motion: Motion, lines: list[str], attribute: str, names_key: str, word: str) -> None:
+    """Put a line with the name, such as "usemtl leaf", before each face at which the name changes."""
     labels, names = motion.attributes.get(attribute), motion.metadata.get(names_key)
     if labels is None or not isinstance(names, list) or labels.shape != (len(lines),) or labels.dtype.kind not in "iu":
         return

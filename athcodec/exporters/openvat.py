@@ -99,6 +99,7 @@ def _size(vertices: int, frames: int) -> tuple[int, int]:
 
 
 def _offset_bounds(motion: Motion, rest: np.ndarray, report: Progress) -> tuple[np.ndarray, np.ndarray]:
+    """Return the smallest and the largest offset (3,) of any vertex in any frame from the rest pose (N, 3)."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for start, portion in portions(motion, motion.vertex_count):
         offsets = portion - rest

@@ -53,6 +53,8 @@ def check_counts(motion: Motion) -> None:
 
 
 def _start_and_step(motion: Motion) -> tuple[float, float]:
+    """Return the number of the first frame, and the frames from one sample to the next. Raises ClipError for uneven
+    times."""
     numbers = frame_numbers(motion)
     if len(numbers) < 2:
         return float(numbers[0]), 1.0

@@ -53,6 +53,6 @@ def in_singles(motion: Motion, can_move: bool) -> SinglesMotion:
 
 
 def origin_of(motion: Motion) -> list[float] | None:
-    """Return the place that a motion is about, for a transform; None for the origin itself."""
+    """Return the origin that positions of a motion are relative to, x, y and z; None if it is 0."""
     origin = getattr(motion, "origin", None)
     return origin.tolist() if origin is not None and origin.any() else None

@@ -55,7 +55,7 @@ def write_png(path: str, pixels: np.ndarray) -> None:
 
 
 def write_json(path: str, facts: JsonObject) -> None:
-    """Raise OSError."""
+    """Write facts to a JSON file. Raises OSError."""
     with open(path, "w", encoding="utf-8") as out:
         json.dump(facts, out, indent=1, allow_nan=False)
         out.write("\n")

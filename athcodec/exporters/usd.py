@@ -207,7 +207,7 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
 def _write_assembly(
     stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
 ) -> JsonObject:
-    """Return as Nanite Assemblies are laid out, see usd_nanite.py."""
+    """Write the stage laid out as Nanite Assemblies are (usd_nanite.py), and return facts about it."""
     parts = nanite.parts_of(motion, objects, joints)
     UsdSkel.Root.Define(stage, nanite.BASE)
     names = distinct(("base", *(_identifier(obj.name) for obj in objects)))[1:]
@@ -269,6 +269,7 @@ def _identifier(name: str) -> str:
 
 
 def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBased:
+    """Define a mesh, curves or points at a path for an object, without its positions."""
     if obj.kind == "mesh":
         schema = mesh = UsdGeom.Mesh.Define(stage, place)
         mesh.CreateSubdivisionSchemeAttr(obj.details.get(SCHEME, UsdGeom.Tokens.none))
@@ -430,6 +431,8 @@ def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject])
 
 
 def _write_array(name: str, values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
+    """Write an array as a primvar of the objects that its rows belong to; return whether USD has a type and place for
+    it."""
     if name == "radius" and domain in ("vertex", "constant") and values.ndim == 1 and values.dtype == np.float32:
         return _write_radius(values, domain, objects)
     kind = WIDER.get(values.dtype.char)

@@ -77,7 +77,8 @@ class GpuFile:
         return block
 
     def recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
-        """Return the block where there is that much room for it; else `room` is set to what it needs."""
+        """Return the words of a segment's block at a level; None if it needs more than `room`, which is then set to
+        what it needs."""
         memory = core_file.aligned(lib.ath_gpu_record_size(self._file, level, byref(room)))
         self._prepare(segment, level, room, memory)
         at = lib.ath_gpu_recorded(memory.ctypes.data, byref(room))
@@ -93,6 +94,8 @@ class GpuFile:
     def _prepare(
         self, segment: int, level: int, room: Room | None = None, memory: np.ndarray | None = None
     ) -> core_file.Segment:
+        """Prepare a segment at a level and return it. room, memory: where its block for the card is recorded as
+        well."""
         self.core.refine(level)
         into = core_file.Segment(self.core.segment_size(level))
         place = self._work.pointer, len(self._work.memory), self._file, segment, level

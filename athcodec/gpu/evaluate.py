@@ -40,7 +40,7 @@ SEGMENT = np.dtype(
 
 
 def section(words: np.ndarray, at: int, dtype: npt.DTypeLike, count: int) -> np.ndarray:
-    """Return records of a block."""
+    """Return `count` records of a type from word `at` of a block on."""
     size = np.dtype(dtype).itemsize // 4
     return words[at : at + size * count].view(dtype)
 
@@ -71,7 +71,7 @@ class Source:
     # ---- pass 1: time ----
 
     def _over_time(self) -> np.ndarray:
-        """Return (rows, 3, frames) float32."""
+        """Return the value of each row on three axes in each frame, (rows, 3, frames) float32."""
         rows = section(self.words, self.head["rows"], ROW, self.head["row_count"])
         out = np.zeros((len(rows), 3, len(self.frames)), np.float32)
         for i, row in enumerate(rows):
@@ -96,11 +96,11 @@ class Source:
         return move, dict(zip(rows["slot"].tolist(), self._amplitudes[move["row"] :], strict=False))
 
     def shift(self, b: int) -> np.ndarray:
-        """Return (frames, 3)."""
+        """Return how far body number `b` is shifted in each frame, (frames, 3)."""
         return self._move(b)[1].get(SHIFT, np.zeros((3, len(self.frames)), np.float32)).T
 
     def turn(self, b: int) -> np.ndarray:
-        """Return (frames, 3): vectors of rotations."""
+        """Return the rotation vector of body number `b` in each frame, (frames, 3)."""
         move, tracks = self._move(b)
         if ROTATION not in tracks:
             return np.zeros((len(self.frames), 3), np.float32)
@@ -108,7 +108,7 @@ class Source:
         return tracks[ROTATION].T @ turn.T
 
     def modes(self, b: int, body: np.void) -> np.ndarray:
-        """Return (modes, 3, frames): what each mode is."""
+        """Return the amplitude of each mode of body number `b` on three axes, (modes, 3, frames)."""
         move, tracks = self._move(b)
         modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
         if move["shape_count"] > 0:
@@ -172,7 +172,7 @@ class Source:
         positions += (sums * self.head["correction_part"]).astype(np.float32)
 
     def baked(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return (frames, positions, 3)."""
+        """Return positions that the block stores frame by frame, weighted, (frames, positions, 3)."""
         shape = int(self.head["frames"]), *shape[1:]
         every = section(self.words, self.head["baked"], "<f4", int(np.prod(shape))).reshape(shape)
         return every[self.frames] * self.weights[:, None, None]

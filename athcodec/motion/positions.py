@@ -79,7 +79,8 @@ def advice(orders: Sequence[Order]) -> str:
 
 
 def facts_of(arrays: JsonMapping) -> dict[str, tuple[str, int]]:
-    """Return the facts that arrays with the names of a clip's state; None for one that is missing."""
+    """Return by an array's name which axis of the positions it tells the length of, and that length. arrays: those of a
+    clip, None for one that is missing."""
     facts = {}
     for name, axis in _COUNTED.items():
         values = np.asarray(arrays[name]) if arrays.get(name) is not None else np.zeros(0)

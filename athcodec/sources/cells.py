@@ -133,7 +133,8 @@ class Topology:
 
 
 def base_kind(kind: str) -> str:
-    """Return the type of first order with the same corners."""
+    """Return the kind of cell without the number of its nodes: "triangle6" gives "triangle", which has the same
+    corners."""
     return kind.rstrip("0123456789")
 
 
@@ -175,6 +176,7 @@ def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
 
 
 def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
+    """Add the lines among the cells to the topology as edges (E, 2), with the row of each cell in the file."""
     pairs: list[np.ndarray] = []
     rows: list[np.ndarray] = []
     for block in blocks:
@@ -196,6 +198,7 @@ def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
 
 
 def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
+    """Add the polygons, and the outer sides of the solids, among the cells to the topology as faces."""
     sizes_of_blocks: list[np.ndarray] = []
     corners_of_blocks: list[np.ndarray] = []
     rows: list[np.ndarray] = []
@@ -245,7 +248,7 @@ def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
 
 
 def _in_order(counts: np.ndarray, corners: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """Return the corners of the polygons in another order."""
+    """Return the corners (C,) of polygons of `counts` corners each, with the polygons in another order."""
     starts, wanted = np.cumsum(counts) - counts, counts[order]
     inside = np.arange(wanted.sum()) - np.repeat(np.cumsum(wanted) - wanted, wanted)
     return corners[np.repeat(starts[order], wanted) + inside]

@@ -116,12 +116,14 @@ class Placement:
         self._motion = NodeMotion(scenes[0], nodes, self.from_world)
 
     def _preference(self, node: GltfNode) -> tuple[bool, int]:
-        """Return the largest mesh keeps its place, of those that can."""
+        """Return the key by which the node is chosen whose space the clip takes: no animation moves it, then the most
+        vertices."""
         hangs = node.skin is None and any(scene.animates({node.index}) for scene in self._scenes)
         return not hangs, node.count
 
     def stays(self, index: int) -> bool:
-        """Return whether what a node shows lies in this space, at all times."""
+        """Return whether node `index` has the space of the clip in all frames, so that its vertices need no
+        transform."""
         scene = self._scenes[0]
         matrix = scene.matrices(scene.ancestors({index}), None)[index][0]
         off = np.abs(matrix - self.space).max()
@@ -139,13 +141,14 @@ class Placement:
 
 
 def _moves(scene: Scene, node: GltfNode) -> bool:
-    """Return whether an animation that is played moves its vertices."""
+    """Return whether an animation that is played moves the vertices of a node, by transforms, joints or morph
+    targets."""
     joints = [node.index] if node.skin is None else indices(scene.file.item("skins", node.skin), "joints")
     return scene.morphs(node.index) or scene.animates(set(joints))
 
 
 def _has_motion(node: GltfNode) -> bool:
-    """Return whether a motion of ATH_motion moves it already."""
+    """Return whether the extension ATH_motion moves a primitive of the node already."""
     return any(extension_of(primitive) is not None for primitive in node.primitives)
 
 
@@ -249,7 +252,7 @@ def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
 
 
 def _chooses(options: ReadOptions) -> bool:
-    """Return whether the options name animations."""
+    """Return whether the options name the animations to read."""
     return bool(options.takes) or any(name.startswith(ANIMATION) for name in options.only)
 
 
@@ -277,7 +280,8 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
 
 
 def _number(nodes: Sequence[GltfNode]) -> int:
-    """Give each node its vertices, and says how many there are."""
+    """Set the number of each node's first vertex in the clip, and return the number of all vertices. Raises
+    ClipError."""
     first = 0
     for node in nodes:
         node.first = first
@@ -339,6 +343,7 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
 
 
 def _names(scene: Scene, nodes: list[GltfNode]) -> JsonObject:
+    """Return the metadata of the clip's objects: names, kinds, and whether their faces are seen from both sides."""
     parts = _parts(scene, nodes)
     details = [
         {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in members) else {}
@@ -459,6 +464,8 @@ def _rigid_copies(part: list[GltfNode]) -> int:
 
 
 def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: NodeMotion) -> np.ndarray:
+    """Return the values of the accessors `key` of all nodes as the array `name` of the clip; vertices without any get
+    0. Normals are turned into world space."""
     pieces = {}
     for number, node in enumerate(nodes):
         if key in node.of_copies:

@@ -52,6 +52,8 @@ class NodeMotion:
         return out
 
     def _positions(self, node: GltfNode, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
+        """Return the vertices (k, n, 3) of a node in the scene at the times, morphed and skinned. matrices: (k, 4, 4)
+        of each node to the world."""
         local = self._morphed(node, times)
         if node.skin is None:
             matrix = matrices[node.index]
@@ -79,6 +81,8 @@ class NodeMotion:
         return local
 
     def _skinned(self, node: GltfNode, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
+        """Return the vertices (k, n, 3) of a node moved by its joints, from those before skinning, `local` (1 or k, n,
+        3)."""
         frames = max(len(local), *(len(matrices[joint]) for joint in node.joints))
         out = np.zeros((frames, 3, node.count))
         for joint, vertices, weights in node.influences:
@@ -90,7 +94,7 @@ class NodeMotion:
         return out.swapaxes(1, 2)
 
     def add_facings(self, times: np.ndarray, facings: Sequence[Facing]) -> None:
-        """Add the frames at these times to the facing of each node."""
+        """Note in `facings`, one for each node, whether transforms mirror the node at these times."""
         world = np.eye(4) if self._from_world is None else self._from_world
         for start in range(0, len(times), FACING_FRAMES):
             matrices = self.scene.matrices(self.ancestors, times[start : start + FACING_FRAMES])
@@ -152,6 +156,8 @@ class Sampling:
 
 
 def sampling_of(motion: NodeMotion, wanted: float | None) -> Sampling:
+    """Return the frame rate and the times at which animations are sampled. wanted: the rate of the caller; None: that
+    of the file, else of its keys."""
     scene, keys = motion.scene, motion.scene.keys
     if not len(keys):
         return Sampling(DEFAULT_FPS, np.zeros(1), {})
@@ -188,7 +194,7 @@ def _stated_extras(scene: Scene) -> JsonObject:
 
 
 def _returns(motion: NodeMotion, keys: np.ndarray) -> bool:
-    """Return whether the last key has the pose of the first."""
+    """Return whether the scene has the same pose at the last key as at the first, as a loop does."""
     first, last = motion.read(keys[[0, -1]]).astype(np.float64)
     return bool(np.linalg.norm(last - first, axis=1).max() <= SAME * np.linalg.norm(np.ptp(first, axis=0)))
 

@@ -87,7 +87,7 @@ class Track:
     is_rotation: bool
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return (k, ...) float64."""
+        """Return the animated value at each of the times (k,), (k, ...) float64, by the track's interpolation."""
         after = np.searchsorted(self.times, times, "right")
         last = len(self.times) - 1
         left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
@@ -155,6 +155,7 @@ class Scene:
     # ---- structure ----
 
     def _parents(self) -> np.ndarray:
+        """Return the parent of each node, -1 for none. Raises ClipError where a node has two."""
         parent = np.full(len(self.nodes), -1)
         for index, node in enumerate(self.nodes):
             for child in indices(node, "children"):
@@ -164,7 +165,8 @@ class Scene:
         return parent
 
     def _reached(self) -> list[int]:
-        """Return the nodes of the default scene, parents first."""
+        """Return the nodes of the default scene, or of all trees if there is no scene; parents come before their
+        children."""
         scenes = self.file.items("scenes")
         if scenes:
             roots = indices(self.file.item("scenes", self.file.json.get("scene", 0)), "nodes")
@@ -248,6 +250,7 @@ class Scene:
         return showing
 
     def _add_animation(self, index: int) -> None:
+        """Read the tracks of animation `index` that move nodes of the scene. Raises ClipError."""
         samplers = entries(self.file.item("animations", index), "samplers")
         for node, target, sampler in self._channels(index)[0]:
             if sampler >= len(samplers):
@@ -266,6 +269,7 @@ class Scene:
             tracks.sort(key=lambda each: (each[0].holder == "nodes", each[0].weight >= 0))
 
     def _track(self, sampler: JsonObject, target: Target, where: str) -> Track:
+        """Return the keys, values and interpolation of a sampler. where: what messages call it. Raises ClipError."""
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
             raise ClipError(

@@ -109,7 +109,7 @@ def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarr
 
 
 def _name_others(path: FilePath, mtg: Mtg) -> None:
-    """Warn of what the file says and no branch has."""
+    """Warn of what an MTG file has that a clip of branches has no place for: features, and rows of later dates."""
     features = [name for name in mtg.features if name not in (*_coordinates(list(mtg.features)), ALIAS)]
     others = [f"features {', '.join(features)}"] if features else []
     others += [f"{mtg.later_rows} row{'s' * (mtg.later_rows != 1)} of later dates (*)"] if mtg.later_rows else []
@@ -185,6 +185,7 @@ class _Plants:
             self._scales[words[0]] = int(words[1])
 
     def _columns(self, lines: Sequence[str], start: int) -> Iterator[tuple[int, list[str]]]:
+        """Find the row with the names of the columns, and return the number and cells of each row behind it."""
         rows = ((number + 1, line.split("\t")) for number, line in enumerate(lines[start:], start))
         for self._line, cells in rows:
             names = [cell.strip() for cell in cells]
@@ -200,6 +201,7 @@ class _Plants:
         return rows
 
     def _row(self, cells: Sequence[str]) -> None:
+        """Read one row of the code: the entities that it makes, and their features."""
         cells = [cell.strip() for cell in cells]
         column = next((place for place, cell in enumerate(cells[: self._topology_columns]) if cell), None)
         if column is None or cells[column] == "*":
@@ -221,7 +223,7 @@ class _Plants:
             self._aliases[features[ALIAS]] = self._latest[column]
 
     def _code(self, code: str, column: int) -> list[int]:
-        """Return the entities that the features of the row are about."""
+        """Make the entities of a row's code, and return those that the row's features belong to."""
         start, code, is_absolute = self._start(code, column)
         at, now, about = 0, start, []
         for step in _STEP.finditer(code):
@@ -331,6 +333,7 @@ def _only_breaks(match: re.Match[str]) -> str:
 
 
 def _parts(plants: _Plants) -> Mtg:
+    """Return the smallest entities of the plants as parts: parents, branches and features."""
     entities = plants.entities
     leaves = [number for number, entity in enumerate(entities) if not entity.parts]
     place = {number: row for row, number in enumerate(leaves)}
@@ -453,7 +456,7 @@ def _stated_base(entities: Sequence[_Entity], leaf: int, coordinates: Sequence[s
 
 
 def _depths(parent: np.ndarray) -> np.ndarray:
-    """Return (V,) how many parts are below each."""
+    """Return (V,) how many parts lie between each part and its root."""
     depth = np.zeros(len(parent))
     for row in _roots_first(parent):
         if parent[row] >= 0:

@@ -227,6 +227,8 @@ class _Clip:
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
     def _order(self, name: str, known: JsonMapping) -> Order:
+        """Return what the axes of the array of positions are. known: arrays by their names in the schema. Raises
+        ClipError."""
         stored = self.arrays.stored[name]
         stated = self.options.order or order_of_labels(self.arrays.labels(name))
         try:
@@ -237,6 +239,8 @@ class _Clip:
             ) from None
 
     def _facts(self, known: JsonMapping) -> dict[str, tuple[str, int]]:
+        """Return by an array's name which axis of the positions it tells the length of, and that length: time has a row
+        per frame."""
         facts = facts_of(known)
         if "time" not in facts and self.options.fps is None and len(guess := self._guessed_times()) == 1:
             name, count = guess[0], self.arrays.stored[guess[0]].shape
@@ -251,6 +255,7 @@ class _Clip:
         return next((full for full in _upwards(self.used[POSITIONS], name) if full in self.arrays.stored), None)
 
     def _of_schema(self) -> dict[str, np.ndarray | None]:
+        """Return the arrays that belong to the positions by their names in the schema, None for one that is missing."""
         known: dict[str, np.ndarray | None] = {}
         for name in sorted(RESERVED_NAMES - {POSITIONS}):
             full = self._near(name)
@@ -265,6 +270,7 @@ class _Clip:
         return self.loaded[full]
 
     def _array(self, name: str, full: str) -> np.ndarray:
+        """Return the array stored as `full`, in the form that the schema has for `name`."""
         self.used[name] = full
         values = self._read(full)
         if name in ROWS and _is_row(self.arrays.stored[full]):
@@ -361,6 +367,7 @@ class _Clip:
         return None
 
     def _in_seconds(self, name: str, values: np.ndarray) -> np.ndarray:
+        """Return times in seconds, by the unit that the file states for the array `name`."""
         notes = dict(self.arrays.notes(name))
         unit = str(notes.pop("units", notes.pop("unit", "s"))).strip()
         self._name_notes(name, notes)

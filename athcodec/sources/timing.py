@@ -90,7 +90,7 @@ def plain_number(number: float) -> str:
 
 
 def whole(number: float) -> int | float:
-    """Return the number, an int where it is whole."""
+    """Return the number as an int if it is whole, as a float otherwise."""
     return int(number) if number == int(number) else float(number)
 
 
@@ -99,6 +99,7 @@ def _start(number: float) -> JsonObject:
 
 
 def _usual_rates(times: np.ndarray) -> list[float]:
+    """Return frame rates that are usual and about that of the times (T,) in seconds, the likeliest first."""
     if len(times) < 2 or not np.isfinite(times).all() or not times[1] > times[0]:
         return []
     step = np.median(np.diff(times))

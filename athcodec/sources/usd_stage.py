@@ -295,6 +295,8 @@ def _instanced(
 
 
 def _in_prototype(prototype: Usd.Prim, choice: _Choice, not_read: dict[str, list[str]]) -> Iterator[PrimObject]:
+    """Yield the objects below a prototype of a PointInstancer. Those of a further PointInstancer are named in
+    `not_read`."""
     prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
@@ -327,7 +329,7 @@ def _kind(prim: Usd.Prim) -> str | None:
 
 
 def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[PrimObject]:
-    """Return the objects that a frame shows, with the frames that do; notes the others."""
+    """Return the objects that any frame shows, each with the frames that do; the others are named in `not_read`."""
     known: dict[Sdf.Path, np.ndarray] = {}
 
     def inherited(prim: Usd.Prim) -> np.ndarray:
@@ -465,6 +467,8 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> JsonObject:
 
 
 def _statics(obj: PrimObject, codes: np.ndarray, matrix: np.ndarray) -> None:
+    """Store the primvars, normals and widths of a prim that are the same in all frames. matrix: to the world at the
+    first frame."""
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
             continue  # which has moved it
@@ -542,6 +546,7 @@ WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8",
 
 
 def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
+    """Yield the arrays that athcodec's own writer stored on the default prim: what each is, and its bytes."""
     root = stage.GetDefaultPrim()
     for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
         values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
@@ -558,6 +563,7 @@ def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
 
 
 def _points(obj: PrimObject, codes: np.ndarray, frame: int) -> np.ndarray:
+    """Return the points (n, 3) float32 of an object in a frame, moved by its skeleton, in the order of its ids."""
     ids = None if obj.ids is None else UsdGeom.Points(obj.prim).GetIdsAttr()
     code = float(codes[frame]) if ids is None else code_of_order(ids, float(codes[frame]))
     points = obj.points.Get(code)

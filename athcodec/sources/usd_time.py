@@ -60,7 +60,7 @@ def time_codes(
 
 
 def _off_grid(times: np.ndarray, start: float, step: float) -> np.ndarray:
-    """Return (K,) whether time codes lie between frames."""
+    """Return (K,) bool: whether each time code lies between the frames that begin at `start`, `step` apart."""
     places = (times - start) / step
     off: np.ndarray = np.abs(places - np.round(places)) > 1e-3
     return off
@@ -91,6 +91,8 @@ def _name_keys_outside(times: np.ndarray, start: float, end: float, not_read: di
 
 
 def _keys(objects: list[PrimObject]) -> _Keys:
+    """Return the time codes at which anything may change that places or shapes the objects, and the splines among
+    it."""
     times: set[float] = set()
     splines: JsonObject = {}
     seen: set[Sdf.Path] = set()

@@ -102,6 +102,7 @@ def _has_shape(prim: Usd.Prim) -> bool:
 
 
 def _other_variants(prim: Usd.Prim) -> Iterator[str]:
+    """Yield for each variant set of a prim a text with the variants that are not read."""
     if not prim.HasVariantSets():
         return
     for name in prim.GetVariantSets().GetNames():
@@ -200,6 +201,7 @@ def unread_properties(prim: Usd.Prim) -> list[str]:
 
 
 def _differs(prim: Usd.Prim, attribute: Usd.Attribute) -> bool:
+    """Return whether an attribute has another value than the default of its prim's type, or one that cannot be read."""
     try:
         value = attribute.Get(Usd.TimeCode.EarliestTime())
     except Tf.ErrorException:

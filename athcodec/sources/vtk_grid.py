@@ -75,7 +75,7 @@ class Grid:
         self._hide()
 
     def _hide(self) -> None:
-        """Leave out the cells that VTK does not show."""
+        """Remove the cells that a ghost array of VTK marks as hidden, and count them."""
         shown = np.ones(len(self.types), bool)
         for name, bits in GHOSTS.items():
             values = self.cell_data.get(name)
@@ -89,7 +89,7 @@ class Grid:
 
     @property
     def cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """What has to be the same in all steps."""
+        """The arrays that describe the cells; they have to be equal in all steps."""
         return self.types, self.starts, self.stops, self.nodes
 
     def topology(self) -> Topology:
@@ -110,7 +110,7 @@ class Grid:
 
 
 def starts_of(stops: np.ndarray) -> np.ndarray:
-    """Return where cells begin whose nodes follow one another."""
+    """Return the start of each cell's nodes (C,), given where they stop, for cells whose nodes follow one another."""
     return np.concatenate([[0], stops[:-1]]).astype(np.int64) if len(stops) else stops
 
 

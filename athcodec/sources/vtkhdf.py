@@ -181,7 +181,7 @@ class _Part:
         return values[:count] if values.dtype.kind == "f" else values[:count].astype(np.float64)
 
     def _pieces(self, step: int) -> range:
-        """Return the pieces of a step, in the arrays that have a number for each."""
+        """Return the numbers of the pieces that make up the data set at a step. Raises ClipError."""
         first = self._of_step("PartOffsets", step, 0)
         total = self._group["NumberOfPoints"].shape[0]
         count = self._of_step("NumberOfParts", step, 1 if self._steps is not None else total)
@@ -192,19 +192,19 @@ class _Part:
         return range(first, first + count)
 
     def _points_at(self, step: int) -> tuple[int, int]:
-        """Return the first point of a step, and their number."""
+        """Return the row of the first point of a step, and the number of its points."""
         pieces = self._pieces(step)
         return self._of_step("PointOffsets", step, 0), sum(self._counts("NumberOfPoints", pieces))
 
     def _cells_at(self, step: int) -> tuple[Any, ...]:
-        """Return what tells where the cells of a step lie."""
+        """Return a key that is equal for two steps if the file stores the same cells for both."""
         kinds = len(SURFACE_CELLS) if self._is_surface else 1
         pieces = self._pieces(step)
         offsets = [self._of_step(name, step, 0, kind) for name in OFFSETS for kind in range(kinds)]
         return (*offsets, pieces, *self._counts("NumberOfPoints", pieces))
 
     def _data_at(self, step: int, name: str, center: str) -> tuple[int, int]:
-        """Return the first value of a step, and their number."""
+        """Return the first row of an array at a step, and the number of its rows. center: points or cells."""
         kinds = len(SURFACE_CELLS) if self._is_surface and center == CELL else 1
         usual = "PointOffsets" if center == NODE else "CellOffsets"
         place = sum(self._of_step(usual, step, 0, kind) for kind in range(kinds))
@@ -212,7 +212,8 @@ class _Part:
         return self._of_step(f"{DATA[center]}Offsets/{name}", step, place), count
 
     def _of_step(self, name: str, step: int, missing: int, column: int = 0) -> int:
-        """Return a number of a step, in its row of an array of Steps."""
+        """Return the integer that the array `name` of the group Steps has for a step; `missing` if there is no such
+        array."""
         if self._steps is None or name not in self._steps:
             return missing
         values = self._array(f"Steps/{name}")
@@ -267,7 +268,7 @@ class _Part:
         return np.array([by_size.get(size, other) for size in sizes.tolist()], np.int64), sizes, nodes
 
     def _rows(self, name: str, first: int, count: int, whole: bool = False) -> np.ndarray:
-        """Return rows of an array; whole: of integers, as int64."""
+        """Return `count` rows of an array from row `first` on. whole: require integers, and return int64."""
         dataset = self._dataset(name)
         if not 0 <= first <= first + count <= dataset.shape[0]:
             raise ClipError(f"{name}: got {dataset.shape[0]} rows, expected {count} from {first} on")
@@ -278,7 +279,7 @@ class _Part:
         return values.astype(np.int64) if whole else values.astype(dataset.dtype.newbyteorder("="), copy=False)
 
     def _array(self, name: str) -> np.ndarray:
-        """Return a small array as a whole, which is kept."""
+        """Return a small array, which is read once and kept."""
         if name not in self._kept:
             dataset = self._dataset(name)
             self._budget.take(dataset.nbytes, name)

@@ -71,6 +71,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
+    """Return the clip of the chosen grids of an XDMF document. Raises ClipError."""
     scene = _Scene(items, fspath(path), options)
     selection = _Selection(scene)
     tracks = selection.chosen()
@@ -531,7 +532,7 @@ class _Part:
         return None
 
     def _same(self, one: Element | None, other: Element | None) -> bool:
-        """Return whether two elements say the same."""
+        """Return whether two elements of the document are equal, or lead to the same one."""
         return one is other or self._documents.source(one) == self._documents.source(other)
 
     def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
@@ -554,6 +555,7 @@ class _Part:
     # ---- cells ----
 
     def _blocks(self, element: Element | None, geometry: Element | None) -> list[Block]:
+        """Return the cells that a Topology element states, as blocks of one kind each."""
         if element is None:
             return []
         kind = (element.get("TopologyType") or element.get("Type") or "").lower()

@@ -153,6 +153,7 @@ class Items:
             raise ClipError(f"{path.name}: {inside[:80]!r}: cannot be read: {error}") from None
 
     def _slab(self, item: Element, depth: int) -> np.ndarray:
+        """Return the part of an array that a HyperSlab item selects by start, stride and count."""
         children = self.documents.children(item, "DataItem")
         if len(children) != 2:
             raise ClipError(f"HyperSlab: got {len(children)} DataItems, expected two")
@@ -163,6 +164,7 @@ class Items:
         return _shaped(values, _shape(item) or tuple(count.tolist()))
 
     def _function(self, item: Element, depth: int) -> np.ndarray:
+        """Return the array that a Function item computes from its operands."""
         text = item.get("Function", "")
         operands = [self.read(child, depth + 1) for child in self.documents.children(item, "DataItem")]
         self.budget.need(
@@ -229,6 +231,8 @@ class _Function:
         return tuple(value if np.size(value) == 1 else np.reshape(value, shape) for value in values)
 
     def _joined(self, arguments: Sequence[ast.expr]) -> np.ndarray:
+        """Return the arrays of JOIN: side by side as columns, or one after the other where a semicolon separates
+        them."""
         is_after = [isinstance(each, ast.Name) and each.id == AFTER for each in arguments]
         values = [np.atleast_1d(self._of(each)) for each, after in zip(arguments, is_after) if not after]
         if any(is_after):
@@ -266,6 +270,7 @@ def _shaped(values: np.ndarray, shape: tuple[int, ...] | None) -> np.ndarray:
 
 
 def _selection(start: np.ndarray, stride: np.ndarray, count: np.ndarray) -> tuple[slice, ...]:
+    """Return the slice along each axis that start, stride and count of a HyperSlab mean. Raises ClipError."""
     if (start < 0).any() or (stride < 1).any() or (count < 0).any():
         raise ClipError("HyperSlab: got a negative start or count, expected some of the data")
     return tuple(

@@ -84,7 +84,7 @@ class Pointers:
                 yield each
 
     def along(self, axis: str, element: Element) -> list[Element]:
-        """Return the elements along an axis from one."""
+        """Return the elements that the axis, such as "child" or "parent", leads to from an element."""
         if axis == "self":
             return [element]
         if axis == "child":
@@ -98,7 +98,7 @@ class Pointers:
 
     @property
     def top(self) -> Element:
-        """What stands for the document."""
+        """The top element, which stands for the document."""
         return self._top
 
 
@@ -172,6 +172,7 @@ class _Parser:
         return finders[0] if len(finders) == 1 else lambda document, start: _once(f(document, start) for f in finders)
 
     def _steps(self) -> Finder:
+        """Parse a path, "/a/b//c" or "(a | b)/c", and return a function that finds its elements."""
         steps: list[Finder] = []
         is_absolute = False
         if self._take("("):
@@ -201,6 +202,8 @@ class _Parser:
         return find
 
     def _step(self) -> Finder:
+        """Parse one step of a path, such as "name[1]", ".." or "child::name", and return a function that finds its
+        elements."""
         if self._take("."):
             return lambda document, element: [element]
         if self._take(".."):
@@ -227,6 +230,7 @@ class _Parser:
         return tests
 
     def _name_test(self) -> Callable[[Element], bool]:
+        """Parse the name in a step, and return a function that tells whether an element has it."""
         name = self._next
         self._at += 1
         if name == "*" or (name == "node" and self._take("(", ")")):
@@ -239,6 +243,7 @@ class _Parser:
     # ---- predicates ----
 
     def _nested(self, parse: Callable[[], Any]) -> Any:
+        """Call a parser one level deeper in parentheses, and return its result. Raises ClipError beyond 32 levels."""
         self._depth += 1
         if self._depth > 32:
             raise self._unknown()
@@ -273,6 +278,8 @@ class _Parser:
         return compare
 
     def _value(self) -> Test:
+        """Parse a value in a predicate: text, a number, an attribute, a function or a path; return a function that
+        computes it."""
         token = self._next
         following = self._tokens[self._at + 1 : self._at + 2]
         if token[:1] in ("'", '"'):
@@ -336,5 +343,5 @@ def local_name(element: Element) -> str:
 
 
 def _once(lists: Any) -> list[Element]:
-    """Return the elements of several lists, each once."""
+    """Return the elements of several lists in their order, each once."""
     return list({id(each): each for element in lists for each in element}.values())

@@ -45,7 +45,7 @@ class Ladder:
         return cls(values, 0).starting_at(start)
 
     def starting_at(self, value: float) -> Ladder:
-        """Return the same numbers; the search starts at the one nearest to `value`."""
+        """Return the ladder with the search starting at the number nearest to `value`."""
         return replace(self, start=int(np.argmin(np.abs(np.log(np.array(self.values) / value)))))
 
 
@@ -81,6 +81,7 @@ class Search:
         return {name: axis.values[i] for (name, axis), i in zip(self.grid.items(), at, strict=True)}
 
     def _cost(self, at: tuple[int, ...]) -> float:
+        """Return the bytes at a point of the grid, measured once. Raises _OutOfTime."""
         if at not in self.known:
             limit = resource.getrlimit(resource.RLIMIT_CPU)[0]
             if self.known and 0 <= limit * SEARCH_SHARE < time.process_time():  # below 0: no limit
@@ -104,6 +105,8 @@ class Search:
                 break
 
     def _round(self, best: tuple[int, ...], first: bool) -> tuple[int, ...]:
+        """Return the best point after each axis of the grid was searched once, from `best` on. first: in strides of
+        two, too."""
         for axis, values in enumerate(self.grid.values()):
             if isinstance(values, Ladder):
                 for stride in (2, 1) if first else (1,):
@@ -113,6 +116,7 @@ class Search:
         return best
 
     def _walk(self, at: tuple[int, ...], axis: int, stride: int) -> tuple[int, ...]:
+        """Return the point that is reached along an axis while the bytes shrink, in steps of `stride`."""
         last = len(list(self.grid.values())[axis].values) - 1
         for direction in (stride, -stride):
             start = at

@@ -126,6 +126,7 @@ def _code_rows(rows: np.ndarray, unit: int) -> bytes:
 
 
 def _read_rows(data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
+    """Return integers of a shape (rows, 3, frames) that `data` holds. unit: rows that are coded together."""
     if data[0]:
         return _read_table(data[1:], (shape[0], 3 * shape[2])).reshape(shape)
     rows = np.zeros(shape, np.int32)
@@ -158,6 +159,7 @@ def _join(streams: list[bytes]) -> bytes:
 
 
 def _split(data: bytes, count: int) -> list[bytes]:
+    """Return the streams that `data` holds one after the other; a length stands before each but the last."""
     streams, at = [], 0
     for _ in range(count - 1):
         size, at = read_varint(data, at)
@@ -215,7 +217,7 @@ class Writer:
         return b"".join(self.parts)
 
     def echo(self) -> Echo:
-        """Return a reader of the written values, without decoding."""
+        """Return a reader that gives back the values as they were written, without decoding."""
         return Echo(self.values)
 
     def count(self, value: int) -> int:

@@ -189,6 +189,7 @@ class Parts:
         return centre, _rotations(np.moveaxis(tracks[:, 1] / self._lever(), 1, 2))
 
     def place_rigid(self, tracks: np.ndarray) -> np.ndarray:
+        """Return positions (N, 3, T) of all vertices, each moved as its part is by its rigid track."""
         centre, rotation = self.rigid_maps(tracks)
         rotation = np.ascontiguousarray(np.moveaxis(rotation, 1, 3))
         positions = centre[self.of_vertex]

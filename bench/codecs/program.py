@@ -197,6 +197,7 @@ class Grid:
     origin: tuple[float, float, float]
 
     def integers(self, positions: np.ndarray) -> np.ndarray:
+        """Return positions rounded to the grid, as int32. Raises CannotKeep where that takes more bits."""
         integers = np.empty(positions.shape, np.int32)
         for block in blocks(positions):
             scaled = np.rint((positions[block].astype(np.float64) - self.origin) / self.step)

@@ -46,6 +46,7 @@ class Numbers:
 
 
 def sine(turns: np.ndarray) -> np.ndarray:
+    """Return the sine of angles in turns, by a series: the same bits on every machine."""
     turns = turns - np.rint(turns)
     folded = np.where(np.abs(turns) > 0.25, np.copysign(0.5, turns) - turns, turns)
     angle = 2 * np.pi * folded
@@ -322,6 +323,7 @@ class Cards:
     digest: str
 
     def make(self) -> MotionClip:
+        """Return a clip of leaf cards that turn about pivots on twigs."""
         numbers, count = Numbers(self.seed), self.cards
         twig = numbers.uniform(-1.0, 1.0, 3, (count + 6) // 7) * [[0.3], [0.3], [0.8]] + [[0.0], [0.0], [1.5]]
         pivots = np.repeat(twig, 7, axis=1)[:, :count] + 0.01 * numbers.normal(3, count)

@@ -55,7 +55,7 @@ class Species:
 
     @property
     def middle(self) -> float:
-        """Of the blade, over the leaf's length from the hinge."""
+        """Where the middle of the blade is along the leaf, as a share of its length from the hinge."""
         return float(np.ptp(self.blade[:, 0]) / 2 + self.blade[:, 0].min())
 
     @property
@@ -123,7 +123,7 @@ class Leaves:
         return (first + self.species.faces).reshape(-1, 4)
 
     def unturned(self) -> np.ndarray:
-        """Return (L, 4)"""
+        """Return the unit quaternion of no rotation for each leaf, (L, 4)."""
         return np.repeat([[1.0, 0.0, 0.0, 0.0]], len(self.node), axis=0)
 
     def flown(self, wind: Wind) -> np.ndarray:
@@ -133,7 +133,7 @@ class Leaves:
         return self.turned(lambda points, seconds: share * wind.at(points, seconds), Plates(self))
 
     def area(self) -> np.ndarray:
-        """Return (L,) m2."""
+        """Return the area of each leaf, (L,) in square metres."""
         return self.species.width * self.species.chord * self.length**2
 
     def turned(self, air: Air, plates: Plates) -> np.ndarray:
@@ -168,6 +168,7 @@ class _Carriers:
         self.known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def at(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the foot (L, 3) and the axes of each leaf (L, 3, 3) in a frame; the last frames are kept."""
         frame = max(0, frame)
         if frame not in self.known:
             leaves, nodes = self.leaves, self.leaves.skeleton.positions[frame]

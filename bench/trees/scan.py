@@ -85,6 +85,7 @@ def _distance(points: np.ndarray, skeleton: Skeleton) -> np.ndarray:
 
 
 def _skin(skeleton: Skeleton, cell: float, random: np.random.Generator) -> Scan:
+    """Return the mesh around a skeleton, as a scanner would triangulate it, from a grid of cells."""
     child = np.flatnonzero(skeleton.parent >= 0)
     start, most = skeleton.parent[child], float(skeleton.radius.max()) + 2 * cell
     boxes = []
@@ -138,7 +139,7 @@ class _Ride:
         self._off = np.zeros(points.shape)
 
     def hold(self, carrier: np.ndarray, points: np.ndarray) -> None:
-        """Take the points as they are in this pose of the carrier."""
+        """Store where the points (P, 3) are relative to the carrier in this pose (N, 3)."""
         foot, frame = self._frames(carrier)
         self._off = np.einsum("pji,pj->pi", frame, points - foot)
 
@@ -147,6 +148,7 @@ class _Ride:
         return foot + np.einsum("pij,pj->pi", frame, self._off)
 
     def _frames(self, carrier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return for each point its foot on the carrier (P, 3), and the axes of the triangle there (P, 3, 3)."""
         corners = carrier[self._triangle].astype(np.float64)
         along, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         along /= np.linalg.norm(along, axis=1, keepdims=True)

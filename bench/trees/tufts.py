@@ -53,7 +53,7 @@ class Arch:
         return np.stack([-np.sin(self.azimuth), np.zeros(len(self.azimuth)), np.cos(self.azimuth)], axis=1)
 
     def plant(self, count: int) -> Plant:
-        """Return plant stems, each with a foot and `count` nodes above it."""
+        """Return the plant of arched stems, each with a foot and `count` nodes above it."""
         stems, share = len(self.foot), (np.arange(count) + 0.5) / count
         away = np.stack([np.cos(self.azimuth), np.zeros(stems), np.sin(self.azimuth)], axis=1)
         angle = self.start[:, None] + (self.end - self.start)[:, None] * share**1.4

@@ -48,6 +48,7 @@ def hub(first: int, quads: int, edges: int) -> list[list[int]]:
 
 
 def hubs() -> list[list[int]]:
+    """Return the faces of a mesh whose vertices have every number of neighbours that the coder tells apart."""
     first, faces = 0, []
     for quads, edges in (
         (1, 0),

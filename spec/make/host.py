@@ -25,6 +25,8 @@ def tall(*counts: int) -> Draft:
 
 
 def deep() -> Draft:
+    """Return a file for a host's mesh with 1,300 branches that hang on each other in a row, and four that hang on
+    earlier ones."""
     stems = chain(1300, 1, flags=0)
     for up in (1200, 1, 20, 98):
         parent = len(stems) - 1

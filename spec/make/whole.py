@@ -20,6 +20,7 @@ EVERYTHING = stems_of(
 
 
 def everything() -> Draft:
+    """Return the file in which every feature of the format occurs at once."""
     random = np.random.default_rng(99)
     vertices = sum(stem.count for stem in EVERYTHING)
     places = [*range(vertices), 2, 0, 2]
