@@ -148,7 +148,7 @@ class FileDecisions:
             return math.inf, False
 
     def decide(self, bound: float) -> Decided:
-        """Search for settings."""
+        """Search for the settings of a file that keeps the bound, and return them with all that follows from them."""
         self._check(bound)
         holding = self._holding(bound)
         split = holding._split(bound, self.thresholds(bound))
@@ -199,7 +199,7 @@ class FileDecisions:
         return SplitSource.of(self.source, self.seen.ath(thresholds), bound)
 
     def _of_choice(self, choice: Choice, thresholds: Thresholds) -> Decided:
-        """Return what follows from a choice for all branches."""
+        """Return the layers and streams that follow from a choice of settings for all branches."""
         bound = choice.settings.bound
         split = self._split(bound, thresholds)
         source = self.source if split is None else split.marked
@@ -242,7 +242,8 @@ class FileDecisions:
         return best
 
     def _searched(self, search: Search, share: float, work: Work) -> Decided:
-        """Return what a search finds, or predicted motion if that takes at most a share of the bytes."""
+        """Return the file that a search finds, or one of predicted motion if that takes at most `share` of its
+        bytes."""
         bound, unsearched = search.trials.start.bound, share * search.first_cost()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched

@@ -247,7 +247,7 @@ def _bound(decisions: FileDecisions, option: BoundOption, report: Progress) -> f
 
 
 def _object(decided: Decided, option: BoundOption, bound: float) -> None:
-    """Warn the caller of `encode` of a bound that was kept and is coarse."""
+    """Warn the caller of `encode` if the bound is coarse for the plant."""
     source = decided.source
     if objection := option.objection(bound, source.seen.diagonal, source.clip.motion.metadata.get("unit")):
         warnings.warn(objection, CoarseWarning, stacklevel=4)

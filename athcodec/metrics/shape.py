@@ -167,7 +167,7 @@ def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return (k, E) lengths."""
+    """Return the lengths (k, E) of edges (E, 2) in frames (k, N, 3)."""
     along = frames.take(edges[:, 1], axis=1) - frames.take(edges[:, 0], axis=1)
     return np.sqrt(np.einsum("tei,tei->te", along, along))
 

@@ -133,7 +133,7 @@ class SmoothnessMeter(Meter):
 
     @property
     def source_tick_ratio(self) -> float | None:
-        """The source in the same frames: it may jerk itself."""
+        """`tick_ratio` of the source itself in the same frames, which may jerk as well."""
         return tick_ratio(self.source_acceleration, self.seams)
 
 

@@ -80,8 +80,8 @@ def rotations_of(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return eigenvalues, (K, n) in descending order, and eigenvectors, (K, n, n) a row each, of symmetric matrices (K,
-    n, n), which are destroyed."""
+    """Return eigenvalues (K, n), descending, and eigenvectors (K, n, n), one in each row, of symmetric matrices (K, n,
+    n). The matrices are overwritten."""
     values, vectors = np.empty(moments.shape[:2]), np.empty(moments.shape)
     arrays = moments, np.empty(moments.shape[1:]), values, vectors
     lib.ath_principal(*moments.shape[:2], *(address(array, np.float64, 0) for array in arrays))

@@ -311,7 +311,7 @@ def _joined(parts: Sequence[Any]) -> Frames:
 
 
 def _run(positions: ArrayLike, first: int, last: int) -> Frames:
-    """Return frames `first` to `last` - 1."""
+    """Return the positions of frames `first` to `last` - 1, which are read when they are sliced."""
     return Frames(
         lambda start, stop: positions[first + start : first + stop], last - first, positions.shape[1], positions.dtype
     )

@@ -66,7 +66,8 @@ class Polygons:
         return cls(corners, np.ascontiguousarray(counts, np.uint32), len(counts), 0, indices.dtype, counts.dtype)
 
     def among(self, vertices: np.ndarray) -> Polygons:
-        """Return the polygons whose corners all are among these vertices, ascending, by their numbers there."""
+        """Return the polygons all of whose corners are among `vertices` (ascending), renumbered to places in
+        `vertices`."""
         number = np.minimum(np.searchsorted(vertices, self.corners), len(vertices) - 1).astype(np.int32)
         counts = np.full(self.face_count, self.columns, np.uint32) if self.counts is None else self.counts
         face = np.repeat(np.arange(self.face_count), counts)

@@ -67,7 +67,7 @@ def order_of_labels(labels: Sequence[ArrayLike]) -> Order | None:
 
 
 def written(order: Order) -> str:
-    """Return an order as `parse_order` reads it."""
+    """Return the text of an axis order, "frames,vertices,xyz", that `parse_order` reads."""
     return ",".join(_text(order))
 
 

@@ -207,7 +207,8 @@ class FileAssembly:
                 store.add(ct.ATTRIBUTE, writing.pack_array(name, array))
 
     def _stored(self, of_source: JsonObject, of_weights: Callable[[ErrorWeights], JsonObject]) -> JsonObject:
-        """Return attributes or metadata of the source with those of weights, if there are some."""
+        """Return the attributes or the metadata that the file stores: those of the source, and those that weights
+        add."""
         weights = self.clip.placed.weights
         return of_source if weights is None else of_source | of_weights(weights)
 

@@ -210,7 +210,7 @@ class Plan:
 
     @cached_property
     def node_ranges(self) -> list[tuple[int, int]]:
-        """Ranges of nodes that several threads may do."""
+        """Ranges (start, stop) of nodes that threads may process at the same time."""
         share = np.cumsum(self.nodes["count"]) // max(LEAST_RANGE, self.vertex_count // 4)
         bounds = np.unique(share, return_index=True)[1].tolist()
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))

@@ -45,7 +45,7 @@ def end_weights(usual_change: float) -> tuple[float, ...]:
 
 
 def error_limit(bound: float, diagonal: float) -> float:
-    """Return what decoded positions are held to: the bound less a margin for how others measure."""
+    """Return the distance within which decoded positions have to be: the bound less a margin for how others measure."""
     return bound - max(min(1e-6 * diagonal, 0.01 * bound), 1e-15 * bound)
 
 
@@ -100,7 +100,8 @@ def half_octaves(exponents: np.ndarray) -> np.ndarray:
 
 
 def turn_of(turn_step: float) -> int:
-    """Return the largest step of rotations in half octaves below 1 radian; 0: any step."""
+    """Return the code of a largest rotation step in radians: how many half octaves it is below 1; 0 for no largest
+    step."""
     return round(-2 * np.log2(turn_step)) if turn_step else 0
 
 

@@ -77,7 +77,7 @@ def detail_of(steps: np.ndarray) -> np.ndarray:
 
 
 def finer_than(details: np.ndarray, step: float) -> np.ndarray:
-    """Return the details of branches whose largest step is below `step`; 0 for others."""
+    """Return the details (B,) with 0 in place of those whose step is not finer than `step`."""
     return np.where((details > 0) & (_most(details) < step), details, 0).astype(np.int32)
 
 

@@ -63,8 +63,8 @@ class BoundOption:
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
 
     def objection(self, bound: float, diagonal: float, unit: JsonValue) -> str:
-        """Return what speaks against a bound for a clip of this diagonal and unit, empty if nothing does. A caller who
-        has passed a fraction knows it."""
+        """Return a sentence on why a bound is coarse for a clip of this diagonal and unit, empty if it is not. A bound
+        passed as a fraction gets none."""
         if self.max_error is None and self.target_size is None or not bound > COARSE_SHARE * diagonal > 0:
             return ""
         of_unit, share = f" {unit}" if isinstance(unit, str) else "", bound / diagonal
@@ -76,7 +76,8 @@ class BoundOption:
         return f"max_error: got {bound:g}{of_unit}, {of_plant}; {expected}: a length may have a unit, such as 1mm"
 
     def least(self, clip: MotionClip) -> float:
-        """Return what the bound for a clip is at least, as far as some of its frames tell; 0: they do not."""
+        """Return a lower estimate of the bound in scene units, from some of the clip's frames; 0 if they do not
+        tell."""
         if self.max_error is not None:
             return self.max_error
         if self.target_size is not None or self.lossless:

@@ -120,7 +120,8 @@ def _check_limits(vertices: int, frames: int, hierarchy: Hierarchy) -> None:
 
 
 def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
-    """Return the clip that branches are sought for."""
+    """Return the clip in which branches are sought: with the pose that shows most of a growing plant, unless the rest
+    pose has to stay."""
     return placed.clip if options.keeps_rest else with_grown_pose(placed.clip)
 
 

@@ -53,7 +53,7 @@ SIZES = 6  # Files that are made to meet a target size.
 
 
 def silent(phase: str, fraction: float) -> None:
-    """Report to nobody."""
+    """Ignore a report of progress."""
 
 
 def allowed_work(vertices: int, frames: int, effort: str) -> float:
@@ -62,7 +62,7 @@ def allowed_work(vertices: int, frames: int, effort: str) -> float:
 
 
 def expected_trials(effort: str, layered: bool, small: bool) -> int:
-    """Return the number of trials that a search takes as long as."""
+    """Return about how many trials take as long as the whole search does."""
     return TRIALS[effort] + LAYER_TRIALS[effort] * layered + SMALL_TRIALS * small
 
 
@@ -79,7 +79,7 @@ class Work:
         self._report, self._phase, self._choice, self._lock = report, phase, "", Lock()
 
     def add(self, work: float) -> None:
-        """Count work that is done."""
+        """Add work to what was done, in the unit of `allowed`."""
         with self._lock:
             self.done += int(work)
 

@@ -68,7 +68,7 @@ def settled(settings: Settings, trials: Trials) -> Settings:
 
 
 def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list[Settings]:
-    """Return the few of the others that are the cheapest, and hardly dearer than the cheapest of all."""
+    """Return the few of the other settings that cost least, and hardly more than the cheapest of all."""
     others = [other for other in distinct(others) if other.key != settings.key]
     costs = trials.costs(others)
     most = NEAR_RATIO * min([trials.cost(settings), *costs])
@@ -189,7 +189,8 @@ class Search:
         return all(trials.costs([in_bases])[0] <= OWN_BASES_SHARE * trials.costs([other])[0] for other in others)
 
     def keep_work_of_maps(self) -> None:
-        """Leave the work of choosing maps of coarse stages, which comes last and is always done."""
+        """Take the work of choosing the maps of coarse stages from what is allowed: that choice comes last and is
+        always made."""
         self.trials.work.allowed -= work_of_steps((self.of_sample or self).trials)
 
     def first_cost(self) -> float:
@@ -204,7 +205,8 @@ class Search:
         return search.trials.cost(search.best)
 
     def tried(self, frames_ratio: float) -> float:
-        """Return about the bytes of a file of so many times the frames, by the choices that save most."""
+        """Return about the bytes of a file of `frames_ratio` times the frames, after the choices that save most were
+        made."""
         search = self.of_sample or self
         return search._cost_of_frames(search.at_best_step, frames_ratio)
 
@@ -265,7 +267,7 @@ class Search:
 
     @cached_property
     def at_best_step(self) -> Settings:
-        """The same at the best steps."""
+        """Bases, rotations and modes of a file of one layer, at the best steps."""
         if self.effort == "fast":
             return self.at_first_step
         return self._after([best_steps, learned_pieces.learned_about_other_pose], self.at_first_step)
@@ -364,7 +366,8 @@ class Search:
         return other if about_mean._cost_to_compare() < cost else self
 
     def _cost_to_compare(self) -> float:
-        """Return what is compared with the cost about another reference pose."""
+        """Return the bytes of this search's file so far, by which it is compared with one about another reference
+        pose."""
         return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
@@ -378,7 +381,7 @@ class Search:
         return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
 
     def _like(self, other: Search, settings: Settings) -> Settings:
-        """Return settings that were chosen about another reference pose, about this one."""
+        """Return settings for this reference pose from those that another search chose about its own."""
         trials, start = self.trials, self.trials.start
         like = replace(
             settings,
@@ -421,7 +424,8 @@ class Search:
         return self._from_sample(sample, sample.first_layer(), start.coarser(self.ratios[0])), candidates
 
     def _from_sample(self, sample: Search, chosen: Settings, start: Settings) -> Settings:
-        """Return what was chosen for a sample, for all of the plant; start: what does not depend on that."""
+        """Return the settings for the whole plant, given those chosen for a sample of it. start: settings that no
+        sample decides."""
         trials, of_sample = self.trials, sample.trials
         inner, all_inner = (inner_nodes(some.source, some.ath, some.stages) for some in (of_sample, trials))
         fewer = np.sqrt(of_sample.extrapolation.vertices * inner / np.maximum(all_inner, 1))

@@ -28,7 +28,7 @@ class SegmentSample:
 
     @property
     def scale(self) -> float:
-        """The frames that the segment stands for, over its own."""
+        """Number of frames that the sample stands for, over its own."""
         return self.frames / self.positions.shape[2]
 
     def of_plant(self, sample: PlantSample) -> SegmentSample:
@@ -97,7 +97,7 @@ def _middle(positions: np.ndarray) -> np.ndarray:
 
 
 def _moved(source: Source, segment: int) -> float:
-    """Return the RMS displacement of the vertices from the first frame of a segment to its middle."""
+    """Return the RMS distance that vertices move from the first frame of a segment to its middle, in scene units."""
     start, stop = source.segments[segment]
     first, middle = (
         source.clip.motion.block(frame, frame + 1).astype(np.float64) for frame in (start, (start + stop) // 2)

@@ -27,7 +27,8 @@ STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficie
 def first_settings(
     source: Source, ath: Ath, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int] = (1,)
 ) -> Settings:
-    """Return the start of a search for the last of layers; ratios: of their steps to that of the last, descending."""
+    """Return the settings that a search for the last layer starts with. ratios: of the layers' steps to that of the
+    last, descending to 1."""
     is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), source.rest_limit(bound) * qz.rest_step_ratio(relative)

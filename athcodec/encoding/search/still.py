@@ -46,7 +46,7 @@ class SplitSource:
 
     @classmethod
     def of(cls, source: Source, ath: Ath, bound: float) -> SplitSource | None:
-        """Return the parts of a source; None: it has nothing that stands still, or nothing else."""
+        """Return the moving and the still part of a source; None if nothing stands still, or everything does."""
         if source.still or source.still_branches is not None or source.reference_is_exact:
             return None
         still = still_branches(source, bound)
@@ -167,7 +167,7 @@ class SplitSource:
 
 
 def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
-    """Return some branches of a source, with all that these are on, as a source of their own."""
+    """Return some branches of a source, and all branches below them, as a source of their own."""
     sample = PlantSample(source, ath, branches, with_faces=True)
     part = replace(
         sample.source,
@@ -181,7 +181,7 @@ def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
 
 
 def _seen(seen: Survey, sample: PlantSample) -> Survey:
-    """Return the survey of some branches, in the box of all."""
+    """Return the survey for the branches of a sample, with the bounding box of the whole plant."""
     chosen = np.isin(seen.branches, sample.branches)
     roots = np.flatnonzero(seen.hierarchy.branch_parent < 0)
     return replace(
@@ -197,6 +197,6 @@ def _seen(seen: Survey, sample: PlantSample) -> Survey:
 
 
 def _standing(source: Source) -> Source:
-    """Return a source that stands still, in one frame."""
+    """Return a source of one frame that shows the rest pose of another."""
     seen = replace(source.seen, frame_count=1, steps=np.array([np.inf]))
     return replace(source, clip=source.clip.standing(), seen=seen, held=None)

@@ -92,7 +92,7 @@ class Trials:
         return other
 
     def apart(self) -> Trials:
-        """Return trials that know what these know and count their work from zero, without a limit."""
+        """Return a copy that knows the costs so far and counts its own work from zero, without a limit."""
         other = replace(self, work=Work())
         for name in ("_known", "_components", "_time_components", "_preludes", "_seen_preludes"):
             setattr(other, name, getattr(self, name).copy())
@@ -108,7 +108,7 @@ class Trials:
         return sum(sample.positions.shape[2] for sample in self.samples)
 
     def work_of(self, each: float) -> float:
-        """Return the work of something that takes so much for each vertex in each frame of the samples."""
+        """Return the work of an operation that takes `each` for every vertex in every frame of the samples."""
         return each * self.source.clip.vertex_count * self.frames
 
     @property
@@ -199,7 +199,7 @@ class Trials:
     def analysed(
         self, settings: Settings, number: int, modes: LearnedModes | None, bent: bool = False
     ) -> SegmentMotion:
-        """Return a sample in its integers. bent: as SegmentMotion.analyse has it."""
+        """Return the quantised motion of sample `number` under some settings. bent: as SegmentMotion.analyse has it."""
         plan, sample = self.prelude(settings).plan, self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
         stages = stage_streams(of_sample, plan.stage_count, self._bases(settings, number))
@@ -208,7 +208,7 @@ class Trials:
         return segment
 
     def coded(self, settings: Settings, number: int, modes: LearnedModes | None) -> Coded:
-        """Return the streams of a sample."""
+        """Return the coded streams of sample `number` under some settings."""
         sample = self.samples[number]
         of_sample = settings.of_segment(sample.whole_loop)
         return code_stems(self.prelude(settings), of_sample, sample.positions, modes, self._bases(settings, number))

@@ -54,7 +54,7 @@ class End:
     shown: tuple[np.ndarray, np.ndarray]
 
     def of(self, some: slice) -> End:
-        """Return the end of some of the vertices, as far as a join is chosen and made by it."""
+        """Return the end with some of its vertices alone, in the arrays by which a join is chosen and made."""
         return replace(self, positions=self.positions[some], source=self.source[some])
 
 
@@ -90,7 +90,8 @@ def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, fr
 
 
 def _ways(end: End, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the jump and the change of slope from an end to the positions after it, (N, 3) float64 each."""
+    """Return the jump of each vertex from the end of a segment to the positions after it, and the change of its slope,
+    (N, 3) float64 each."""
     start, last = (end.positions[:, :, i].astype(np.float64) for i in range(END_FRAMES))
     first, second = (positions[:, :, i].astype(np.float64) for i in range(2))
     return 0.5 * (3.0 * (last - first) - (start - second)), (last - start) - (second - first)
@@ -98,7 +99,7 @@ def _ways(end: End, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def _shares(join: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the shares of the jump and of the change of slope that a join adds to its frames, (width,) each."""
+    """Return by which share of the jump, and of the change of slope, a join moves each of its frames, (width,) each."""
     width, is_sloped = join % SLOPED, join >= SLOPED
     u = (np.arange(width) + 0.5) / width if width else np.empty(0)
     left = 1.0 - u
@@ -180,7 +181,8 @@ class _Moved:
 
 
 def seen(vertices: int) -> slice:
-    """Return the vertices by which joins are chosen. The stride is odd, so that each corner of a card comes in turn."""
+    """Return the slice of vertices by which joins are chosen. The stride is odd, so that each corner of a card comes in
+    turn."""
     return slice(None, None, vertices // SEEN | 1)
 
 
@@ -190,17 +192,17 @@ def _squares(away: np.ndarray) -> np.ndarray:
 
 
 def _parts(count: int, frames: int) -> Iterator[slice]:
-    """Yield few vertices at a time."""
+    """Yield slices of so few vertices that arrays of their positions in `frames` frames stay small."""
     return (slice(*part) for part in ranges(count, 16 * frames))
 
 
 def _changes(positions: np.ndarray) -> np.ndarray:
-    """Return the RMS over vertices of the change of velocity at each frame but the first and the last."""
+    """Return the RMS over vertices of the change of velocity at each frame but the first and the last, (T - 2,)."""
     return np.sqrt(sum(squared_bends(positions[part]) for part in _parts(*positions.shape[::2])) / len(positions))
 
 
 def _usual(changes: np.ndarray) -> float:
-    """Return the change in a usual frame. If most frames have none, as between keys, it is half the RMS."""
+    """Return the change of velocity of a usual frame. If most frames have none, as between keys, it is half the RMS."""
     return max(float(np.median(changes)), 0.5 * float(np.sqrt((changes**2).mean())))
 
 
@@ -212,7 +214,7 @@ class SourceStart:
         self.usual, self._frames, self._origin = _usual(_changes(positions)), positions, origin[:, None]
 
     def frames(self, vertices: slice, count: int) -> np.ndarray:
-        """Return the first frames of some of the vertices."""
+        """Return the first `count` frames of the source for some of the vertices, with the origin added."""
         return self._frames[vertices, :, :count] + self._origin
 
 

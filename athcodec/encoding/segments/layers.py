@@ -123,7 +123,7 @@ class Layers:
 
     @property
     def first_rest_bytes(self) -> int:
-        """Bytes of the streams up to the rest pose of the first layer."""
+        """Bytes of the hierarchy and of the rest pose that the first layer decodes."""
         refined = self.each[0].rest
         return len(self.rest.stream) + (0 if refined is None else len(refined.stream))
 
@@ -165,14 +165,15 @@ def _in_bounds(ladder: Sequence[float], bound: float, diagonal: float) -> list[f
 
 
 def _held_limit(source: Source, bound: float, factor: float, ratio: int) -> float | np.ndarray:
-    """Return what the positions of a layer before the last are held to: no error in the table exceeds the one that the
-    ladder names. factor: of its step."""
+    """Return the distance within which corrections keep the positions of a layer before the last, so that no stored
+    error exceeds the one that the ladder names. factor: of its step."""
     error = ct.short_float_within(ratio / factor * bound)
     return np.minimum(source.limit(error), source.unweighted_limit(error))
 
 
 def _between(ratio: int, finer: int) -> list[int]:
-    """Return `ratio` and those before `finer`, each at most MOST_RATIO from the next one."""
+    """Return the ratios of steps from `ratio` down to the one before `finer`, each at most MOST_RATIO times the next
+    one."""
     if ratio <= MOST_RATIO * finer:
         return [ratio]
     middle = math.isqrt(ratio * finer)
@@ -369,7 +370,7 @@ class Ends:
 
     @contextmanager
     def failing(self) -> Iterator[None]:
-        """Let the segment that waits fail as this one does."""
+        """Return a context in which an error also ends the segment that waits for these ends."""
         try:
             yield
         except BaseException as error:
@@ -429,7 +430,7 @@ class CodedMotion:
             self._segment = self._first(layers.each[0])
 
     def finish(self) -> None:
-        """Code what is left: the first layer is there once the object is made."""
+        """Code the refinements. The first layer is coded when the object is made."""
         segment = self._segment
         del self._segment
         with self._failing():
@@ -563,7 +564,8 @@ class CodedMotion:
         return self._corrected[stage].applied(positions) if stage in self._corrected else nullcontext()
 
     def _meet(self, start: np.ndarray) -> None:
-        """Close the start of the last stage, in whose first frame the corrections of an end stand."""
+        """Require the corrections of the last stage to meet those that an earlier segment's end left in the first
+        frame."""
         rows = np.concatenate([start * np.array([1, 0, 1, 1, 1, 1], np.int32), self._end_corrections])
         ordered = rows[np.lexsort(rows[:, 1::-1].T)]
         self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)

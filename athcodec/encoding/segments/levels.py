@@ -112,7 +112,8 @@ def chosen_levels(
 
 
 def _of_clips(errors: np.ndarray, clip_frames: Sequence[Sequence[int]]) -> np.ndarray:
-    """Return the largest and the RMS error of each stage in each clip, and over all clips, (stages, 2 + 2 * clips)."""
+    """Return the largest and the RMS error of each stage over all clips, and then in each clip, (stages, 2 + 2 *
+    clips)."""
     stops = np.cumsum([len(frames) for frames in clip_frames])[:-1]
     parts = list(zip(np.split(errors, stops, axis=1), clip_frames))
     everything = errors, [frames for of_clip in clip_frames for frames in of_clip]

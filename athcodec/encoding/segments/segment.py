@@ -169,7 +169,7 @@ class Source:
         return len(self.segments) > len(self.clip_range_segments)
 
     def about(self, reference: np.ndarray | None) -> Source:
-        """Return the source about another reference pose."""
+        """Return the source with another reference pose, (N, 3) less the origin, for its motion."""
         if reference is None and self.reference is None:
             return self
         source = self._changed(reference=reference)
@@ -178,7 +178,8 @@ class Source:
         return source
 
     def marking(self, still_branches: np.ndarray) -> Source:
-        """Return the source with branches marked whose motion is not looked at, (B,) bool."""
+        """Return the source with some branches, (B,) bool, marked as standing still: the coder takes them from the rest
+        pose."""
         return self._changed(still_branches=still_branches)
 
     def in_segments(self, frames: int | None) -> Source:
@@ -186,7 +187,8 @@ class Source:
         return self._changed(segment_frames=frames, whole=None)
 
     def holding(self, tolerance: float) -> Source:
-        """Return the source with frames left out that differ by at most so much from the last one that is coded."""
+        """Return the source without the frames that differ from the last coded one by at most `tolerance` at each
+        vertex."""
         nearly = (self.seen.steps > 0) & (self.seen.steps <= tolerance)
         if not nearly.any() or self.still or Feature.REPEATS in self.without:
             return self
@@ -246,7 +248,7 @@ class Source:
         return Mesh.of(self.polygons, self.hierarchy.vertex_source)
 
     def mesh_for(self, settings: Settings) -> Mesh | None:
-        """Return the faces that the rest pose of some settings goes by."""
+        """Return the faces by which the rest pose is predicted under these settings; None without such a prediction."""
         return self.mesh if settings.connected_rest else None
 
     @property
@@ -267,7 +269,8 @@ class Source:
         return length(high - low)
 
     def limit(self, bound: float) -> float | np.ndarray:
-        """Return what decoded positions are held to: one distance for all vertices, or one each, (N,) in file order."""
+        """Return the distance within which decoded positions have to be: one for all vertices, or one for each, (N,) in
+        file order."""
         if self.weights is None:
             return self.unweighted_limit(bound)
         return np.array(
@@ -275,12 +278,12 @@ class Source:
         )
 
     def unweighted_limit(self, bound: float) -> float:
-        """Return what decoded positions of any vertex are held to if weights do not count."""
+        """Return the distance within which decoded positions would have to be if no vertex had a weight."""
         return qz.error_limit(bound - self.replaced_error, self.seen.diagonal)
 
     @property
     def replaced_error(self) -> float:
-        """Largest distance of any vertex in any frame from what is coded in its place."""
+        """Largest distance of any vertex in any frame from the place or held frame that is coded instead of it."""
         return self.held_error + self.clip.placed.places.error
 
     def smallest_bound(self, bound: float) -> float:
@@ -296,8 +299,8 @@ class Source:
         return bound if self.has_source_rest else min(bound, self.rest_error)
 
     def stage_weights(self, stages: int, part: float) -> np.ndarray:
-        """Return for each stage the weight that such a part of its vertices and those below fall short of, (stages,). A
-        stage without vertices has the weight of the one above."""
+        """Return for each stage, (stages,), the weight below which a share `part` of its vertices, and of those of
+        finer stages, lies. A stage without vertices has the weight of the one above."""
         stage = self.hierarchy.branch_depth[self.hierarchy.vertex_branch()]
         weights = np.ones(len(stage)) if self.weights is None else self.weights
         below = [weights[stage >= first] for first in range(stages)]
@@ -343,7 +346,7 @@ class Source:
         return block[~repeats] if repeats.any() else block
 
     def exact(self, block: np.ndarray) -> np.ndarray:
-        """Return a block in file order with its very numbers, (N, 3, T)."""
+        """Return a block (T, N, 3) of the clip in file order, (N, 3, T), without any rounding."""
         return np.ascontiguousarray(block[:, self.hierarchy.vertex_source].transpose(1, 2, 0))
 
     def relative(self, block: np.ndarray) -> np.ndarray:
@@ -365,7 +368,8 @@ class Source:
         return positions
 
     def sharing(self, segment: int, positions: np.ndarray) -> np.ndarray:
-        """Return positions of a segment, which are not read again while they are in use if they are all of it."""
+        """Return the positions (N, 3, T) of a segment. If they have all of its frames, `positions` returns the same
+        array while it is in use."""
         if positions.shape[2] == self.frames_of(segment):
             self._held[segment] = positions
         return positions
@@ -387,7 +391,7 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
 
 
 def plain_settings(source: Source, stages: int, bound: float, step: float, rest_step: float) -> Settings:
-    """Return settings in which nothing is chosen."""
+    """Return settings without rotations, learned bases, rigid parts or other choices, at these steps."""
     none = np.zeros(source.hierarchy.branch_count, np.int32)
     return Settings(
         bound=bound,
@@ -683,7 +687,7 @@ class Corrections:
 
     @contextmanager
     def applied(self, decoded: np.ndarray) -> Iterator[None]:
-        """Correct the positions as long as the context lasts."""
+        """Return a context in which `decoded` has the corrections added; they are taken back at its end."""
         vertices = np.unique(self.rows[:, 0])
         before = decoded[vertices]
         streams.apply_corrections(decoded, self.rows, self.step)
@@ -764,7 +768,7 @@ def stem_streams(
 
 
 def correction_step(limit: float | np.ndarray) -> float:
-    """Return the step of corrections that is tried first."""
+    """Return the quantisation step of corrections that is tried first, for a limit in scene units."""
     return qz.single(qz.CORRECTION_STEP * float(np.min(limit)))
 
 

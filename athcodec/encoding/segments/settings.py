@@ -94,7 +94,8 @@ class Settings:
 
     @property
     def rounding(self) -> Rounding:
-        """How numbers become integers."""
+        """The way in which coefficients become integers: dead zone, weights of the ends, and whether roots alone
+        turn."""
         return Rounding(
             qz.DEAD_ZONE, qz.end_weights(self.usual_change / float(np.min(self.limit))), roots_turn=self.roots_turn
         )
@@ -108,7 +109,8 @@ class Settings:
         return max(last, min(wanted, self.coarsest_rest_step))
 
     def of_segment(self, whole_loop: bool) -> Settings:
-        """Return the settings of a segment, which is all of a loop or not."""
+        """Return the settings for one segment. whole_loop: whether the segment is all of a loop, and may have periodic
+        waves."""
         return replace(self, periodic=self.periodic and whole_loop)
 
     def with_rotations(self, factor: int) -> Settings:

@@ -100,7 +100,7 @@ class TimeComponents:
 
     @cached_property
     def _suits_waves(self) -> bool:
-        """Whether the rows are smaller in waves, or samples too coarse for them."""
+        """Whether the learned rows are stored in waves, because that is smaller or samples would be too coarse."""
         rank = max(self._rank(1.0), 1)
         is_coarse = MOST_SAMPLE * PRECISION < np.sqrt(self._energies[0])
         in_waves, entries = self._in_waves(rank, 1.0), self._entries(rank)

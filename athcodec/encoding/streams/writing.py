@@ -156,13 +156,13 @@ def pack_steady_time(*times: np.ndarray) -> bytes | None:
 
 
 def _rate_of(time: np.ndarray) -> tuple[int] | None:
-    """Return the whole rate that gives these times from 0 on."""
+    """Return the whole number of frames per second whose times from 0 on are exactly these, if there is one."""
     rate = round(1 / float(time[1])) if len(time) > 1 and float(time[1]) > 1e-5 else 1
     return (rate,) if 0 < rate < 65536 and (np.arange(len(time)) / rate == time).all() else None
 
 
 def _step_of(time: np.ndarray) -> tuple[float, float] | None:
-    """Return the first time and the step that give these times."""
+    """Return the first time and the step in seconds that give exactly these times, if there are such."""
     index, first = np.arange(len(time)), float(time[0])
     if len(time) == 1:
         return first, 1.0

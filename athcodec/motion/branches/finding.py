@@ -121,7 +121,8 @@ def _distinct(proposals: Iterable[Found]) -> Iterator[Found]:
 
 
 def _others(seen: Seen, first: Found) -> Iterator[Found]:
-    """Yield alternatives to branches that are not found by motion alone."""
+    """Yield other branches that may suit as well where the first ones were found by runs of points, joints or connected
+    pieces."""
     if first.method == "runs":
         yield from _in_order(seen)
     elif first.method == "skeleton":
@@ -151,8 +152,8 @@ def _by_contact(seen: Seen, first: Found) -> Found:
 
 
 def _in_order(seen: Seen) -> Iterator[Found]:
-    """Yield parts of points that nothing joins whose vertices follow each other in the source, as programs write
-    them."""
+    """Yield labels for points that nothing joins: parts whose vertices follow each other in the source, as programs
+    write them."""
     for label in _labels_in_order(seen):
         yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)
 

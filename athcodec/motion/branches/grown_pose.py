@@ -82,7 +82,7 @@ def _some_frames(frame_count: int) -> np.ndarray:
 
 
 def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield frames, (N, 3) float64."""
+    """Yield the positions (N, 3) float64 of the clip in each of these frames."""
     return (clip.block(frame, frame + 1)[0].astype(np.float64) for frame in frames.tolist())
 
 

@@ -177,12 +177,12 @@ def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
 
 
 def _degrees(links: np.ndarray, count: int) -> np.ndarray:
-    """Return the links at each point, (N,)."""
+    """Return how many links each point has, (N,), of `count` points."""
     return np.bincount(links.reshape(-1), minlength=count)
 
 
 def _parts(links: np.ndarray, count: int) -> np.ndarray:
-    """Return labels of what links join, (N,)."""
+    """Return a label (N,) for each point: the connected part that links make."""
     graph = scipy_module("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
     labels: np.ndarray = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
     return labels

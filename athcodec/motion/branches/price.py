@@ -65,7 +65,8 @@ class Prices:
         return HANGING + bits
 
     def _of_sizes(self, child: np.ndarray, parent: np.ndarray) -> np.ndarray:
-        """Return the bits of hanging on what is not larger, (C,)."""
+        """Return the bits (C,) that are added where a branch hangs on one that is smaller, or less than twice as
+        large."""
         smaller, larger = self._sizes[child], self._sizes[parent]
         return SMALLER * ((larger < smaller).astype(float) + (larger < 2 * smaller))
 
@@ -81,7 +82,8 @@ class Prices:
 
     @cached_property
     def _apart(self) -> np.ndarray:
-        """The vertices in a space of four dimensions, (N, 4), in which branches are apart."""
+        """The vertices (N, 4) as points in four dimensions: the fourth separates branches, so that neighbours are of
+        one branch."""
         return np.column_stack([self._rest / self._diagonal, APART * self._label])
 
     @cached_property
@@ -89,7 +91,7 @@ class Prices:
         return scipy_module("spatial").cKDTree(self._apart)
 
     def _bits(self, tracks: np.ndarray) -> np.ndarray:
-        """Return the bits of some tracks of each of some branches, (K, p, 3, F)."""
+        """Return about how many bits the tracks (K, p, 3, F) of K branches take, for each branch."""
         bits: np.ndarray = 0.5 * np.log2(1 + np.square(tracks @ self._components / self._step)).sum(axis=(1, 2, 3))
         return bits
 

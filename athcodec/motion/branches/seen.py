@@ -42,7 +42,7 @@ class Seen:
 
     @property
     def is_carried(self) -> bool:
-        """Whether all turns or travels as a whole."""
+        """Whether the whole plant turns or travels, so that its frames are seen without that motion."""
         return self._standing is not None
 
     @cached_property
@@ -215,7 +215,7 @@ def components(links: np.ndarray, vertex_count: int) -> np.ndarray:
 
 
 def numbered(label: np.ndarray) -> np.ndarray:
-    """Return labels numbered from 0 on by their first vertices."""
+    """Return labels (N,) renumbered from 0 on, in the order of their first vertices."""
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
