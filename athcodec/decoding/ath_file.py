@@ -454,6 +454,7 @@ class AthFile:
         return self.levels[1].max_error / self.max_error_bound
 
     def _clip_info(self, clip: Clip) -> JsonObject:
+        """Return the facts of one clip of the file, for `info`."""
         metadata = metadata_of(self.metadata, clip.name)
         strength, heading = wind_of(metadata)
         return {

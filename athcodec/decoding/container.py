@@ -328,6 +328,7 @@ def _array_type(code: int, size: int, subject: str) -> np.dtype:
 
 
 def _array_name(text: bytes, subject: str, limits: Limits) -> str:
+    """Return the name of an array from its bytes. Raises LimitExceeded, BadChunk."""
     if len(text) > limits.string_bytes:
         raise LimitExceeded(f"{subject}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
     try:

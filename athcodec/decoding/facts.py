@@ -121,6 +121,7 @@ def _clips(facts: JsonObject) -> Table:
 
 
 def _levels(facts: JsonObject) -> Table:
+    """Return the table of a file's levels: bytes and errors."""
     measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
     columns = ["bytes so far", *(head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [

@@ -108,6 +108,8 @@ class FileBytes:
             self.source.prefetch(ranges)
 
     def _open_core(self) -> core_file.File:
+        """Read as much of the front as the core needs, and return the file opened by the core. Raises the errors of
+        damaged files."""
         limits, data = core_file.Limits.of(self.limits), b""
         try:
             needed, memory, lacking = core_file.front(data, limits)

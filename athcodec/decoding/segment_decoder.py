@@ -149,6 +149,8 @@ class SegmentDecoder:
     def _missing(
         self, segment: int, level: int, before: core_file.Segment | None, joined_to: core_file.Segment | None
     ) -> list[tuple[int, int]]:
+        """Return the ranges of bytes that decoding a segment at a level still lacks. before, joined_to: prepared
+        segments that need no bytes."""
         if not before and not joined_to:
             return self._core.missing(level, segment)
         ranges = self._core.missing_of(segment, level, self._core.level_of(before) if before else -1)

@@ -130,6 +130,8 @@ class FileDecisions:
         return self._holding(bound)._tried(bound, work, frames_ratio)
 
     def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+        """Return the estimated bytes of a file of `frames_ratio` times the frames, and whether its motion is
+        predicted."""
         try:
             self._check(bound)
             if self.source.still:
@@ -217,6 +219,8 @@ class FileDecisions:
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
     def _decide(self, bound: float, work: Work) -> Decided:
+        """Return what is decided about a file at a bound with so much work: its search, its layers or its
+        prediction."""
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound, self.options.ladder)
         ratio = ratios[0]
@@ -329,6 +333,7 @@ class FileDecisions:
         return self.source.in_segments(self.options.predicted_frames)
 
     def _predicted(self, choice: Choice) -> Decided:
+        """Return what follows from a choice of predicted motion, in its longer segments."""
         source = self._long_segments
         ath = one_map_each(source.seen)
         prelude = CodedPrelude(source, ath, choice.settings, predicted=True)
@@ -387,6 +392,8 @@ class FileDecisions:
         return self._holding(draft.choice.settings.bound)._decided(draft)
 
     def _decided(self, draft: Draft) -> Decided:
+        """Return what follows from the choice of a draft. Raises ClipError if hierarchy or rest pose are not those of
+        the draft."""
         decided = self._of_choice(draft.choice, draft.thresholds)
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(

@@ -256,6 +256,7 @@ def _object(decided: Decided, option: BoundOption, bound: float) -> None:
 def _weighted_progress(
     clip: MotionClip, progress: Progress | None, option: BoundOption, options: EncodingOptions, draft: bool = False
 ) -> WeightedProgress:
+    """Return the progress of a whole encoding, whose phases count by the time that they are expected to take."""
     weights = _phase_weights(clip, option, options, not draft)
     if _is_compared(option, options):
         as_usual = dataclasses.replace(options, effort="default")
@@ -264,6 +265,7 @@ def _weighted_progress(
 
 
 def _phase_weights(clip: MotionClip, option: BoundOption, options: EncodingOptions, motion: bool) -> dict[str, float]:
+    """Return about how much work each phase of an encoding takes. motion: whether segments are coded, too."""
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
     return phase_weights(
         clip.vertex_count,

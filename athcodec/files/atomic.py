@@ -252,6 +252,7 @@ def _sync_folder(folder: str) -> None:
 
 
 def _locked_folder(folder: str) -> int:
+    """Lock a folder until the returned descriptor is closed; -1 where the system has no locks."""
     if fcntl is None:
         return -1
     descriptor = os.open(folder, os.O_RDONLY | PLAIN_OPEN)
@@ -300,6 +301,7 @@ def _locked_new_file(path: str) -> tuple[str, int]:
 
 
 def _remove_if_dead(name: str) -> None:
+    """Remove a temporary file or folder whose writer no longer runs."""
     with suppress(OSError):  # The file is locked by its writer, gone by now, or not ours.
         if fcntl is None:
             shutil.rmtree(name) if os.path.isdir(name) else os.unlink(name)

@@ -89,6 +89,7 @@ class Remote:
             self.keep(self._source.fetch(wanted))
 
     def keep(self, pieces: list[tuple[int, bytes]]) -> None:
+        """Store pieces of the file, (offset, bytes), and drop the oldest beyond KEPT_BYTES."""
         for offset, data in pieces:
             if len(data) > len(self._kept.get(offset, b"")):
                 self._kept[offset] = data
@@ -113,6 +114,7 @@ class Remote:
     # ---- as a file ----
 
     def read(self, size: int = -1) -> bytes:
+        """Return the next `size` bytes, or all that follow, and fetch those that are not there."""
         stop = self.size if size < 0 else min(self._place + size, self.size)
         parts = []
         while self._place < stop:

@@ -49,6 +49,7 @@ class ErrorMeter(Meter):
         self._high = np.full(3, -inf)
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        """Add the errors of decoded frames (k, N, 3) against those of the reference."""
         difference = reference - decoded
         scale = _scale(difference)
         square = ((difference / scale) ** 2).sum(axis=2)

@@ -100,6 +100,7 @@ class MotionMeter(Meter):
         }
 
     def _shape(self) -> JsonObject:
+        """Return the figures about the shape of edges and faces, by name."""
         shape = self.shape
         edges = {
             "edges": shape.edge_count,

@@ -721,6 +721,7 @@ def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
 
 
 def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
+    """Return the number of a branch that is its own ancestor; None if there is none."""
     count = len(branch_parent)
     ancestor = np.append(np.where(branch_parent < 0, count, branch_parent), count)
     for _ in range(count.bit_length()):

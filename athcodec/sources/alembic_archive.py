@@ -130,6 +130,7 @@ class _Xform:
     still: np.ndarray | None = None
 
     def at(self, time: float) -> np.ndarray:
+        """Return the matrix (4, 4) at a time in seconds, between the samples beside it."""
         if self.still is not None:
             return self.still
         matrix = np.zeros((4, 4))
@@ -148,6 +149,7 @@ class _Visibility:
     values: np.ndarray
 
     def at(self, times: np.ndarray) -> np.ndarray:
+        """Return the stated visibility at each of the times, (T,)."""
         return self.values[[self.track.at(time)[0][0] for time in times]]
 
 
@@ -205,6 +207,7 @@ class _Object(SceneObject):
 
 
 def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
+    """Return the clip of the objects in an archive. Raises ClipError."""
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
     metadata, kept = _kept(archive)
@@ -362,6 +365,7 @@ def _names_of(properties: AlembicObject) -> list[str]:
 
 
 def _above(child: AlembicObject, xforms: list[_Xform]) -> list[_Xform]:
+    """Return the transforms above what hangs on the transform `child`: its own, and those above if it inherits them."""
     schema = AbcGeom.IXform(child, EXISTING).getSchema()
     above = xforms if schema.getInheritsXforms() else []
     count = schema.getNumSamples()
@@ -487,6 +491,7 @@ def _rate(archive: AlembicObject, step: float, times: np.ndarray) -> float:
 
 
 def _metadata(archive: AlembicObject, times: np.ndarray, rate: float | None) -> JsonObject:
+    """Return the metadata that the archive states: frame rate, first frame and up axis."""
     metadata: JsonObject = {}
     if rate is not None:
         start = float(times[0]) * rate
@@ -501,6 +506,7 @@ def _metadata(archive: AlembicObject, times: np.ndarray, rate: float | None) -> 
 
 
 def _statics(obj: _Object, time: float) -> None:
+    """Store the arrays of an object that are the same at all times."""
     for name, getter in NAMED_PARAMS:
         if hasattr(obj.schema, getter):  # A subdivision surface has no normals.
             _keep(obj, name, getattr(obj.schema, getter)())
@@ -518,6 +524,8 @@ def _statics(obj: _Object, time: float) -> None:
 
 
 def _keep(obj: _Object, name: str, param: AlembicObject) -> None:
+    """Store one parameter of an object as an array, or note that it is left out if it changes or is no array of
+    numbers."""
     if not param.valid() or not param.getNumSamples():
         return
     if not param.isConstant():
@@ -588,6 +596,7 @@ def _descriptor(text: str) -> ArrayDescriptor:
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
+    """Return the points (n, 3) float32 of an object at a time, between the samples beside it."""
     samples = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
     counts = {len(points) for points, _ in samples}
     if len(counts) != 1:

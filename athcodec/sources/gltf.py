@@ -64,6 +64,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
+    """Return the clip of the nodes that the options choose. Raises ClipError."""
     scenes = _scenes(file, options)
     scene = next(iter(scenes.values()))
     nodes = _chosen(scene, _patterns(options))
@@ -355,6 +356,7 @@ def _names(scene: Scene, nodes: list[GltfNode]) -> JsonObject:
 
 
 def _is_double_sided(file: GltfFile, node: GltfNode) -> bool:
+    """Return whether the file states for all primitives of the node that both sides are seen."""
     numbers = [primitive.get("material") for primitive in node.primitives]
     materials = [{} if number is None else file.item("materials", number) for number in numbers]
     return all(item.get("doubleSided") is True and "doubleSided" not in guessed(item) for item in materials)
@@ -530,6 +532,7 @@ def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
 
 
 def _above(scene: Scene, joint: int, place: dict[int, int]) -> int:
+    """Return the number in `place` of the nearest joint above another, -1 for none."""
     joint = int(scene.parent[joint])
     while joint >= 0 and joint not in place:
         joint = int(scene.parent[joint])

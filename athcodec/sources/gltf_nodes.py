@@ -155,6 +155,7 @@ def _refuse_draco(file: GltfFile, primitive: JsonObject, positions: int) -> None
 
 
 def load_node(node: GltfNode, scene: Scene) -> None:
+    """Read the points, morph targets and joints of a node. Raises ClipError."""
     file = scene.file
     slots = sum(key.startswith("JOINTS_") for key in node.attributes) if node.skin is not None else 0
     file.budget.take(INFLUENCE_BYTES * 4 * slots * node.count, f"mesh {node.name!r}")
@@ -182,6 +183,7 @@ def triples(file: GltfFile, index: int, count: int, subject: str) -> np.ndarray:
 
 
 def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.ndarray:
+    """Return the matrices (joints, 4, 4) from a skin's mesh to its joints in the bind pose."""
     if skin.get("inverseBindMatrices") is None:
         return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
     file.budget.take(256 * file.count(skin["inverseBindMatrices"]), "skins")

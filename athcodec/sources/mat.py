@@ -61,6 +61,8 @@ class _Variables:
         self.stored = {name: Stored(name, values.shape, values.dtype) for name, values in self._arrays.items()}
 
     def _add(self, name: str, values: Any, depth: int) -> None:
+        """Store an array under its path; fields of a struct become paths of their own, and what is no array of numbers
+        is named as not read."""
         is_array = type(values) is np.ndarray
         if is_array and values.dtype.names and values.size == 1 and depth < MOST_NESTED:
             for field in values.dtype.names:

@@ -211,6 +211,8 @@ class _Decimals:
         return self._kind(named) == "doubtful"
 
     def _kind(self, named: str) -> str:
+        """Return how the numbers in names are meant: "frames", "decimals" of seconds, or what is in doubt between
+        them."""
         broken = [number for number in self.numbers if number.behind or number.exponent]
         if not broken or len(self.numbers) < 2 or re.search(r"\d[.,]$", self.prefix):  # 31.03.2024, version 1.2.3
             return "frames"
@@ -342,6 +344,7 @@ def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def _called(named: dict[NumberedFiles | str, list[str]]) -> Iterator[tuple[str, str]]:
+    """Yield the path and the name of the clip for each sequence, and for each single file."""
     for files, names in named.items():
         if len(names) == 1 or isinstance(files, str) or files.numbers is None:
             yield from ((path, Path(path).stem) for path in names)

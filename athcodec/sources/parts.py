@@ -96,6 +96,8 @@ class JoinedSteps:
         return list(dict.fromkeys(name for part in self._parts for name in part.names(NODE)))
 
     def field(self, step: int, name: str) -> np.ndarray:
+        """Return the field of all parts at a step, (N, ...); 0 for parts without it. Raises ClipError if no part has
+        it."""
         having = [part for part in self._parts if name in part.names(NODE)]
         if not having:
             raise ClipError(f"frame {step}: got no field {name!r} per point, expected one as in the first")
@@ -114,6 +116,7 @@ class JoinedSteps:
         return self._static_data(NODE, self._counts)
 
     def _static_data(self, center: str, counts: Sequence[int]) -> dict[str, np.ndarray]:
+        """Return the arrays per point or per cell that all parts have and that are the same in all steps, joined."""
         kept = {}
         for name in dict.fromkeys(name for part in self._parts for name in part.names(center)):
             if name and all(name in part.names(center) and part.is_static(name, center) for part in self._parts):
@@ -133,6 +136,7 @@ class JoinedSteps:
         return [name for name in dict.fromkeys(names) if name and name not in kept]
 
     def _joined(self, rows: Sequence[np.ndarray], subject: str) -> np.ndarray:
+        """Return the rows of all parts, one part after the other. Raises ClipError if their widths differ."""
         if len(rows) == 1:
             return rows[0]
         if len({each.shape[1:] for each in rows}) > 1:

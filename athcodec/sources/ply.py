@@ -120,6 +120,8 @@ class _Text:
         self._words, self._at = data.split(), 0
 
     def rows(self, element: PlyElement, count: int, lengths: dict[str, int]) -> np.ndarray:
+        """Return `count` rows of an element from the next words, as PlyElement.row describes them. Raises ClipError
+        where the file ends."""
         width = sum(1 + lengths[name] if counted_by else 1 for name, _, counted_by in element.properties)
         if self._at + count * width > len(self._words):
             raise ClipError(f"{element.name}: got the end of the file, expected {element.count} of them")
@@ -207,6 +209,7 @@ def _uniform(source: _Text | _Binary, element: PlyElement, lengths: dict[str, in
 
 
 def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, Column]:
+    """Return the values of each property of an element whose lists differ in length from row to row."""
     parts: dict[str, list[np.ndarray]] = {name: [] for name, *_ in element.properties}
     counts: dict[str, list[int]] = {name: [] for name in element.lists}
     for _ in range(element.count):
@@ -285,6 +288,7 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, columns: Mapping[str, Column]) -> None:
+    """Add the values of vertices other than positions to the mesh: colours, texture coordinates and further columns."""
     columns_used, vertices = set(POSITION_COLUMNS), _numbers(columns)
     if not {"nx", "ny", "nz"}.isdisjoint(columns):
         _leave_out(mesh, "normals")
@@ -302,6 +306,8 @@ def _add_ply_vertex_values(mesh: Mesh, columns: Mapping[str, Column]) -> None:
 
 
 def _add_attribute(mesh: Mesh, name: str, values: Column, prefix: str = "vertex_") -> None:
+    """Add a column as an attribute of the mesh under its name, or with `prefix` if that name is taken; lists are named
+    as not read."""
     if isinstance(values, tuple):
         _leave_out(mesh, f"{prefix}{name} (lists)")
         return
@@ -321,6 +327,7 @@ def _leave_out(mesh: Mesh, *names: str) -> None:
 
 
 def _native(values: np.ndarray) -> np.ndarray:
+    """Return the values in the byte order of this machine."""
     return values.astype(values.dtype.newbyteorder("="))
 
 
@@ -338,6 +345,7 @@ def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
 
 
 def _add_ply_faces(mesh: Mesh, face_values: dict[str, Column]) -> None:
+    """Add the faces, their texture coordinates per corner and further columns to the mesh."""
     corner_name = next((name for name in ("vertex_indices", "vertex_index") if name in face_values), "")
     lists = face_values.get(corner_name)
     if not isinstance(lists, tuple):

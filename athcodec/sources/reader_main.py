@@ -37,6 +37,7 @@ THREADS = 256 << 20
 
 
 def main() -> None:
+    """Read the clip that the first line on standard input asks for, and then answer each further line with frames."""
     module = importlib.import_module(sys.argv[1])
     asked = sys.stdin.buffer
     with os.fdopen(os.dup(1), "wb") as answers:
@@ -70,6 +71,7 @@ def limit_memory(size: int) -> None:
 
 @contextmanager
 def _answering(answers: BinaryIO, limit: int) -> Iterator[None]:
+    """Return a context that sends an error of the block as the answer."""
     try:
         yield
     except MemoryError:
@@ -85,6 +87,7 @@ def _refuse(answers: BinaryIO, message: str) -> None:
 
 
 def _send(answers: BinaryIO, data: bytes) -> None:
+    """Send bytes as an answer, after a line with their number."""
     answers.write(json.dumps({"size": len(data)}).encode() + b"\n" + data)
     answers.flush()
 

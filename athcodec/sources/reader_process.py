@@ -114,5 +114,6 @@ class _Process:
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
+    """End the process and wait for that."""
     process.kill()
     process.communicate()

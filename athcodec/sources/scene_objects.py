@@ -327,8 +327,8 @@ def _add_kept(
     domains: dict[str, str],
     skip: Collection[str],
 ) -> None:
-    """Add the arrays that a writer of athcodec stored in the file to `attributes` and their rows' meaning to `domains`,
-    unless `skip` names them or their length does not fit."""
+    """Add the arrays that a writer of athcodec stored in the file, and what their rows stand for, unless `skip` has
+    them."""
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     for descriptor, raw in kept:
         name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
@@ -374,8 +374,7 @@ class Facing:
         self._signs, self.changes = np.zeros(1), False
 
     def add(self, matrices: np.ndarray) -> None:
-        """Note which copies are mirrored in further frames, and whether that changes. matrices: (frames, copies, 4, 4)
-        to the world."""
+        """Note which copies further frames mirror. matrices: (frames, copies, 4, 4) to the world."""
         signs = np.nan_to_num(np.sign(np.linalg.det(matrices[..., :3, :3])))
         signs = np.concatenate([np.broadcast_to(self._signs, (1, signs.shape[1])), signs])
         self._signs = signs[(signs != 0).argmax(axis=0), np.arange(signs.shape[1])]
@@ -383,8 +382,7 @@ class Facing:
 
     @property
     def mirrored(self) -> np.ndarray:
-        """(copies,) bool: whether the transform of each copy turns its faces inside out, in the first frame that
-        tells."""
+        """(copies,) bool: whether each copy is mirrored in the first frame that tells."""
         return self._signs < 0
 
 
@@ -439,8 +437,8 @@ def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
 
 
 def _common_domain(statics: list[Static], object_count: int) -> str:
-    """Return what the rows of a joined array stand for, "constant", "vertex", "face" or "corner", so that the arrays of
-    all objects fit."""
+    """Return what rows of a joined array stand for, "constant", "vertex", "face" or "corner", to fit those of all
+    objects."""
     domains = {static.domain for static in statics}
     if domains == {"constant"}:
         same = all(np.array_equal(static.values, statics[0].values) for static in statics)
@@ -450,8 +448,7 @@ def _common_domain(statics: list[Static], object_count: int) -> str:
 
 
 def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an object's array with a row for each element of `domain`, repeated from coarser rows; zeros of `shape` if
-    the object has none."""
+    """Return an object's array with a row for each element of `domain`; zeros of `shape` if it has none."""
     if static is None:
         return np.zeros((obj.rows(domain), *shape), np.uint8)
     if static.domain == domain:
@@ -486,8 +483,8 @@ def scene_fields(entries: JsonObject, count: int) -> tuple[JsonObject, dict[str,
 
 
 def _object_fields(entries: Any, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
-    """Return the metadata and attributes of objects that a file of athcodec states: names, kinds, vertices and copies
-    of each; empty if they do not fit `count` vertices."""
+    """Return metadata and attributes of the objects that a file of athcodec states; empty if they do not fit `count`
+    vertices."""
     entries = entries if isinstance(entries, dict) else {}
     names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(

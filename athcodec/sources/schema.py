@@ -227,8 +227,7 @@ class _Clip:
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
     def _order(self, name: str, known: JsonMapping) -> Order:
-        """Return what the axes of the array of positions are. known: arrays by their names in the schema. Raises
-        ClipError."""
+        """Return what the axes of the positions are. known: arrays by their names in the schema. Raises ClipError."""
         stored = self.arrays.stored[name]
         stated = self.options.order or order_of_labels(self.arrays.labels(name))
         try:
@@ -239,8 +238,7 @@ class _Clip:
             ) from None
 
     def _facts(self, known: JsonMapping) -> dict[str, tuple[str, int]]:
-        """Return by an array's name which axis of the positions it tells the length of, and that length: time has a row
-        per frame."""
+        """Return for arrays beside the positions, by name, the axis whose length each tells, and that length."""
         facts = facts_of(known)
         if "time" not in facts and self.options.fps is None and len(guess := self._guessed_times()) == 1:
             name, count = guess[0], self.arrays.stored[guess[0]].shape

@@ -66,6 +66,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _reader_of(series: Series, options: ReadOptions) -> FileFrames:
+    """Return the reader of a series of files, after it has looked at each of them once."""
     files = [file for (file,) in series.frames]
     reader = FileFrames(files, parse_mesh, _fast_reader, Budget(options.max_memory))
     if series.index is not None:
@@ -137,6 +138,8 @@ class FileFrames:
         return points if points is not None and points.shape == self.mesh.points.shape else None
 
     def _points(self, frame: int) -> np.ndarray:
+        """Return the points (N, 3) of the file of a frame. Raises ClipError if its topology is not that of the first
+        file."""
         path = self.paths[frame]
         data = read_plain(path, self._budget)
         points = self._quick_points(data)
@@ -163,6 +166,8 @@ def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None
 
 
 def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
+    """Return a function that reads the points of OBJ files that differ from `data` in coordinates alone; it returns
+    None for others."""
     dtype, colors = mesh.points.dtype, mesh.attributes.get("colors")
     elements, statements = _obj_elements(obj_lines(data)), _statements(obj_lines(data))
     if any(b"-" in line for line in elements if line.startswith(_ELEMENTS)):
@@ -196,6 +201,8 @@ def _statements(lines: Sequence[bytes]) -> set[bytes]:
 
 
 def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
+    """Return a function that reads the points of binary PLY files that differ from `data` in coordinates alone; it
+    returns None for others."""
     header = ply_header(data)
     vertex = header.elements[0]
     if not header.order or vertex.name != "vertex" or vertex.lists:

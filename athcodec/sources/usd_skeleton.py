@@ -38,6 +38,7 @@ class Skeleton:
         return points
 
     def _blend(self, points: Vt.Vec3fArray, code: float) -> None:
+        """Add the blend shapes at a time code to the points."""
         weights = self.animation.ComputeBlendShapeWeights(code)
         if weights is None:
             return
@@ -82,6 +83,8 @@ class Skeleton:
 def bind_skeletons(
     stage: Usd.Stage, objects: list[PrimObject], not_read: dict[str, list[str]]
 ) -> list[UsdSkel.SkeletonQuery]:
+    """Give each object the skeleton that moves it, and return the skeletons. Animations without one are named in
+    `not_read`."""
     by_path = {obj.prim.GetPath(): obj for obj in objects}
     predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     queries, animations = [], {}

@@ -44,6 +44,7 @@ class PrimObject(SceneObject):
 
 
 def lineage(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    """Yield a prim and all prims above it, without the root."""
     while prim and not prim.IsPseudoRoot():
         yield prim
         prim = prim.GetParent()
@@ -66,6 +67,7 @@ def hiding(obj: PrimObject) -> Iterator[Usd.Prim]:
 
 
 def visibility(prim: Usd.Prim) -> Usd.Attribute | None:
+    """Return the visibility attribute of a prim; None if its type has none."""
     return UsdGeom.Imageable(prim).GetVisibilityAttr() if prim.IsA(UsdGeom.Imageable) else None
 
 
@@ -127,6 +129,7 @@ def changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
 
 
 def numbers_of(values: Any) -> np.ndarray | None:
+    """Return a value of USD as an array of numbers with a row for each element; None if it is nothing of that kind."""
     if values is None:
         return None
     try:

@@ -79,6 +79,7 @@ class _Legacy:
         self._other: dict[str, None] = {}
 
     def grid(self) -> Grid:
+        """Read the whole file and return its data set. Raises ClipError."""
         place, count = "FIELD", 0
         while (line := self._line()) != "":
             word, *rest = line.split()
@@ -132,6 +133,7 @@ class _Legacy:
         return self._data[start : start + len(word)].upper() == word
 
     def _words(self, count: int) -> list[bytes]:
+        """Return the next `count` words of a text file, and pass them."""
         left = self._data[self._at :]
         if count > len(left):
             raise ClipError(f"got the end of the file, expected {count} numbers")
@@ -169,6 +171,7 @@ class _Legacy:
         return values if width == 1 else values.reshape(count, width)
 
     def _skip_strings(self, count: int) -> None:
+        """Pass `count` strings, which are not read."""
         if not self._is_binary:
             for _ in range(count):
                 if self._at >= len(self._data):
@@ -193,12 +196,14 @@ class _Legacy:
     # ---- the data set ----
 
     def _begin(self, words: list[str]) -> None:
+        """Note the type of the data set that the words behind DATASET state. Raises ClipError for others."""
         self._kind = (words[0] if words else "").upper()
         known = ("POLYDATA", "UNSTRUCTURED_GRID", "STRUCTURED_GRID", "STRUCTURED_POINTS", "RECTILINEAR_GRID")
         if self._kind not in known:
             raise ClipError(f"got a data set of the type {self._kind[:40]!r}, expected one of {', '.join(known)}")
 
     def _geometry(self, word: str, words: list[str], line: str) -> None:
+        """Read what a keyword of the geometry begins: points, cells, their types, or the axes of a grid."""
         if word == "POINTS":
             self._points = self._array(_word(words, 1, line), _number(words, 0, line), 3)
         elif word in _POLY:
@@ -282,6 +287,7 @@ class _Legacy:
         return self._points, *lattice_cells(size)
 
     def _dimensions(self) -> list[int]:
+        """Return the number of points along each axis of a structured grid. Raises ClipError."""
         size = self._axes.get("DIMENSIONS", np.zeros(3, int)).tolist()
         count = int(np.prod(size, dtype=object))
         if min(size) < 1:
@@ -292,6 +298,7 @@ class _Legacy:
     # ---- attributes ----
 
     def _attribute(self, place: str, count: int, word: str, words: list[str], line: str) -> None:
+        """Read the array of points or cells that a keyword such as SCALARS begins. place: POINT_DATA or CELL_DATA."""
         if word == "LOOKUP_TABLE":
             size = _number(words, 1, line)
             self._array("unsigned_char" if self._is_binary else "float", size, 4)
@@ -313,6 +320,7 @@ class _Legacy:
             raise ClipError(f"got {line[:60]!r}, expected an attribute of a legacy VTK file; save it as .vtu or .vtp")
 
     def _fields(self, place: str, count: int) -> None:
+        """Read `count` arrays behind FIELD."""
         for _ in range(count):
             line = self._line()
             if line.upper() == "METADATA":
@@ -323,6 +331,8 @@ class _Legacy:
             self._keep(place, name, _word(words, 3, line), rows, width)
 
     def _keep(self, place: str, name: str, kind: str, count: int, width: int) -> None:
+        """Read an array and store it under its name, or note that it is left out: strings, and fields of the whole data
+        set that are no time."""
         values = None
         if kind.lower() in _STRINGS:
             self._skip_strings(count * width)

@@ -159,6 +159,7 @@ class VtkXml:
                 self._other["names of components"] = None
 
     def _piece(self, piece: ElementTree.Element) -> Grid:
+        """Return points, cells and arrays of one Piece element. Raises ClipError."""
         points = piece.find("Points/DataArray")
         if points is None:
             if int(piece.get("NumberOfPoints", "-1")) != 0:
@@ -179,6 +180,7 @@ class VtkXml:
         return Grid(coordinates, types, starts_of(stops), stops, nodes, point_data, cell_data)
 
     def _lattice(self, piece: ElementTree.Element, point_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return types, stops and nodes of the cells between the points of a structured grid, by its extent."""
         ends = [int(number) for number in (piece.get("Extent") or "").split()]
         size = [last - first + 1 for first, last in zip(ends[::2], ends[1::2])]
         if len(size) != 3 or min(size) < 1 or size[0] * size[1] * size[2] != point_count:
@@ -196,6 +198,7 @@ class VtkXml:
         return types, stops, nodes
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
+        """Return the arrays in PointData or CellData of a piece by name; those of other types are left out."""
         arrays = {}
         for element in (*piece.findall(f"{tag}/DataArray"), *piece.findall(f"{tag}/Array")):
             name = element.get("Name", "")
@@ -215,6 +218,7 @@ class VtkXml:
         return values.astype(np.int64)
 
     def _array(self, element: ElementTree.Element) -> np.ndarray:
+        """Return the numbers of a DataArray element, whichever way it stores them. Raises ClipError."""
         dtype = np.dtype(_TYPES[element.get("type", "")])
         form = element.get("format", "ascii")
         if form == "ascii":
@@ -233,6 +237,7 @@ class VtkXml:
         return np.frombuffer(data, dtype.newbyteorder(self._order)).astype(dtype)
 
     def _appended_at(self, offset: int) -> bytes:
+        """Return the bytes of the array that begins at an offset of AppendedData."""
         if self._appended is not None:
             if not 0 <= offset < len(self._appended):
                 raise ClipError(f"got data at {offset}, expected less than {len(self._appended)}")
@@ -255,6 +260,7 @@ class VtkXml:
         return self._unpacked(head + _from_base64(body, packed))
 
     def _unpacked(self, data: bytes) -> bytes:
+        """Return the bytes that follow a header of VTK, decompressed if the file has a compressor."""
         size = self._count.itemsize
         first = self._numbers(data, 1)[0]
         if self._unpack is None:

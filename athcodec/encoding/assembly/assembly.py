@@ -121,6 +121,7 @@ class FileAssembly:
         return _Result(store, header, errors)
 
     def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
+        """Return the chunk CLIPS. seam_errors: for each loop the error at its seam at each level."""
         decided = self.decided
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
         return writing.pack_clips(
@@ -161,6 +162,7 @@ class FileAssembly:
         return tuple(seams)
 
     def _add_prelude(self, store: writing.ChunkStore) -> None:
+        """Add the chunks that decoding begins with: hierarchy, rest poses, times and places."""
         decided = self.decided
         store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
         store.add(ct.REST, writing.pack_rest(decided.layers.rest))
@@ -195,6 +197,7 @@ class FileAssembly:
         return polygons.pack(Polygons.of_rows(edges), places)
 
     def _add_static(self, store: writing.ChunkStore) -> None:
+        """Add the chunks of attributes, faces, edges and metadata."""
         source = self.clip.placed.source
         attributes = self._stored(source.attributes, lambda weights: {weights.name: weights.array})
         if self._keeps_static and len(attributes) > ct.Limits.attributes:
@@ -251,6 +254,8 @@ class FileAssembly:
         return chosen_levels(errors, frames, flaws, diagonal, self.options.lossless, first_held)
 
     def _summary(self, path: Path | None, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:
+        """Return the summary of a file that was written, with its bytes by kind of chunk and the choices of the
+        search."""
         decided = self.decided
         sizes: dict[str, int] = {}
         for chunk in chunks:

@@ -133,6 +133,8 @@ def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> 
 
 
 def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
+    """Return learned modes from their integers (K, LEARNED_NUMBERS): with their unit vectors, and the duals that
+    project on them."""
     (units, duals), first = np.zeros((2, *integers.shape)), np.cumsum(counts, dtype=np.int64) - counts
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     for count in np.unique(counts[counts > 0]).tolist():

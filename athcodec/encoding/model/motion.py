@@ -387,6 +387,7 @@ class SegmentMotion:
         return self.waves if stream.temporal is None else stream.temporal
 
     def _bind(self) -> None:
+        """Make the structs of the C core that point to the arrays of this segment."""
         self._c_streams = (Stream * len(self.streams))()
         self._temporal = []  # Arrays that the C structs point to.
         for c_stream, stream in zip(self._c_streams, self.streams):
@@ -504,6 +505,7 @@ class SegmentMotion:
         return place
 
     def _nodewise(self, call: Callable[[Motion, int, int], None], stage: int | None = None) -> None:
+        """Call with a motion and each range of nodes, or each node of one stage."""
         plan = self.plan
         of_stage = [(n, n + 1) for n in np.flatnonzero(plan.nodes["stage"] == stage).tolist()]
         plan.pool.map(self._with_scratch(call), plan.node_ranges if stage is None else of_stage)
@@ -521,6 +523,7 @@ class SegmentMotion:
         return run
 
     def _source(self, source: np.ndarray) -> int | None:
+        """Return the address of positions (N, 3, T), once their type and size are checked."""
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
     def pose(self, stage: int, origin: np.ndarray, dtype: DTypeLike, room: np.ndarray | None = None) -> np.ndarray:

@@ -44,6 +44,7 @@ class PlantSample:
         self.ath = self._ath(ath)
 
     def _source(self, source: Source, with_faces: bool) -> Source:
+        """Return the source of the sampled branches, in the segments of the whole plant."""
         places = source.hierarchy.vertex_source[self.vertices]
         hierarchy = self._hierarchy(source.hierarchy, np.searchsorted(np.sort(places), places))
         sample = replace(
@@ -70,6 +71,8 @@ class PlantSample:
         return replace(some, shape_of=streams.find_copies(branches, some.rest_step, self.source.rest, some.rest_slack))
 
     def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:
+        """Return the hierarchy of the sampled branches, renumbered. vertex_source: the places of its vertices in the
+        sampled clip."""
         parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]
         number_of_vertex = np.zeros(whole.vertex_count, np.int64)
         number_of_vertex[self.vertices] = np.arange(len(self.vertices))
@@ -82,6 +85,7 @@ class PlantSample:
         )
 
     def _ath(self, whole: Ath) -> Ath:
+        """Return the nodes of the sampled branches, renumbered."""
         chosen = np.flatnonzero(np.isin(whole.node_branch, self.branches))
         parent = whole.node_parent[chosen]
         return Ath(

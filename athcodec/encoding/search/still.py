@@ -67,6 +67,7 @@ class SplitSource:
         return replace(self, ath=self.source.seen.ath(thresholds))._choice(chosen, bound)
 
     def _choice(self, chosen: Choice, bound: float) -> Choice:
+        """Return a choice for all branches from one for those that move."""
         stillness, source = self._still_settings(bound), self.about(chosen.reference)
         may_be_coarser = not chosen.predicted
         settings = self._settings(chosen.settings, stillness, may_be_coarser)
@@ -131,11 +132,13 @@ class SplitSource:
         return replace(settings, learned_pieces=pieces)
 
     def _joined(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
+        """Return values for all branches, (B, ...), from those of branches that move and of those that stand still."""
         joined = np.empty(len(self.still), moving.dtype)
         joined[~self.still], joined[self.still] = moving, still
         return joined
 
     def _shapes(self, moving: Settings, still: Settings) -> list[tuple[np.ndarray | None, np.ndarray]]:
+        """Return for both parts which branches copy others, and the numbers of the part's branches among all."""
         return [(moving.shape_of, np.flatnonzero(~self.still)), (still.shape_of, np.flatnonzero(self.still))]
 
     @staticmethod
@@ -150,6 +153,7 @@ class SplitSource:
         return ~self.still[plan.pieces["branch"]]
 
     def _modes(self, modes: LearnedModes | None, settings: Settings) -> LearnedModes | None:
+        """Return the learned modes of the moving pieces, numbered among all pieces."""
         if modes is None:
             return None
         moves = self._moving_pieces(settings)
@@ -158,6 +162,7 @@ class SplitSource:
         return replace(modes, counts=counts, first=(np.cumsum(counts) - counts).astype(modes.first.dtype))
 
     def _reference(self, reference: np.ndarray | None) -> np.ndarray | None:
+        """Return a reference pose for all branches from one for those that move."""
         if reference is None:
             return self.source.reference
         whole = self.source.rest.copy()

@@ -224,12 +224,15 @@ class Trials:
         self._last_modes = None
 
     def _tried(self, settings: Settings) -> tuple[float, np.ndarray]:
+        """Return bytes and bytes of each stage under some settings, from an earlier trial if there was one."""
         key = settings.key
         if key not in self._known:
             self._known[key] = self._try(settings)
         return self._known[key]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
+        """Code the samples under some settings, and return the estimated bytes of the whole file, and of each stage's
+        streams."""
         try:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)

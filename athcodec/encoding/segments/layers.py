@@ -710,6 +710,8 @@ class _EvenStages:
                 return
 
     def _set(self, moved: int, factor: float) -> None:
+        """Multiply the step of a stage's maps by a factor, and measure the errors of the stages that these maps
+        move."""
         nodes = self._shown[moved].plan.nodes
         last = int(nodes["last_stage"][nodes["stage"] == moved].max())
         self._steps, self.errors = self._steps.copy(), [*self.errors]

@@ -556,6 +556,7 @@ class StreamBasis:
 
 
 def stage_streams(settings: Settings, stages: int, bases: dict[int, StreamBasis]) -> list[StageStream]:
+    """Return how the integers of each stage are read under some settings. bases: learned time bases by stage."""
     stage_streams = []
     for stage in range(stages):
         factor = float(settings.rotation_step_factors[stage])
@@ -582,6 +583,8 @@ def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarra
 
 
 def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
+    """Return second moments over time (T, T) of the rows of some parts, in squared steps, and the number of rows that
+    count."""
     lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
     for part in parts:
         rows = part.reshape(-1, segment.frames)

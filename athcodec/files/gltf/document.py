@@ -185,6 +185,8 @@ class GltfFile:
         return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
 
     def _strided(self, accessor: JsonMapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
+        """Return the elements (count, width) of an accessor or a part of one, from its buffer view. where: what
+        messages call it."""
         index = accessor.get("bufferView")
         view = self.item("bufferViews", index)
         item, offset = dtype.itemsize * width, integer(accessor, "byteOffset", 0)
@@ -200,6 +202,7 @@ class GltfFile:
         return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
 
     def _sparse(self, sparse: JsonMapping, values: np.ndarray, where: str) -> np.ndarray:
+        """Return the values of an accessor with the changes of its sparse part."""
         count = integer(sparse, "count", low=1, stop=len(values) + 1)
         indices, changed = entry(sparse, "indices"), entry(sparse, "values")
         dtype = np.dtype(looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
@@ -234,6 +237,8 @@ class GltfFile:
         return self._slice(view, integer(view, "byteOffset", 0) + offset, size, f"bufferView {index}")
 
     def _unpacked(self, index: int, name: str) -> bytes:
+        """Return the unpacked bytes of a buffer view that the extension `name` has compressed; the last few are
+        kept."""
         if index not in self._unpacked_views:
             packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
             raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
@@ -245,6 +250,7 @@ class GltfFile:
         return self._unpacked_views[index]
 
     def _slice(self, view: JsonMapping, offset: int, size: int, where: str) -> bytes:
+        """Return `size` bytes from an offset of a view's buffer. Raises ClipError beyond its end."""
         buffer = self._buffer_of(view)
         if offset + size > buffer.size:
             raise ClipError(
@@ -259,6 +265,8 @@ class GltfFile:
         return self._buffers[index]
 
     def _buffer(self, index: int) -> _Bytes:
+        """Return the bytes behind buffer `index`: the binary chunk, a data URI or a file beside this one. Raises
+        ClipError."""
         buffer = self.item("buffers", index)
         uri = buffer.get("uri")
         if uri is None and index == 0 and self._binary is not None:

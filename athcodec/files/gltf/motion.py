@@ -68,6 +68,7 @@ class GltfMotion:
         self._place = 0
 
     def _chosen(self, name: str | None) -> int:
+        """Return the number of the motion of this name, or of the only one. Raises ClipError."""
         names = motion_names(self._gltf.json)
         if not names:
             raise ClipError(
@@ -117,6 +118,7 @@ class GltfMotion:
             return self._rest()
 
     def _rest(self) -> np.ndarray:
+        """Return the rest pose (N, 3) that the primitives of the GLB hold for the motion. Raises ClipError."""
         total = sum(len(vertices) for _, vertices in self._places)
         count = 1 + max(int(vertices.max()) for _, vertices in self._places)
         if count > total:

@@ -117,6 +117,7 @@ def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contact
 def _bases(
     parent: np.ndarray, still: np.ndarray, branch: np.ndarray, other: np.ndarray, vertices: np.ndarray
 ) -> np.ndarray:
+    """Return the vertex at which each branch begins: where it hangs on its parent, else its vertex that moves least."""
     base = still.copy()
     for child, above, vertex in ((branch, other, vertices[:, 0]), (other, branch, vertices[:, 1])):
         hangs = parent[child] == above

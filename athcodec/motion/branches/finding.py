@@ -73,6 +73,8 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
 
 
 def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
+    """Yield the ways to divide a clip into branches that are worth comparing, the likeliest first. by_points: whether
+    runs of points may be sought."""
     clip = seen.clip
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
@@ -132,6 +134,7 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
 
 
 def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
+    """Yield other branches for connected pieces: without parents, in another order, or joined where they touch."""
     roots = np.count_nonzero(first.branch_parent < 0)
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)

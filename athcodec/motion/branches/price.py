@@ -55,6 +55,7 @@ class Prices:
         return bits + self._of_sizes(*self._label[vertices].T)
 
     def _on(self, vertices: np.ndarray) -> np.ndarray:
+        """Return the bits (C,) of branches that hang on others, by pairs (C, 2) of a vertex of each."""
         child, attach = self._label[vertices[:, 0]], vertices[:, 1]
         left = self._ways[self._shown[child]] - self._ways[attach][:, None]
         arm = self._rest[self._shown[child]] - self._rest[attach][:, None]

@@ -134,6 +134,7 @@ def _among(rows: np.ndarray | None, vertices: np.ndarray) -> np.ndarray | None:
 
 
 def _attributes(clip: MotionClip, vertices: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the attributes by which branches are found, of some of the clip's vertices."""
     polygons = Polygons.of_attributes(clip.attributes)
     kept = None if polygons is None else polygons.among(vertices)
     arrays = kept.attributes if kept is not None and kept.face_count else {}
