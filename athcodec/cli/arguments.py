@@ -728,6 +728,7 @@ def _picture_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _width_and_height(text: str) -> tuple[int, int]:
+    """Return width and height in pixels from text such as "640x480". Raises ValueError."""
     if not re.fullmatch(r"[1-9]\d{0,3}x[1-9]\d{0,3}", text):
         raise ValueError(f"got {text!r}, expected width and height in pixels, as 640x480")
     width, height = text.split("x")
@@ -791,6 +792,7 @@ def _rest_error(text: str) -> float | str:
 
 
 def _fraction(text: str) -> float:
+    """Return a number between 0 and 1 from text. Raises ValueError."""
     value = _number(text, float)
     if not 0 < value < 1:
         raise ValueError(f"got {text!r}, expected a number between 0 and 1, such as 1e-4")
@@ -798,6 +800,7 @@ def _fraction(text: str) -> float:
 
 
 def _segment_frames(text: str) -> int:
+    """Return the longest segment in frames from text. Raises ValueError beyond its limits."""
     value = _number(text, int)
     if not MIN_SEGMENT <= value <= MAX_SEGMENT:
         raise ValueError(f"got {text!r}, expected {MIN_SEGMENT} to {MAX_SEGMENT} frames")
@@ -805,6 +808,8 @@ def _segment_frames(text: str) -> int:
 
 
 def _frame_bounds(text: str) -> tuple[int | None, int | None]:
+    """Return first frame and the frame behind the last from "A:B", "A:" or ":B", None for a missing one. Raises
+    ValueError."""
     match = re.fullmatch(r"(\d*):(\d*)", text)
     if not match:
         raise ValueError(f"got {text!r}, expected A:B, A: or :B")
@@ -813,6 +818,7 @@ def _frame_bounds(text: str) -> tuple[int | None, int | None]:
 
 
 def _tam(text: str) -> tuple[Length, int, Length, int]:
+    """Return the thresholds from text "EPS,ETA,XI,LAMBDA". Raises ValueError."""
     parts = text.split(",")
     if len(parts) != 4:
         raise ValueError(f"got {text!r}, expected four values: EPS,ETA,XI,LAMBDA")

@@ -70,6 +70,7 @@ class Streams:
         sys.stdout.buffer.flush()
 
     def _read(self, suffix: str) -> str:
+        """Write standard input to a temporary file and return its path. Raises ClipError the second time."""
         if self._input:
             raise ClipError(f"{STREAM}: got standard input twice, expected it once")
         self._input = os.path.join(self._folder, f"standard_input{suffix}")

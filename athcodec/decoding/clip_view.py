@@ -21,7 +21,7 @@ from athcodec.untyped import JsonObject
 
 
 def _of_file(name: str, text: str) -> Any:
-    """Return a property that is the one of this name of the file."""
+    """Return a property for a view that gives the file's property `name`; text: its docstring."""
     return property(lambda view: getattr(view.decoder.file, name), doc=text)
 
 

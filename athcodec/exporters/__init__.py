@@ -230,7 +230,8 @@ def write(
 
 
 def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: JsonObject) -> None:
-    """Warn the caller of `write` of a skeleton that is far off the motion."""
+    """Warn the caller of `write` if the motion of a skeleton is far from that of the clip. most: joints that were
+    allowed."""
     diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
     if not error > COARSE_SHARE * diagonal > 0:
         return

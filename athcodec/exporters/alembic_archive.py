@@ -312,6 +312,7 @@ def _write_param(params: AlembicObject, name: str, values: np.ndarray, domain: s
 
 
 def _keep_own(properties: AlembicObject, motion: Motion, left: Statics) -> None:
+    """Write the metadata and arrays that Alembic has no place for as properties that athcodec reads again."""
     kept = {key: value for key, value in motion.metadata.items() if key not in KNOWN_METADATA}
     Abc.OStringProperty(properties, OWN).setValue(json.dumps(kept))
     for i, (descriptor, raw) in enumerate(own_arrays(motion, left)):

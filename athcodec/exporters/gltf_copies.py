@@ -188,7 +188,8 @@ def _mesh_without(shape: GltfMesh, lost: set[str]) -> GltfMesh:
 
 
 def _hold(motion: Motion, copies: Copies, allowed: float) -> None:
-    """Hold values that hardly move still, so that they need no keys."""
+    """Set places, turns and scales of copies that hardly move to those at rest, so that they need no keys, and add the
+    error of that."""
     extent = np.tile(np.abs(copies.shape).max(axis=0), (copies.places.shape[1], 1))
     for start, stop in motion.clip_range_frames:
         poses = [pose[start:stop] for pose in (copies.places, copies.turns, copies.scales)]

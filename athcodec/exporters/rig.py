@@ -81,7 +81,8 @@ class _Parts:
 def _cut(
     hierarchy: Hierarchy, branch: int, stop: int, chain: int, excess: float, left: int
 ) -> list[tuple[int, int, int]]:
-    """Return the joints of a part, at most `left` more."""
+    """Return a part of the hierarchy, branches `branch` to `stop` - 1, cut into parts that get a joint each, with at
+    most `left` further joints."""
     if chain:
         room = min(LONGEST_CHAIN, int(hierarchy.stem_count[branch]), chain + left)
         return [(branch, stop, max(min(int(np.ceil(chain * min(np.sqrt(excess), 2.0))), room), chain))]

@@ -120,6 +120,7 @@ class _Array:
         return positions_of_rows("positions", rows, header, order, self._budget)
 
     def notes(self, name: str) -> JsonMapping:
+        """Return nothing: an .npy file has no notes."""
         return {}
 
     def labels(self, name: str) -> Sequence[str]:

@@ -95,6 +95,7 @@ def whole(number: float) -> int | float:
 
 
 def _start(number: float) -> JsonObject:
+    """Return the metadata of a first frame with this number; empty for 0, which is the default."""
     return {"start_frame": whole(number)} if np.isfinite(number) and number else {}
 
 

@@ -145,6 +145,7 @@ class _Scene:
 
     @staticmethod
     def _is_timeless(track: Track, time: float | None) -> bool:
+        """Return whether a track is a single grid without a time, in a scene that has times."""
         return time is not None and track.times is None and len(track.steps) == 1
 
     def _series(self, collection: Element, name: str, grids: Sequence[Element], depth: int) -> list[Track]:

@@ -133,7 +133,8 @@ def _zig(folder: str, *arguments: str) -> None:
 
 
 def pack(template: str, wasm: bytes) -> str:
-    """Return the module's text."""
+    """Return the text of the JavaScript module: the template with what it includes, and the compiled decoder as
+    base64."""
     payload = base64.b64encode(zstandard.ZstdCompressor(level=PACKING).compress(wasm)).decode("ascii")
     head, code = template.split("\n\n", 1)
     pieces = INCLUDE.split(code)  # Text of the template and names of files take turns.

@@ -143,6 +143,7 @@ def refuse_glb(data: bytes) -> None:
 
 
 def _read(path: FilePath) -> bytes:
+    """Return the bytes of a file or a URL."""
     if not is_url(path):
         return Path(path).read_bytes()
     from athcodec.files.remote import Remote  # Its requirements take long to import.
@@ -281,6 +282,7 @@ def serve(
 
 
 def _check_server(path: FilePath) -> None:
+    """Raise MissingExtra if aiohttp is missing, or an error if the path is a URL that the server does not fetch."""
     try:
         import aiohttp  # noqa: F401
     except ImportError:

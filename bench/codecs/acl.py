@@ -144,7 +144,8 @@ class _Track:
         return numbers
 
     def ranges(self) -> list[np.ndarray]:
-        """Return two tables, one row per bone."""
+        """Return two tables with a row for each bone: the least values of its segments, as differences, and their
+        extents."""
         low = np.diff(self.low, axis=1, prepend=0)
         return [table.reshape(len(table), -1) for table in (low, self.extent)]
 
@@ -158,7 +159,7 @@ class _Track:
         return rates, np.cumsum(rates) - rates
 
     def bits(self, tier: int) -> np.ndarray:
-        """Return bits, one per byte, of the frames of even (0) or odd (1) number."""
+        """Return the bits, one per byte, of the values in frames of even (tier 0) or odd (tier 1) number."""
         (rates, begin), codes = self._layout(tier), self.codes[:, :, tier::2].ravel()
         bits = np.zeros(rates.sum(), np.uint8)
         for bit in range(rates.max(initial=0)):

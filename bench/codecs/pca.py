@@ -127,6 +127,7 @@ def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectori
 
 
 def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
+    """Read the basis of trajectories, a row for each component, (K, numbers of a trajectory)."""
     steps = 2.0 ** ((np.cumsum(reader.table()[0]) + COARSEST_BASIS) / 2)
     kind = reader.count()
     width = 3 if trajectories.joint else 1

@@ -172,6 +172,7 @@ def unpredict(values: np.ndarray, predictor: str) -> np.ndarray:
 
 
 def _predictor_axes(predictor: str) -> list[int]:
+    """Return the axes along which a predictor such as "time+vertex" takes differences: 0 for time, 1 for vertices."""
     names = {"none": [], "time": [0], "time2": [0, 0], "vertex": [1]}
     return [axis for name in predictor.split("+") for axis in names[name]]
 

@@ -70,6 +70,8 @@ class VertexOrder:
 
 
 def vertex_order(source: Source, name: str) -> VertexOrder:
+    """Return the order of vertices by name: "hierarchy", or that of the source."""
+
     def make() -> VertexOrder:
         if name == "hierarchy":
             return VertexOrder(source.hierarchy.vertex_source, source.hierarchy)
@@ -84,6 +86,7 @@ def write_order(writer: Writer, order: VertexOrder) -> None:
 
 
 def read_order(reader: Reader) -> VertexOrder:
+    """Read the order of vertices that an encoding begins with."""
     if reader.count():
         hierarchy = reader.hierarchy()
         if "_vertex_order" not in hierarchy.__dict__:  # kept, since an encoder reads the same one in every trial
@@ -149,6 +152,7 @@ def write_pose(writer: Writer, order: VertexOrder, pose: np.ndarray, step: float
 
 
 def read_pose(reader: Reader, order: VertexOrder) -> np.ndarray:
+    """Read a pose (N, 3) in the order of its vertices, after its step."""
     return reader.pose(order.branches, reader.single())
 
 

@@ -40,7 +40,7 @@ class Bones:
 
     @property
     def rest(self) -> np.ndarray:
-        """(N, 3) float64."""
+        """Rest positions of the nodes, (N, 3) float64, in metres."""
         position = self.element.copy()
         for node, below in enumerate(self.parent[1:].tolist(), start=1):
             position[node] += position[below]

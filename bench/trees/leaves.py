@@ -72,7 +72,7 @@ def sheet(along: list[float], half: list[float], fold: list[float]) -> tuple[np.
 
 
 def _leaflets(places: list[tuple[float, float, float]], size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return quads at (along, across) that point away by an angle."""
+    """Return vertices and faces of one quad for each (along, across, angle), which points away by the angle."""
     card, quad = sheet([0.0, size], [0.2 * size, 0.2 * size], [0.0, 0.0])
     blades = []
     for along, across, angle in places:

@@ -45,7 +45,7 @@ LEVEL_1_REST = {(REFINED_REST, 1, 0): lambda: Chance(81, large=4)}
 
 
 def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
-    """Return the same, with a rest pose of stage 0 alone."""
+    """Return the plant of `refinements`, with a rest pose of stage 0 alone."""
     plant = refinements(stems, seed, **fields)
     plant.scripts |= LEVEL_1_REST
     return plant

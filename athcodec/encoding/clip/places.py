@@ -376,5 +376,6 @@ def _alike_in_runs(places: Places, counts: np.ndarray) -> Places:
 
 
 def _joined_in_all(places: np.ndarray) -> np.ndarray:
-    """Return labels (k, n) for the places (k, n) of vertices of like parts, which join what is joined in all parts."""
+    """Return labels (k, n) for k like parts of n vertices, by their places (k, n): two vertices have one label if all
+    parts join them."""
     return np.broadcast_to(Places.of_labels(places.T).of_vertex, places.shape)

@@ -94,6 +94,8 @@ class TimeComponents:
         return self._in_waves(rank, precision) if self._suits_waves else self._entries(rank)
 
     def _rank(self, ratio: float) -> int:
+        """Return how many components are worth storing where steps are `ratio` times as large as those that they were
+        learned at."""
         frames = len(self._rows)
         allowed = TOLERANCE * ratio**2 * self._count * frames
         return frames - int(np.searchsorted(self._left_out, allowed, side="right"))

@@ -191,6 +191,7 @@ def pack_clips(
 
 
 def pack_time(stream: bytes) -> bytes:
+    """Return TIME with times one by one; stream: as `encode_times` returns it."""
     return _TIME.pack(ONE_BY_ONE) + stream
 
 
@@ -227,6 +228,7 @@ def pack_refined_shapes(shift: int, stream: bytes) -> bytes:
 
 
 def pack_refined_rest(step: float, stream: bytes) -> bytes:
+    """Return REST of a refinement: its step and its stream."""
     return _STEP.pack(step) + stream
 
 

@@ -117,6 +117,8 @@ def _other_lags(source: Source, settings: Settings) -> list[Settings]:
 
 
 def _connected(source: Source, settings: Settings) -> list[Settings]:
+    """Return the settings with a rest pose that is predicted by faces, with their lags and with lags of 1; none without
+    faces."""
     if source.mesh is None or source.host_rest:
         return []
     tried = (settings.lags, np.ones_like(settings.lags))
