@@ -1,5 +1,5 @@
 """A constant has the same value wherever it is written. The headers of the C core define those of the format, which
-Python, JavaScript and FORMAT.md repeat; the plugin for USD repeats what the exporters guess."""
+Python, JavaScript and FORMAT.md repeat."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from athcodec._native import lib
 from athcodec.decoding import container, core_file
 from athcodec.encoding.segments import layers
 from athcodec.encoding.segments.segmentation import decoding_bytes
-from athcodec.exporters import looks, surface
 from spec import stamp
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -45,20 +44,6 @@ def js_constants(path: str) -> dict[str, int]:
     code = (VIEWER / path).read_text("utf-8")
     lines = re.findall(r"^(?:export )?const ((?:[A-Z_]+ = (?:0x)?[0-9a-f]+(?:, )?)+);", code, flags=re.M)
     return {name: int(value, 0) for line in lines for name, value in re.findall(r"([A-Z_]+) = (\w+)", line)}
-
-
-def test_the_plugin_for_usd_guesses_looks_by_the_words_colours_and_share_of_the_exporters():
-    code = (ROOT / "athcodec" / "usd" / "src" / "looks.cpp").read_text("utf-8")
-    [table] = re.findall(r"kColours\[\] = \{(.*?)\};", code, re.S)
-    colours = [tuple(map(float, re.findall(r"([\d.]+)f", row))) for row in re.findall(r"\{([^{}]+)\}", table)]
-    assert colours == list(looks.COLOURS.values())
-    kinds = dict.fromkeys((kind for _, kind in re.findall(r'\{"(\w+)", k(\w+)\}', code)))
-    words = {kind: [word for word, of in re.findall(r'\{"(\w+)", k(\w+)\}', code) if of == kind] for kind in kinds}
-    groups = re.findall(r"\(\?P<(\w+)>((?:[^()]|\(\?<!sy\))*)\)", looks.WORDS.pattern)
-    assert {kind.lower(): of for kind, of in words.items()} == {
-        kind: text.replace("(?<!sy)", "").split("|") for kind, text in groups
-    }
-    assert re.findall(r"kOpenShare = ([\d.]+)", code) == [str(surface.OPEN_SHARE)]
 
 
 def test_the_version_of_the_format_is_the_same_everywhere():

@@ -84,6 +84,8 @@ def described(path):
     for prim in stage.GetDefaultPrim().GetChildren():
         own = {}
         for attribute in prim.GetAuthoredAttributes():
+            if attribute.GetCustomDataByKey("athcodec:guessed"):
+                continue
             value = attribute.Get(1001)
             own[attribute.GetName()] = [
                 str(attribute.GetTypeName()), attribute.GetMetadata("interpolation"),
@@ -103,83 +105,92 @@ print(json.dumps({name: [kind, sorted(own)] for name, (kind, own) in ours.items(
     assert {kind for kind, _ in prims.values()} == {"Mesh", "BasisCurves"}
 
 
-def looking_clip(metadata: dict, face_material: list[int] | None, uv: str = "") -> MotionClip:
-    """Two objects: a closed box beside a card, a tube whose seam is cut open and two triangles of opposite sides; and a
-    square pyramid without its base."""
-    angle = np.linspace(0, 2 * np.pi, 7)
-    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    box = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    card = [(8, 9, 10, 11)]
-    tube = [(12 + i, 13 + i, 20 + i, 19 + i) for i in range(6)]
-    twisted = [(26, 27, 28), (26, 27, 29)]
-    pyramid = [(30, 31, 34), (31, 32, 34), (32, 33, 34), (33, 30, 34)]
-    faces = [*box, *card, *tube, *twisted, *pyramid]
-    points = [*corners, (3, 0, 0), (4, 0, 0), (4, 1, 0), (3, 1, 0)]
-    points += [(6 + 0.1 * np.cos(a), 5 * y, 0.1 * np.sin(a)) for y in (0, 1) for a in angle]
-    points += [(9, 0, 0), (9, 1, 0), (10, 0, 0), (10, 0, 1)]
-    points += [(12, 0, 0), (13, 0, 0), (13, 0, 1), (12, 0, 1), (12.5, 0.2, 0.5)]
-    points[18], points[25] = points[12], points[19]
+def box_clip(metadata: dict, face_material: list[int] | None, has_colours: bool = False) -> MotionClip:
+    """Two closed boxes."""
+    corners = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    box = np.array([(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)])
+    rest = np.concatenate([corners, corners + [3.0, 0.0, 0.0]])
     attributes = {
-        "face_vertex_counts": np.array([len(face) for face in faces], np.int32),
-        "face_vertex_indices": np.concatenate(faces).astype(np.int32),
-        "part_vertex_counts": np.array([30, 5], np.int32),
+        "face_vertex_counts": np.full(12, 4, np.int32),
+        "face_vertex_indices": np.concatenate([box, box + 8]).ravel().astype(np.int32),
+        "part_vertex_counts": np.array([8, 8], np.int32),
     }
     domains = {"face_vertex_counts": "face", "face_vertex_indices": "corner", "part_vertex_counts": "constant"}
-    if uv:
-        rows = {"vertex": len(points), "corner": sum(map(len, faces))}[uv]
-        attributes["uv"], domains["uv"] = np.linspace(0, 2, 2 * rows, dtype=np.float32).reshape(-1, 2)[::-1], uv
+    if has_colours:
+        attributes["colors"], domains["colors"] = np.linspace(0, 1, 48, dtype=np.float32).reshape(16, 3), "vertex"
     if face_material is not None:
-        attributes["face_material"] = np.resize(np.array(face_material, np.int32), len(faces))
-        domains["face_material"] = "face"
-    metadata = {"part_kinds": ["mesh", "mesh"], "part_names": ["thing", "system"]} | metadata | {"domains": domains}
-    rest = np.array(points, np.float64)
+        attributes["face_material"], domains["face_material"] = np.array(face_material, np.int32), "face"
+    metadata = {"part_kinds": ["mesh", "mesh"], "part_names": ["trunk", "leaf"]} | metadata | {"domains": domains}
     return MotionClip(swaying(rest, 4), np.arange(4) / 24, rest=rest, attributes=attributes, metadata=metadata)
 
 
-LOOKS = {
-    "guessed": ({}, None, ""),
-    "names": ({"part_names": ["my_Stemless", "Leafy fruit tree"]}, None, ""),
-    "stated sides": ({"part_usd": [{"doubleSided": "true"}, {}]}, None, ""),
-    "materials": ({"material_names": ["Bark", "no word", "system", "PETAL"]}, [0, 1, 2, 7, -1, 3], ""),
-    "surfaces of corners": ({"surfaces": "stalks, pinnae"}, None, "corner"),
-    "surfaces of vertices": ({"surfaces": "bark, leaves"}, None, "vertex"),
-    "no surfaces": ({"surfaces": "leaves, bark"}, None, "vertex"),
+MATERIALS = {
+    "nothing": ({}, None),
+    "stated sides": ({"part_usd": [{"doubleSided": "true"}, {}]}, None),
+    "materials": ({"material_names": ["Bark", "no word", "2nd", "Bark"]}, [0, 1, 2, 7, -1, 3] + [2] * 6),
+    "a name taken": ({"material_names": ["Bark"], "part_names": ["materials", "leaf"]}, [0] * 3 + [1] * 9),
+    "no names": ({}, [0] * 12),
 }
 
 
-def test_meshes_look_as_decode_writes_them(tmp_path):
+def test_faces_are_bound_to_the_materials_that_decode_writes(tmp_path):
     pairs = []
-    for name, (metadata, face_material, uv) in LOOKS.items():
+    for name, (metadata, face_material) in MATERIALS.items():
         file, written = tmp_path / f"{name}.ath", tmp_path / f"{name}.usda"
-        athcodec.encode(looking_clip(metadata, face_material, uv), file, rel_error=1e-3, effort="fast")
+        athcodec.encode(box_clip(metadata, face_material), file, rel_error=1e-3, effort="fast")
         assert main(["decode", str(file), str(written)]) == 0
         pairs.append([str(file), str(written)])
-    looks = script(
+    found = script(
         """
-NAMES = "doubleSided", "primvars:displayColor", "primvars:displayColor:indices"
-def looks(path):
-    stage, found = Usd.Stage.Open(path), {}
-    for prim in stage.GetDefaultPrim().GetChildren():
-        if prim.IsA(UsdGeom.Mesh):
-            attributes = [prim.GetAttribute(name) for name in NAMES if prim.HasAttribute(name)]
-            found[prim.GetName()] = [
-                [one.GetName(), str(one.GetTypeName()), one.GetMetadata("interpolation"),
-                 one.GetCustomDataByKey("athcodec"), np.asarray(one.Get()).tolist()]
-                for one in attributes if one.IsAuthored()
-            ]
-    return found
+from pxr import UsdShade
+def described(path):
+    stage = Usd.Stage.Open(path)
+    prims = [prim for prim in stage.Traverse() if not prim.IsA(UsdGeom.Xform)]
+    bound = {str(p.GetPath()): str(UsdShade.MaterialBindingAPI(p).ComputeBoundMaterial()[0].GetPath()) for p in prims}
+    subsets = [UsdGeom.Subset(prim) for prim in prims if prim.IsA(UsdGeom.Subset)]
+    faces = {str(one.GetPath()): list(one.GetIndicesAttr().Get()) for one in subsets}
+    families = [
+        [str(token) for mesh in prims if mesh.IsA(UsdGeom.Mesh)
+         for token in UsdShade.MaterialBindingAPI(mesh).GetMaterialBindSubsetsFamilyType()],
+        [UsdGeom.Subset.ValidateFamily(UsdGeom.Imageable(mesh), "face", "materialBind")[0]
+         for mesh in prims if mesh.IsA(UsdGeom.Mesh)],
+    ]
+    return [
+        [[str(p.GetPath()), str(p.GetTypeName()), p.GetDisplayName(), p.GetAppliedSchemas(),
+          p.HasAttribute("primvars:face_material")] for p in prims],
+        bound, faces, families,
+    ]
 every = []
 for file, written in json.loads(sys.argv[1]):
-    every.append(looks(file))
-    assert every[-1] == looks(written), (file, every[-1], looks(written))
-print(json.dumps(every))
+    every.append(described(file))
+    assert every[-1] == described(written), (file, every[-1], described(written))
+print(json.dumps([[bound, faces] for _, bound, faces, _ in every]))
 """,
         json.dumps(pairs),
     )
-    guessed = looks[0]["thing"]
-    assert guessed[0] == ["doubleSided", "bool", None, {"guessed": True}, True]
-    assert guessed[2][-1] == [0] * 6 + [1] + [0] * 6 + [1] * 2
-    assert len({json.dumps(each) for each in looks}) >= 6
+    bound, faces = found[list(MATERIALS).index("materials")]
+    assert bound["/clip/trunk/no_word"] == "/clip/materials/no_word" and bound["/clip/leaf"] == "/clip/materials/_nd"
+    assert faces["/clip/trunk/Bark_2"] == [5]
+
+
+def test_meshes_show_both_sides_and_only_colours_that_the_file_has(tmp_path):
+    files = []
+    for name, has_colours in (("stated sides", False), ("nothing", True)):
+        files.append(str(tmp_path / f"{name}.ath"))
+        athcodec.encode(box_clip(*MATERIALS[name], has_colours), files[-1], rel_error=1e-3, effort="fast")
+    found = script(
+        """
+def shown(path):
+    stage = Usd.Stage.Open(path)
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    sides = [mesh.GetDoubleSidedAttr() for mesh in meshes]
+    return [[[one.Get(), one.GetCustomDataByKey("athcodec:guessed")] for one in sides],
+            [mesh.GetDisplayColorAttr().IsAuthored() for mesh in meshes]]
+print(json.dumps([shown(path) for path in sys.argv[1:]]))
+""",
+        *files,
+    )
+    assert found == [[[[True, None], [True, True]], [False] * 2], [[[True, True]] * 2, [True] * 2]]
 
 
 def test_clips_are_variants_and_can_be_asked_for_by_name(medley_ath, medley_clips):

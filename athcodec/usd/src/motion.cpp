@@ -89,43 +89,6 @@ bool Motion::Points(int clip, int frame, int level, size_t first, size_t count, 
     return true;
 }
 
-std::vector<double> Motion::Rest() const
-{
-    // The player's file is not for writing, and reading a rest pose changes a file.
-    const auto *bytes = reinterpret_cast<const uint8_t *>(_bytes.get());
-    size_t front = 0, size = 0;
-    ath_fault_info fault{};
-    int result = ath_front(bytes, _size, nullptr, &front, &size, &fault);
-    std::vector<std::max_align_t> opened(size / sizeof(std::max_align_t) + 1), built;
-    const auto file = reinterpret_cast<ath_file *>(opened.data());
-    if (result == ATH_OK) result = ath_open(file, size, bytes, _size, nullptr, &fault);
-    if (result == ATH_OK) {
-        size = ath_build_size(file);
-        built.resize(size / sizeof(std::max_align_t) + 1);
-        result = ath_build(file, built.data(), size);
-    }
-    int level = 0;
-    for (; result == ATH_OK && level < _info.level_count; level++) result = ath_refine_size(file, level, &size, &fault);
-    if (result == ATH_MISSING && level > 1) {
-        level--;
-        result = ATH_OK;
-    }
-    std::vector<double> rest(3 * size_t(_info.vertex_count));
-    constexpr size_t stride = 3 * sizeof(double);
-    if (result == ATH_OK) result = ath_read_rest(file, &fault);
-    if (result == ATH_OK)
-        result = ath_rest_float64(file, ATH_SOURCE_ORDER, rest.data(), stride);
-    else if (result == ATH_MISSING && level > 0)
-        result = ath_level_rest(file, level - 1, ATH_SOURCE_ORDER, rest.data(), stride);
-    if (result != ATH_OK) {
-        TF_RUNTIME_ERROR("%s: the rest pose: %s", _path.c_str(), FaultText(fault, result).c_str());
-        return {};
-    }
-    if (!_info.rest_is_float64)
-        for (double &number : rest) number = float(number);
-    return rest;
-}
-
 bool Motion::_Decode(int clip, int frame, int level, VtVec3fArray *points) const
 {
     const ath_clip &of = ath_clips(File())[clip];

@@ -40,10 +40,6 @@ class Motion
     // reported once.
     bool Points(int clip, int frame, int level, size_t first, size_t count, VtVec3fArray *points) const;
 
-    // The source's rest pose, x, y and z of each vertex in scene units; the reference pose where the file ends before
-    // it. Empty where its bytes are damaged, which is reported.
-    std::vector<double> Rest() const;
-
   private:
     struct Frame {
         int clip, frame, level;

@@ -1,5 +1,4 @@
 #include "scene.h"
-#include "looks.h"
 #include "static_data.h"
 
 #include <pxr/gf/half.h>
@@ -16,6 +15,7 @@
 #include <pxr/gf/vec4i.h>
 #include <pxr/sdf/attributeSpec.h>
 #include <pxr/sdf/primSpec.h>
+#include <pxr/sdf/relationshipSpec.h>
 #include <pxr/sdf/schema.h>
 #include <pxr/sdf/types.h>
 #include <pxr/sdf/variantSetSpec.h>
@@ -51,7 +51,7 @@ struct Object {
 std::string Distinct(const std::string &wanted, std::set<std::string> *taken)
 {
     std::string name = wanted;
-    for (int number = 1; !taken->insert(name).second; number++) name = TfStringPrintf("%s_%d", wanted.c_str(), number);
+    for (int number = 2; !taken->insert(name).second; number++) name = TfStringPrintf("%s_%d", wanted.c_str(), number);
     return name;
 }
 
@@ -205,13 +205,15 @@ void Ints(const SdfPrimSpecHandle &prim, const char *name, const std::vector<int
         ->SetDefaultValue(VtValue(VtIntArray(values.begin(), values.end())));
 }
 
-bool IsDoubleSided(const Object &object) { return Text(object.details, "doubleSided") == "true"; }
-
-SdfAttributeSpecHandle DoubleSided(const SdfPrimSpecHandle &prim)
+// Every mesh shows both sides, because a file does not say that a surface is closed. Where the file does not state that
+// both sides are seen, the attribute is marked as a guess, so that readers do not take it for a statement.
+void ShowBothSides(const Object &object)
 {
-    const auto spec = Attribute(prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform);
+    const auto spec = Attribute(object.prim, "doubleSided", SdfValueTypeNames->Bool, SdfVariabilityUniform);
     spec->SetDefaultValue(VtValue(true));
-    return spec;
+    if (Text(object.details, "doubleSided") == "true") return;
+    const VtDictionary marks{{"guessed", VtValue(true)}};
+    spec->SetInfo(SdfFieldKeys->CustomData, VtValue(VtDictionary{{"athcodec", VtValue(marks)}}));
 }
 
 void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const Polygons &faces, Object *object)
@@ -225,7 +227,7 @@ void DefineObject(const SdfPrimSpecHandle &root, const std::string &name, const 
         Token(object->prim, "subdivisionScheme", Text(object->details, "subdivisionScheme").value_or("none"));
         Ints(object->prim, "faceVertexCounts", std::vector<int>(counts, counts + object->face_count));
         Ints(object->prim, "faceVertexIndices", own);
-        if (IsDoubleSided(*object)) DoubleSided(object->prim);
+        ShowBothSides(*object);
     } else if (object->kind == "curves") {
         object->prim = SdfPrimSpec::New(root, name, SdfSpecifierDef, "BasisCurves");
         Ints(object->prim, "curveVertexCounts", object->curves);
@@ -389,11 +391,11 @@ bool Primvar(const std::string &name, const StaticArray &array, const std::strin
     return true;
 }
 
-// Gives the objects their static arrays; names of those that USD has no place for.
-std::vector<std::string> Primvars(const StaticData &data, const ath_info &info, std::vector<Object> *objects)
+// Gives the objects their static arrays, but for those that are `known`. Returns the names of those that USD has no place
+// for.
+std::vector<std::string> Primvars(const StaticData &data, const ath_info &info, const std::set<std::string> &known,
+                                  std::vector<Object> *objects)
 {
-    static const std::set<std::string> known = {"part_vertex_counts", "curve_vertex_counts", "face_vertex_counts",
-                                                "face_vertex_indices"};
     std::vector<std::string> left = data.unread;
     for (const auto &[name, array] : data.arrays) {
         if (known.count(name)) continue;
@@ -405,57 +407,71 @@ std::vector<std::string> Primvars(const StaticData &data, const ath_info &info, 
     return left;
 }
 
-// ---- looks ----
+// ---- materials ----
 
-// Marks what the file does not state, so that readers do not take it for a statement.
-void MarkGuess(const SdfAttributeSpecHandle &spec)
+constexpr char kFaceMaterial[] = "face_material";
+
+void BindMaterial(const SdfPrimSpecHandle &prim, const SdfPath &material)
 {
-    const VtDictionary marks{{"guessed", VtValue(true)}};
-    spec->SetInfo(SdfFieldKeys->CustomData, VtValue(VtDictionary{{"athcodec", VtValue(marks)}}));
+    SdfRelationshipSpec::New(prim, "material:binding", false)->GetTargetPathList().GetExplicitItems() = {material};
 }
 
-// One colour, or one for each material that the object's faces have.
-void DisplayColor(const Object &object, const std::vector<GfVec3f> &colours, const std::vector<int> &of_face)
+void MarkAsBound(const SdfPrimSpecHandle &prim)
 {
-    if (colours.empty()) return;
-    const bool has_one = std::all_of(colours.begin(), colours.end(), [&](auto &each) { return each == colours[0]; });
-    const auto spec = Attribute(object.prim, "primvars:displayColor", SdfValueTypeNames->Color3fArray);
-    spec->SetDefaultValue(VtValue(VtVec3fArray(colours.begin(), has_one ? colours.begin() + 1 : colours.end())));
-    spec->SetInfo(TfToken("interpolation"), VtValue(TfToken(has_one ? "constant" : "uniform")));
-    if (!has_one) Ints(object.prim, "primvars:displayColor:indices", of_face);
-    MarkGuess(spec);
+    prim->SetInfo(TfToken("apiSchemas"), VtValue(SdfTokenListOp::Create({TfToken("MaterialBindingAPI")})));
 }
 
-// Gives objects colours, unless the file has some, and both sides to open faces.
-void Show(const Motion &motion, const StaticData &data, std::vector<Object> *objects)
+// Binds the faces of a mesh that have a material. labels: the number of each face's material, none outside 0 to
+// materials.size() - 1.
+void BindFaces(const Object &object, const std::vector<int64_t> &labels, const std::vector<SdfPath> &materials)
 {
-    std::vector<ObjectFaces> faces;
-    for (const Object &object : *objects)
-        faces.push_back({object.name, object.first_face, object.face_count, IsDoubleSided(object)});
-    const auto uv = data.arrays.find("uv");
-    const std::string domain = uv == data.arrays.end() ? "" : DomainOf(data, "uv", uv->second, motion.Info());
-    const bool has_uv = domain == "vertex" || domain == "corner", has_faces = !data.faces.counts.empty();
-    const Looks looks = LooksOf(data, has_faces ? motion.Rest() : std::vector<double>{}, has_uv ? &uv->second : nullptr,
-                                domain == "corner", faces);
-    const bool has_colours =
-        data.arrays.count("colors") || std::find(data.unread.begin(), data.unread.end(), "colors") != data.unread.end();
-    for (Object &object : *objects) {
-        std::vector<GfVec3f> colours;
-        std::vector<int> of_face;
-        if (object.kind == "mesh") {
-            const auto first = looks.materials.begin() + object.first_face, last = first + object.face_count;
-            const auto open = looks.is_open.begin() + object.first_face;
-            const std::set<int> used(first, last);
-            for (const int material : used) colours.push_back(looks.colours[size_t(material)]);
-            for (auto face = first; face != last; ++face)
-                of_face.push_back(int(std::distance(used.begin(), used.find(*face))));
-            if (!IsDoubleSided(object) && std::any_of(open, open + object.face_count, [](char is) { return is; }))
-                MarkGuess(DoubleSided(object.prim));
-        } else {
-            colours.push_back(LineColour(object.name));
-        }
-        if (!has_colours) DisplayColor(object, colours, of_face);
+    std::map<int64_t, std::vector<int>> faces;
+    for (size_t face = 0; face < object.face_count; face++) {
+        const int64_t label = labels[object.first_face + face];
+        if (label >= 0 && label < int64_t(materials.size())) faces[label].push_back(int(face));
     }
+    if (faces.empty()) return;
+    MarkAsBound(object.prim);
+    if (faces.begin()->second.size() == object.face_count) {
+        BindMaterial(object.prim, materials[size_t(faces.begin()->first)]);
+        return;
+    }
+    Token(object.prim, "subsetFamily:materialBind:familyType", "nonOverlapping");
+    for (const auto &[label, indices] : faces) {
+        const SdfPath &material = materials[size_t(label)];
+        const auto subset = SdfPrimSpec::New(object.prim, material.GetName(), SdfSpecifierDef, "GeomSubset");
+        MarkAsBound(subset);
+        Token(subset, "elementType", "face");
+        Token(subset, "familyName", "materialBind");
+        Ints(subset, "indices", indices);
+        BindMaterial(subset, material);
+    }
+}
+
+// Defines the materials that the file names, without contents, and binds the faces that have them. Returns whether the
+// file says which faces have which material.
+bool BindMaterials(const SdfPrimSpecHandle &root, const StaticData &data, const std::vector<Object> &objects,
+                   std::set<std::string> *taken)
+{
+    const auto array = data.arrays.find(kFaceMaterial);
+    const std::vector<std::string> names = Texts(data.metadata, "material_names");
+    if (array == data.arrays.end() || !array->second.IsInteger() || names.empty()
+        || array->second.shape != std::vector<size_t>{data.faces.counts.size()})
+        return false;
+    const auto scope = SdfPrimSpec::New(root, Distinct("materials", taken), SdfSpecifierDef, "Scope");
+    std::set<std::string> identifiers;
+    std::vector<SdfPath> materials;
+    for (const std::string &name : names) {
+        const std::string identifier = Distinct(Identifier(name, "part"), &identifiers);
+        const auto material = SdfPrimSpec::New(scope, identifier, SdfSpecifierDef, "Material");
+        if (identifier != name) material->SetInfo(SdfFieldKeys->DisplayName, VtValue(name));
+        materials.push_back(material->GetPath());
+    }
+    std::vector<int64_t> labels;
+    for (size_t face = 0; face < data.faces.counts.size(); face++) labels.push_back(array->second.Integer(face));
+    for (const Object &object : objects)
+        if (object.kind == "mesh") BindFaces(object, labels, materials);
+    return true;
 }
 
 // ---- the layer ----
@@ -584,8 +600,10 @@ Scene Scene::Of(const Motion &motion, const Choice &choice, bool metadata_only)
     std::set<std::string> taken;
     for (Object &object : objects)
         DefineObject(root, Distinct(Identifier(object.name, "part"), &taken), data.faces, &object);
-    Show(motion, data, &objects);
-    const std::vector<std::string> left = Primvars(data, info, &objects);
+    std::set<std::string> known = {"part_vertex_counts", "curve_vertex_counts", "face_vertex_counts",
+                                   "face_vertex_indices"};
+    if (BindMaterials(root, data, objects, &taken)) known.insert(kFaceMaterial);
+    const std::vector<std::string> left = Primvars(data, info, known, &objects);
     if (!left.empty())
         scene.layer->SetCustomLayerData({{"athcodec:notShown", VtValue(VtStringArray(left.begin(), left.end()))}});
     if (choice.clip < 0 && info.clip_count > 1) {
