@@ -59,13 +59,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return {"tables": [each for each, _ in made], "broken": [line for _, lines in made for line in lines]}
 
 
+def sapling() -> athcodec.MotionClip:
+    """Return the tree that grows, its positions on GRID."""
+    clip = data.RECIPES["sapling"].make()
+    return clip.replace(positions=(np.round(np.asarray(clip.positions) / GRID) * GRID).astype(np.float32))
+
+
 def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
     """Return the table of the tree that grows."""
-    clip = data.RECIPES["sapling"].make()
-    positions = (np.round(np.asarray(clip.positions) / GRID) * GRID).astype(np.float32)
-    out = folder / athcodec.sample_path(GROWTH).name
-    athcodec.write_hdf5(clip.replace(positions=positions), out, gzip=True)
-    still = int((np.diff(positions, axis=0) == 0).all(axis=(1, 2)).sum())
+    clip, out = sapling(), folder / athcodec.sample_path(GROWTH).name
+    athcodec.write_hdf5(clip, out, gzip=True)
+    still = int((np.diff(clip.positions, axis=0) == 0).all(axis=(1, 2)).sum())
     rows = [{"vertices": clip.vertex_count, "frames": clip.frame_count, "steps without motion": still}]
     return table(f"{out.name}: {out.stat().st_size:,} bytes", rows), []
 

@@ -5,11 +5,11 @@ import { BackSide, Color, DirectionalLight, HemisphereLight, Mesh, Scene, Shader
 export const SUN = new Vector3(-0.62, 0.72, 0.32).normalize();
 const SHADOW_PIXELS = 2048;
 
-// Haze: the one colour that sky, hills and ground end in. `back`: the light that the sky has opposite to the sun.
+// Haze: the one colour that sky, hills and ground end in. `back`: the light from the side of the eye, where the sun is not.
 const DAY = { zenith: 0x7fb2e2, haze: 0xcfe0e8, glow: 0xfff0d6, cloud: 0xffffff, hills: 0x7d9a8c, sun: 0xfff1d8, sunlight: 3.0, above: 0xdcebf8, below: 0x8c8f62, fill: 1.7,
   back: 0.9 };
 const DUSK = { zenith: 0x131b2a, haze: 0x39455a, glow: 0x6b6470, cloud: 0x59606f, hills: 0x1f2937, sun: 0xffcf9e, sunlight: 2.0, above: 0xb4c4e4, below: 0x6a7060, fill: 2.8,
-  back: 1.7 };
+  back: 2.2 };
 
 const VERTEX = "varying vec3 way; void main() { way = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }";
 const FRAGMENT = /* glsl */`
@@ -81,7 +81,7 @@ export class Sky {
     back.renderOrder = -2;
     back.frustumCulled = false;
     const sky = new Scene().add(back, sun, sun.target, new HemisphereLight(above, below, fill), shade);
-    shade.position.set(-SUN.x, 0.25, -SUN.z);
+    shade.position.set(-SUN.x, 0.25, 1);
     sky.name = "sky";
     if (old) this.#reach(sun, old.getObjectByName("sun"));
     scene.add(sky);

@@ -100,7 +100,7 @@ if (athIsLeaf) {
 #else
   athBump = athBark(athUv);
   float age = athNoise(athGrown * 3.0), lichen = smoothstep(0.62, 0.8, athNoise(athGrown * 7.0 + 3.0));
-  vec3 bark = mix(vec3(0.05, 0.037, 0.027), vec3(0.27, 0.215, 0.165), athBump);
+  vec3 bark = mix(vec3(0.09, 0.07, 0.05), vec3(0.3, 0.24, 0.18), athBump);
   bark = mix(bark, bark * vec3(0.85, 0.92, 0.8), age);
   diffuseColor.rgb = mix(bark, vec3(0.17, 0.19, 0.12), 0.35 * lichen * athBump);
 #endif

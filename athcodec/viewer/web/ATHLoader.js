@@ -218,7 +218,7 @@ diffuseColor.rgb=mix(vec3(.1,.075,.03),vec3(.12,.17,.04),clamp(.02*athUv.y,.0,1.
 #else
 athBump=athBark(athUv);
 float age=athNoise(athGrown*3.),lichen=smoothstep(.62,.8,athNoise(athGrown*7.+3.));
-vec3 bark=mix(vec3(.05,.037,.027),vec3(.27,.215,.165),athBump);
+vec3 bark=mix(vec3(.09,.07,.05),vec3(.3,.24,.18),athBump);
 bark=mix(bark,bark*vec3(.85,.92,.8),age);
 diffuseColor.rgb=mix(bark,vec3(.17,.19,.12),.35*lichen*athBump);
 #endif
