@@ -25,15 +25,15 @@ from athcodec.viewer.picture import chromium
 from bench.sample import sapling
 from bench.tables import table
 from bench.trees.beams import bend
-from bench.trees.leafed import SETTLING_SECONDS
 from bench.trees.plant import grow
 from bench.trees.wind import Wind
 
 FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
 SAMPLES = ("leafed", "fern", "grass")
 RETURN_FRAMES = 30  # of the tree that grows, in which it goes back to its first frame
-BARE = {"nodes": 8001, "orders": 3, "height": 12.0, "seed": 1}
+BARE = {"nodes": 4001, "orders": 3, "height": 12.0, "seed": 1}
 BARE_FRAMES, BARE_FPS, BARE_WIND = 200, 30.0, 9.0  # wind in m/s
+BARE_SETTLING_SECONDS = 12.0  # What the tree began with has died away after these.
 FLOOR = {"fern": 4.0, "grass": 9.0}  # plants around each tree of the forest
 TREES = 40
 SIZE = (640, 480)
@@ -67,7 +67,7 @@ def bare() -> athcodec.MotionClip:
     """Return a tree of points and the lines between them, in a wind that repeats."""
     plant = grow(**BARE)
     wind = Wind(BARE_WIND, plant.height, seed=BARE["seed"], period=BARE_FRAMES / BARE_FPS)
-    positions = bend(plant, wind, BARE_FRAMES, BARE_FPS, spin_up=SETTLING_SECONDS)
+    positions = bend(plant, wind, BARE_FRAMES, BARE_FPS, spin_up=BARE_SETTLING_SECONDS)
     return _loop(plant.clip(positions, np.arange(BARE_FRAMES) / BARE_FPS, BARE_FPS), "wind")
 
 

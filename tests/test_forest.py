@@ -110,9 +110,10 @@ def test_plants_of_a_forest_are_where_the_decoder_has_them(opened, grove):
     assert np.array_equal(before, got), "the previous positions are those of the picture before"
 
 
-def test_a_level_that_was_not_shown_in_the_picture_before_has_no_velocity(opened, grove):
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_level_that_was_not_shown_in_the_picture_before_has_no_velocity(opened, grove, count):
     """Its positions of some earlier picture would be a jump for motion blur."""
-    page = opened(grove, 4)
+    page = opened(grove, count)
     with athcodec.open(grove) as decoder:
         level = decoder.levels[-1].level
     shown(page, 0.0, level)
