@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import SLOWEST
 
@@ -29,6 +30,15 @@ def test_all_that_the_gallery_of_the_documentation_names_is_there():
     assert len(named) > 15 and len(files) > 8
     assert all((DOCS / name).is_file() for name in named)
     assert all((viewer / name).is_file() for name in files)
+
+
+@pytest.mark.parametrize("name", ["growth", "bare"])
+def test_a_clip_that_the_gallery_is_made_of_repeats_without_a_jump(name):
+    with athcodec.open(DOCS / "gallery" / f"{name}.ath") as decoder:
+        frames = decoder.positions(dtype=np.float64)
+        assert decoder.clip.loop
+    steps = np.abs(np.diff(frames, axis=0)).max(axis=(1, 2))
+    assert np.abs(frames[0] - frames[-1]).max() <= steps.max()
 
 
 MAP = re.search(r'<script type="importmap">(.*?)</script>', (DOCS / "gallery.md").read_text("utf-8"))[0]
