@@ -113,7 +113,7 @@ def test_plants_of_a_forest_are_where_the_decoder_has_them(opened, grove):
 @pytest.mark.parametrize("count", [1, 4])
 def test_a_level_that_was_not_shown_in_the_picture_before_has_no_velocity(opened, grove, count):
     """Its positions of some earlier picture would be a jump for motion blur."""
-    page = opened(grove, count)
+    page = opened(grove, count, f"(athcodecForest.camera.position.set(0, 1, 1), {FINEST})")
     with athcodec.open(grove) as decoder:
         level = decoder.levels[-1].level
     shown(page, 0.0, level)
