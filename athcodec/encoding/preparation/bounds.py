@@ -17,7 +17,6 @@ from athcodec.options import COARSE_SHARE, DEFAULT_REL_ERROR, LOSSLESS_REL_ERROR
 from athcodec.untyped import JsonValue
 
 GUESSED_SIZES = 16  # Files whose bounds are guessed from earlier sizes; later bounds halve the interval.
-SIZE_ROUNDS = GUESSED_SIZES + 14  # Files that are coded at most. As many halvings end within 1.01 of any size of clips.
 
 
 @dataclass(frozen=True)
@@ -105,14 +104,12 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
     low, high = 1e-7, max(0.1, 2 * least_bound(source) / diagonal)
     sizes: dict[float, float] = {}
     guess = min(DEFAULT_REL_ERROR, high)
-    for attempt in range(SIZE_ROUNDS):
-        if high / low <= 1.01 or sizes.get(high, 0) >= filled * target:
-            break
+    while high / low > 1.01 and sizes.get(high, 0) < filled * target:
         sizes[guess] = file_size(guess * diagonal)
         low, high = (low, guess) if sizes[guess] <= target else (guess, high)
         # Guesses are rounded, because logarithms differ between C libraries in the last bit.
         halving = high if high not in sizes else math.sqrt(low * high)
-        guess = qz.single(_next_guess(low, high, sizes, target) if attempt < GUESSED_SIZES else halving)
+        guess = qz.single(_next_guess(low, high, sizes, target) if len(sizes) < GUESSED_SIZES else halving)
     if sizes.get(high, target + 1) > target:
         least = file_size(high * diagonal)
         raise BoundError(f"target size: got {target} bytes; expected at least {least} for this clip")

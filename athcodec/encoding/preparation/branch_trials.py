@@ -15,6 +15,7 @@ from athcodec.encoding.decisions import FileDecisions
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.preparation.bounds import BoundOption
 from athcodec.encoding.search.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
+from athcodec.encoding.search.segment_samples import TRIAL_FRAMES
 from athcodec.encoding.search.still import STILL_SHARE
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
@@ -25,7 +26,6 @@ from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.hierarchy import branch_orders, hierarchy_of
 from athcodec.options import DEFAULT_SEGMENT
 
-TRIAL_FRAMES = 64  # Frames of a clip that branches are tried on.
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
 TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
 ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.

@@ -35,8 +35,6 @@ REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements be
 SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
 NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
-SETTLING_ROUNDS = 64  # Largest number of times that the choices of a small clip are changed.
-
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
@@ -52,7 +50,7 @@ def settled(settings: Settings, trials: Trials) -> Settings:
     """Return settings that no other choice of one kind makes smaller, each with steps of its own. Earlier choices were
     made at other steps, and sizes jump from bound to bound if the worse one of two stays."""
     saving = settings.learned_saving
-    for _ in range(SETTLING_ROUNDS):
+    while True:
         plain = replace(settings, learned_pieces=None)
         turned = rotations.candidates(plain)
         in_forms = [candidate for start in (plain, turned[0]) for candidate in forms.candidates(start, trials)]
@@ -61,10 +59,9 @@ def settled(settings: Settings, trials: Trials) -> Settings:
         in_time = [settings.in_waves(), *learned_bases.candidates(settings, trials)]
         others = _nearest(settings, starts + learned + in_time + rotations.turned_over(settings, trials), trials)
         best = trials.cheapest([settings, *(walked(other, trials) for other in others)])
-        if best is settings:
-            break
+        if best is settings:  # All of a sampled plant goes by the saving chosen before.
+            return replace(settings, learned_saving=saving)
         settings = best
-    return replace(settings, learned_saving=saving)  # All of a sampled plant goes by the saving chosen before.
 
 
 def _nearest(settings: Settings, others: list[Settings], trials: Trials) -> list[Settings]:

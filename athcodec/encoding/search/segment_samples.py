@@ -13,7 +13,10 @@ from athcodec.encoding.search.sample import PlantSample
 from athcodec.encoding.segments.segment import Source
 from athcodec.options import DEFAULT_SEGMENT, MAX_SEGMENT
 
-SAMPLES = 3  # Largest number of segments that stand for several clips.
+SAMPLES = 3  # Largest number of segments that stand for a clip, or for several.
+LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes and a mean pose are made from.
+TRIAL_FRAMES = 64  # Frames of a segment, or of a clip, that tell which of several ways makes the smaller file.
+FRAMES = 12  # Frames of a segment by which is judged how parts move.
 SPAN = MAX_SEGMENT  # Largest number of frames of a clip on which lengths of segments are compared.
 
 
@@ -34,6 +37,11 @@ class SegmentSample:
     def of_plant(self, sample: PlantSample) -> SegmentSample:
         """Return the segment of a part of the plant, whose source goes on with these positions."""
         return replace(self, positions=sample.source.sharing(self.segment, self.positions[sample.vertices]))
+
+
+def spread(count: int, most: int = FRAMES) -> list[int]:
+    """Return a few of so many frames, or of other things, from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, most).astype(int)).tolist()
 
 
 def samples_of(source: Source) -> list[SegmentSample]:

@@ -21,7 +21,7 @@ from athcodec.motion.branches.still import LEAST_STILL
 from athcodec.motion.thresholds import Thresholds
 from athcodec.untyped import Keywords
 
-STILL_SHARE = 1 / 64  # Largest distance, in bounds, of a vertex that stands still from its place in the rest pose.
+STILL_SHARE = 1 / 64  # Largest distance, in bounds, from its place of a vertex that counts as standing still.
 
 
 def still_branches(source: Source, bound: float) -> np.ndarray | None:

@@ -20,7 +20,7 @@ from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import progress
 from athcodec.encoding.search.progress import Work
 from athcodec.encoding.search.sample import ExtrapolationFactors
-from athcodec.encoding.search.segment_samples import SegmentSample, usual_change
+from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS, SegmentSample, spread, usual_change
 from athcodec.encoding.segments.segment import (
     Coded,
     CodedPrelude,
@@ -43,7 +43,6 @@ from athcodec.files.threads import ThreadPool
 TimeComponentsOfSamples: TypeAlias = list[dict[int | None, TimeComponents]]
 """For each sample its components over time by stage; None: those of all stages."""
 
-LEARNING_SEGMENTS = 4  # Largest number of segments of a clip that modes are learned from.
 PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
 
 
@@ -314,7 +313,7 @@ class Trials:
         if key not in self._components:
             prelude = self.prelude(settings)
             plan = prelude.plan if coded else prelude.uncoded_plan
-            chosen = np.unique(np.linspace(0, count - 1, LEARNING_SEGMENTS).astype(int))
+            chosen = spread(count, LEARNING_SEGMENTS)
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)
             self._components[key] = components(

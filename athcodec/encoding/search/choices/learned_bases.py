@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from athcodec.encoding.model.quantise import single
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
-FINER = 0.5  # Step at which learned time bases are tried too: an error of one of their numbers lasts over all frames.
 PERIODIC_WORTH = 1.3  # Largest ratio of bytes at which waves are periodic: coarse stages jump at the seam of others.
 
 
@@ -34,10 +32,7 @@ def best_bases(settings: Settings, trials: Trials) -> Settings:
     shorter = trials.stage_costs(each) < trials.stage_costs(waves)
     mixed = replace(each, learned_bases=tuple(shorter.tolist()))
     mixes = [each] if each.common_basis else [each, mixed]
-    best = trials.cheapest([settings, waves, *mixes, *common])
-    if best is not waves or not shorter.any() or not trials.work.fits(2 * trials.work_of_trial):
-        return best
-    return trials.cheapest([best, replace(each, step=single(FINER * each.step))])  # They may lose by their step alone.
+    return trials.cheapest([settings, waves, *mixes, *common])
 
 
 def waves_if_smaller(settings: Settings, trials: Trials) -> Settings:

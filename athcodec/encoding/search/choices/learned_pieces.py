@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.learned_modes import estimated_bits
 from athcodec.encoding.model.motion import LearnedModes
 from athcodec.encoding.options.features import Feature
@@ -18,7 +17,6 @@ from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
-FINER_REST = 0.36  # Factor on the step of a rest pose whose rounding learned modes no longer describe.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
@@ -51,19 +49,19 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
 
 
-def learned_anew(settings: Settings, trials: Trials, rest_factor: float = 1.0) -> Settings:
+def learned_anew(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with modes learned about the rest pose as it is coded, whose rounding they then describe, or
-    before that, whichever is smaller. rest_factor: on the step of a rest pose whose rounding they do not describe."""
+    before that, whichever is smaller."""
     if settings.learned_pieces is None or trials.is_layered or trials.source.reference_is_exact:
         return settings
-    step = settings.rest_step * rest_factor if settings.learned_coded else trials.start.rest_step
-    other = replace(settings, learned_coded=not settings.learned_coded, rest_step=qz.single(step))
+    step = settings.rest_step if settings.learned_coded else trials.start.rest_step
+    other = replace(settings, learned_coded=not settings.learned_coded, rest_step=step)
     return trials.cheapest([settings, other])
 
 
 def learned_about_other_pose(settings: Settings, trials: Trials) -> Settings:
     """Return the same at the best steps: those of the other way to learn are walked to again."""
-    best = learned_anew(settings, trials, FINER_REST)
+    best = learned_anew(settings, trials)
     return settings if best is settings else walked(best, trials)
 
 

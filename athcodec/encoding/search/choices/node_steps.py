@@ -12,6 +12,7 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.search import progress
+from athcodec.encoding.search.segment_samples import spread
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import CodedPrelude, Source
 from athcodec.encoding.segments.settings import Settings
@@ -106,7 +107,7 @@ def _stage_errors(trials: Trials, plan: Plan, bound: float) -> np.ndarray:
     """Return the error in all vertices of a node together that would double the error of its stage, (stages,). A stage
     errs by the RMS that independent least-squares maps leave in a few frames, or by the bound if that is more."""
     source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
-    some = np.linspace(0, sample.shape[2] - 1, min(FRAMES, sample.shape[2])).astype(int)
+    some = spread(sample.shape[2], FRAMES)
     frames = np.empty((len(some), *sample.shape[:2]))
     frames[:, source.hierarchy.vertex_source] = np.moveaxis(sample[:, :, some], 2, 0) + source.origin
     nodes = np.bincount(plan.nodes["stage"], plan.nodes["coded"], trials.stages)

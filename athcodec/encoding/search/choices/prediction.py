@@ -19,9 +19,10 @@ from athcodec.decoding import container as ct
 from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import SegmentMotion, StageStream, position_errors
+from athcodec.encoding.search.choices.node_steps import FILE_SHARE
 from athcodec.encoding.search.choices.rest import with_best_rest
 from athcodec.encoding.search.progress import PREDICTION, REST, Work
-from athcodec.encoding.search.segment_samples import SegmentSample, typical_segments
+from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, spread, typical_segments
 from athcodec.encoding.segments.levels import MOST_AWAY, SourceFrames
 from athcodec.encoding.segments.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segments.settings import Choice, Settings
@@ -34,13 +35,8 @@ from athcodec.options import SMOOTHNESS
 
 REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
 USUAL_REST_RATIO = 0.5  # Step of the rest pose, in bounds, that is taken where none other is tried.
-REST_TRIALS = 3  # Steps of the rest pose that are tried, those nearest to the error of the motion.
 STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
-TRIAL_SEGMENTS = 3  # Segments of a trial.
-TRIAL_FRAMES = 64  # Frames of each segment by which predicted motion is given up.
-TOO_MANY = 1.2  # Bytes, over those allowed, that these have to promise for that.
-FEW_FRAMES = 8  # Frames by which it is given up before in long segments, where they cost little.
-FAR_TOO_MANY = 3.0  # Bytes, over those allowed, that these have to promise for that.
+TOO_MANY = 1.2  # Bytes, over those allowed, that TRIAL_FRAMES have to promise for predicted motion to be given up.
 STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
 CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
 FINE_STILL = 0.25  # Largest error, in limits, whose second differences stay within one limit.
@@ -49,9 +45,7 @@ UNSEEN = 1e-5  # Bound, in diagonals, below which twitches count for less: a hun
 INVISIBLE = 1e-6  # Bound, in diagonals, below which they count for nothing.
 TWITCHING = 0.02  # Share of the vertices that may twitch in any frame.
 HOPELESS = 1.05  # Factor on the bytes allowed at which other steps of the rest pose do not help.
-MAP_SHARE = 0.02  # Share of the bytes that the maps of stage 0 may take.
 MAP_STEPS = (0.1, 0.25, 0.5, 1.0)  # Steps of these maps that are tried, over the error of the rest pose.
-LESS_ERROR = 0.9  # Largest error of stage 0 with maps, over that without, that is worth their bytes.
 
 
 def one_map_each(seen: Survey) -> Ath:
@@ -116,7 +110,7 @@ def best_prediction(
 
     def best(share: float, most: float) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
-        ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))[:REST_TRIALS]
+        ratios = sorted(REST_STEPS, key=lambda ratio: abs(math.log(ratio / share)))
         prediction = coded(Way(ratios[0], error_share=share))
         if prediction.bytes > HOPELESS * most:
             return prediction
@@ -126,12 +120,11 @@ def best_prediction(
     if usual:
         prediction = coded(Way(USUAL_REST_RATIO))
         return prediction if prediction.bytes < most_bytes else None
-    some, are_long = by_ratio(USUAL_REST_RATIO), max(one.positions.shape[2] for one in samples) >= 2 * TRIAL_FRAMES
+    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
     try:
-        for frames, too_many in [(FEW_FRAMES, FAR_TOO_MANY)] * are_long + [(TRIAL_FRAMES, TOO_MANY)]:
-            work.add(PREDICTION * vertices * sum(min(frames, sample.positions.shape[2]) for sample in samples))
-            if sum(_begun(prelude_of(USUAL_REST_RATIO), some, one, frames) for one in samples) > too_many * most_bytes:
-                return None
+        prelude, settings = prelude_of(USUAL_REST_RATIO), by_ratio(USUAL_REST_RATIO)
+        if sum(_begun(prelude, settings, sample) for sample in samples) > TOO_MANY * most_bytes:
+            return None
     except BoundError:
         return None
     prediction = best(1.0, most_bytes)
@@ -190,15 +183,14 @@ def _samples(source: Source) -> list[SegmentSample]:
     """Return a few segments spread over a clip, or the typical segments of several clips."""
     if len(source.clip_range_segments) > 1:
         return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
-    some = np.unique(np.linspace(0, len(source.segments) - 1, TRIAL_SEGMENTS).astype(int))
-    positions = [source.positions(segment) for segment in some]
+    positions = [source.positions(segment) for segment in spread(len(source.segments), SAMPLES)]
     scale = source.coded_frames / sum(block.shape[2] for block in positions)
     return [SegmentSample(block, scale * block.shape[2]) for block in positions]
 
 
-def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample, frames: int) -> float:
+def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
     """Return the bytes of the frames that a sample stands for, without first frames, as far as its first ones tell."""
-    some = sample.positions[:, :, :frames]
+    some = sample.positions[:, :, :TRIAL_FRAMES]
     choice = Choice(settings, settings, None, predicted=True)
     coded, first = (len(_predicted(prelude, choice, part)[0]) for part in (some, some[:, :, :1]))
     return (coded - first) / some.shape[2] * sample.frames
@@ -245,7 +237,7 @@ def code_predicted_segment(
         pose = moved.pose(0, prelude.origin, prelude.dtype)
         with_maps, map_away = error(pose), source.flaws(pose, None)[0]
         stays = map_away <= max(away, MOST_AWAY * length(box[1] - box[0]))
-        if stays and len(maps) <= MAP_SHARE * len(payload) and with_maps[-1] < LESS_ERROR * errors[0][-1]:
+        if stays and len(maps) <= FILE_SHARE * len(payload) and with_maps[-1] < errors[0][-1]:
             chunks[0, ct.AFFINES], errors[0], away = maps, with_maps, map_away
             break
     errors.append(error(decoded))

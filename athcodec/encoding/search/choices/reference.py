@@ -13,19 +13,17 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import SegmentMotion
+from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS, spread
 from athcodec.encoding.segments.segment import FINER, Source, analyse_finely, stage_streams, uncoded_plan
 from athcodec.encoding.segments.settings import Settings
-
-SEGMENTS = 4  # Largest number of segments whose mean is taken.
 
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
     """Return the mean pose, (N, 3) float64 less the origin, in file order. settings: the start of a search."""
     settings = replace(settings, forms=source.sheet_like.astype(np.int32), layer=0)
     plan = uncoded_plan(source, ath, settings)
-    some = np.unique(np.linspace(0, len(source.segments) - 1, SEGMENTS).astype(int))
     coefficients, tracks, frames = 0.0, 0.0, 0
-    for segment in some:
+    for segment in spread(len(source.segments), LEARNING_SEGMENTS):
         motion = analyse_finely(plan, settings, source.positions(segment))
         of_sum = np.sqrt(motion.frames)  # Factor from the coefficient of the mean wave to the sum over frames.
         coefficients = coefficients + of_sum * motion.coefficients[:, :, 0]

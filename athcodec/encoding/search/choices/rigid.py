@@ -15,7 +15,8 @@ import numpy as np
 from athcodec._native import PIECE_VERTICES
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.options.features import Feature
-from athcodec.encoding.search.segment_samples import SegmentSample
+from athcodec.encoding.search.choices.steps import STEP_FACTOR
+from athcodec.encoding.search.segment_samples import SegmentSample, spread
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.settings import Settings
@@ -25,12 +26,9 @@ MOST_BEND = 0.3  # Distance, in bounds, by which a rigid part may bend in the so
 STIFF_BEND = 0.05  # Distance, in bounds, up to which a part of any size is rigid.
 LARGEST = 20.0  # Size of a part, in bounds, up to which the bound would spoil its shape.
 CARRIER = 8.0  # Size of a part that carries others, in bounds, up to which it is rigid where it bends within the bound.
-FRAMES = 12  # Frames of a segment by which rigid parts are found.
 TURN_STEP = qz.half_octave(-7)  # Largest step of rotations, in radians: their errors are 1 to 2 degrees.
 MOST_TURN = 15  # Half octaves below 1 radian of the finest largest step.
-CALM_STEP = 1.15  # Factor by which a calmer step is finer.
 CALM_COST = 1.03  # Bytes that all calmer steps may cost, over those of the first.
-CALM_ROUNDS = 32  # Steps finer than the first that are tried at most: the last is 1/87 of it.
 CALM_SHARE = 1e-4  # Share of the vertices of small rigid parts, over all frames, that may be corrected.
 
 
@@ -58,11 +56,9 @@ def best_freedom(settings: Settings, trials: Trials) -> Settings:
 def calm_parts(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with cheap finer steps, of all or of turns, if corrections twitch many small rigid parts."""
     most, share = CALM_COST * trials.cost(settings), _corrected_parts(settings, trials)
-    for _ in range(CALM_ROUNDS):
-        if share <= CALM_SHARE:
-            break
+    while share > CALM_SHARE:
         finer = (
-            replace(settings, step=qz.single(settings.step / CALM_STEP)),
+            replace(settings, step=qz.single(settings.step / STEP_FACTOR)),
             replace(settings, turn_step=_finer_turn(settings.turn_step)),
         )
         calmer = {_corrected_parts(tried, trials): tried for tried in finer if trials.cost(tried) <= most}
@@ -115,7 +111,7 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
     3)."""
     d = shapes - shapes.mean(axis=1, keepdims=True)
     worst = np.zeros(len(shapes))
-    for t in np.unique(np.linspace(0, sample.shape[2] - 1, FRAMES).astype(int)):
+    for t in spread(sample.shape[2]):
         x = sample[:, :, t][vertices]
         x = x - x.mean(axis=1, keepdims=True)
         u, _, v = decompose(multiply(x.transpose(0, 2, 1), d))

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from athcodec.encoding.model.quantise import bits
+from athcodec.encoding.search.segment_samples import spread
 
 LEAST_RING = 2  # Least vertices of a ring (FORMAT.md, HIERARCHY).
 LARGEST_RING = 32  # Most vertices of a ring (FORMAT.md, HIERARCHY).
 LEAST_RINGS = 4  # Rings of a tube.
 FINE = 1e-3  # Unit, in lengths of a stem, of the differences by which a period is found.
 WITHIN = 0.1  # Largest share of the squared motion of a tube that is within its rings.
-FRAMES = 12  # Frames of a segment by which rings are judged.
 
 
 def ring_sizes(
@@ -64,7 +64,7 @@ def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.nd
     sizes = np.diff(np.append(starts, stems.shape[1]))
     within, all_in_all = np.zeros(len(stems)), np.zeros(len(stems))
     for sample in samples:
-        for t in np.unique(np.linspace(0, sample.shape[2] - 1, FRAMES).astype(int)):
+        for t in spread(sample.shape[2]):
             moved = sample[:, :, t][vertices] - stems
             moved -= moved.mean(axis=1, keepdims=True)
             centres = np.add.reduceat(moved, starts, axis=1) / sizes[:, None]

@@ -11,7 +11,7 @@ import numpy as np
 from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices import learned_bases
-from athcodec.encoding.search.segment_samples import SegmentSample
+from athcodec.encoding.search.segment_samples import SegmentSample, spread
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.settings import Settings
@@ -21,7 +21,6 @@ HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not 
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
 FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
 
-FRAMES = 12  # Frames of a segment by which it is known that plants turn.
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
 MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre that is then no turn.
 
@@ -46,7 +45,7 @@ def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
     size2 = _sums(np.square(rest), first).sum(axis=1)
     moved, bent, turned = (np.zeros(len(roots)) for _ in range(3))
     for sample in samples:
-        for frame in np.unique(np.linspace(0, sample.positions.shape[2] - 1, FRAMES).astype(int)).tolist():
+        for frame in spread(sample.positions.shape[2]):
             pose = _about_centres(sample.positions[:, :, frame], first)
             moments = _sums((pose[:, :, None] * rest[:, None]).reshape(-1, 9), first).reshape(-1, 3, 3)
             left, stretch, right = decompose(moments)

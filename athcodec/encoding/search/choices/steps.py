@@ -13,11 +13,8 @@ from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
 WALKS = 3  # Largest number of walks of both steps.
-LONGEST_WALK = 10  # Grid points that a walk moves at most.
 STEP_FACTOR = 1.15  # Ratio of neighbouring steps of motion on the grid.
 REST_STEP_FACTOR = 1.4  # Ratio of neighbouring steps of the rest pose, by which bytes change less.
-FINE_FACTOR = 1.04  # Ratio of steps of motion at effort "best".
-FINE_REST_FACTOR = 1.12  # Ratio of steps of the rest pose at effort "best".
 WEIGHT_PARTS = (0.0, 0.05, 0.2)  # Shares of a stage's vertices that may have weights below that of the stage's step.
 WEIGHT_POWERS = (0.5, 1.0)  # Powers of a stage's weight that are tried as the factor on its step.
 
@@ -38,8 +35,8 @@ def best_steps(settings: Settings, trials: Trials) -> Settings:
 
 
 def finer_steps(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with steps from a finer grid."""
-    return walked(settings, trials, FINE_FACTOR, FINE_REST_FACTOR)
+    """Return the settings with steps from a grid that is three times as fine."""
+    return walked(settings, trials, STEP_FACTOR ** (1 / 3), REST_STEP_FACTOR ** (1 / 3))
 
 
 def walked(
@@ -77,7 +74,7 @@ def _walk(
         costs |= costs_at(ahead)
     while True:
         best = min(costs, key=costs.__getitem__)
-        wanted = [e for e in (best - 1, best + 1) if e not in costs and abs(e) <= LONGEST_WALK]
+        wanted = [e for e in (best - 1, best + 1) if e not in costs]
         if not wanted:
             return moved(best)
         costs |= costs_at(wanted)
