@@ -129,6 +129,10 @@ def encode(
     of_source = {name: settings.pop(name) for name in {*OF_ARRAYS, *OF_PATHS} if name in settings}
     out = io.BytesIO() if target is None else target
     with clip_of(source, **of_source) as (clip, converted):
+        if isinstance(source, (str, PathLike)):
+            from athcodec.sources import warn_of_still  # The sources take long to import.
+
+            warn_of_still(clip, source, axes=of_source.get("axes"))
         summary = replace(encode_clip(clip, out, **settings), converted=converted)
     return out.getvalue() if isinstance(out, io.BytesIO) and target is None else summary
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import distributed
 import fsspec
+import numpy as np
 import psutil
 import pytest
 from plants import plant
@@ -471,6 +472,20 @@ def test_each_clip_has_a_line_once_it_is_done_or_has_failed(clips, cluster, out)
     batch.run(batch.find([clips], out, settings=FAST), out, scheduler=cluster, report=lambda line: None)
     batch.run([*batch.find([clips], out, settings=FAST), items[1]], out, scheduler=cluster, report=said.append)
     assert said[2] == "3 kept, 1 to do" and said[3].startswith("[1/1] b.h5: failed: ")
+
+
+def test_warnings_of_workers_look_like_those_of_a_single_encoding(clips, out):
+    """A worker is a process without a terminal, whose own warnings would name a file and a line of Python."""
+    for name, frames in (("still", 1), ("sways", 40)):  # A clip that is encoded whole, and one whose segments are.
+        np.savez(clips / f"{name}.npz", verts=plant(seed=frames, branches=5, longest=4, frames=frames).positions)
+    words = [str(clips / "*.npz"), "--out", str(out), "--workers", "1", "--split", "1", *WORDS, "--rel-error", "0.3"]
+    done = subprocess.run([*BATCH, *words], capture_output=True, text=True, timeout=600)
+    warned = [line for line in done.stderr.splitlines() if "arning" in line]
+    assert done.returncode == 0 and warned, done.stderr
+    assert all(line.startswith(f"athcodec: warning: {clips}/s") for line in warned), done.stderr
+    for name, text in (("still", "holds a single frame"), ("sways", "was taken for them")):
+        assert sum(f"{name}.npz" in line and text in line for line in warned) == 1, done.stderr
+    assert ".py:" not in done.stderr
 
 
 # ---- what goes wrong ----

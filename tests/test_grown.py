@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import h5py
 import numpy as np
 import pytest
 
 import athcodec
-from athcodec.motion.branches.grown_pose import with_grown_pose
+from athcodec.motion.branches.grown_pose import grown_pose, with_grown_pose
 
 ORGANS, VERTICES, FRAMES = 10, 40, 24
 
@@ -47,6 +48,16 @@ def test_a_clip_that_begins_grown_keeps_its_first_frame_as_rest_pose():
     clip = growing_organs(decay=True)
     with athcodec.open(athcodec.encode(clip, rel_error=1e-4, attributes="none")) as decoder:
         assert np.abs(decoder.file.rest - clip.positions[0]).max() < 1e-3
+
+
+def test_chunks_of_many_frames_are_not_unpacked_for_each_frame_that_is_looked_at(tmp_path):
+    clip = growing_organs()
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        data = file.create_dataset("positions", data=clip.positions, chunks=(FRAMES // 2, *clip.positions.shape[1:]))
+        stored, reads = athcodec.MotionClip(data, clip.time, attributes=clip.attributes), []
+        stored.block, read = lambda start, stop: reads.append(start) or read(start, stop), stored.block
+        assert np.array_equal(grown_pose(stored), grown_pose(clip))
+    assert len(reads) == 3, "both chunks once, and the frame that is most grown"
 
 
 def test_no_pose_shows_points_grown_that_wander():

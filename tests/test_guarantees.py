@@ -13,7 +13,7 @@ from plants import ring_quads, tube
 
 import athcodec
 from athcodec import ClipView, MotionClip
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, GuessWarning
 
 RATE = 24000 / 1001
 FORMATS = {"hdf5": "a.h5", "npz": "a.npz", "usdc": "a.usdc", "usda": "a.usda", "alembic": "a.abc", "gltf": "a.glb"}
@@ -94,6 +94,39 @@ def test_arrays_come_back_or_are_named_as_not_written(clip, tmp_path, name):
     lost = athcodec.write(odd, tmp_path / FORMATS[name]).facts.get("not_written", {}).get("arrays", [])
     with there_and_back(odd, tmp_path, name) as back:
         assert set(shapes) - set(lost) == set(shapes) & set(back.attributes)
+
+
+@pytest.mark.parametrize("moves", [True, False])
+@pytest.mark.parametrize("name", tiered(FORMATS))
+def test_everything_in_a_file_that_athcodec_wrote_is_known_when_it_is_read(clip, tmp_path, name, moves):
+    whole = clip if moves else clip.replace(positions=np.repeat(clip.positions[:1], 3, axis=0), time=clip.time[:3])
+    with there_and_back(whole, tmp_path, name) as back:
+        assert back.not_read == {}
+
+
+def test_every_kind_of_glb_that_athcodec_wrote_is_known_when_it_is_read(clip, tmp_path):
+    branches = {"vertex_branch": np.zeros(clip.vertex_count, int), "branch_parent": np.array([-1])}
+    both = athcodec.join({"calm": clip.replace(**branches), "gale": clip.replace(**branches)})
+    for kind in ("morphs", "joints"):
+        athcodec.write(both, tmp_path / "b.glb", animation=kind)
+        with athcodec.read(tmp_path / "b.glb", takes="all") as back:
+            assert back.not_read == {}
+    athcodec.encode(both, tmp_path / "b.ath", rel_error=1e-2, effort="fast", ladder="none")
+    with athcodec.open(tmp_path / "b.ath") as decoder:
+        athcodec.write(ClipView(decoder), tmp_path / "r.glb", rig=True)
+    with athcodec.read(tmp_path / "r.glb", takes="all") as back:
+        assert back.not_read == {}
+
+
+@pytest.mark.parametrize("name", tiered(FORMATS))
+def test_encoding_a_file_of_one_frame_says_what_makes_it_a_motion(clip, tmp_path, name, capsys):
+    path = tmp_path / FORMATS[name]
+    if name == "pc2":
+        pytest.skip("its frames are a number in the head, and one of them is a frame like any other")
+    write(clip.replace(positions=clip.positions[:1], time=clip.time[:1]), path)
+    path = path if path.exists() else next(tmp_path.glob(f"a*{path.suffix}"))
+    with pytest.warns(GuessWarning, match="holds a single frame, so the plant stands still: .*--still"):
+        athcodec.encode(path, effort="fast")
 
 
 @pytest.mark.parametrize("name", tiered(FORMATS))

@@ -143,7 +143,7 @@ def test_every_budget_of_memory_is_kept_to_or_refused(bushy_ath):
 
 @pytest.mark.slow
 def test_every_array_of_every_call_failing_once_is_a_memory_error_and_nothing_else(full_ath):
-    row = load.failing_allocations(full_ath)
+    row = load.failing_allocations(full_ath, seconds=1500)
     assert row.tried > 1_000 and row.crashes == row.wrong == 0, row.note
 
 

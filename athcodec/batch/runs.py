@@ -17,6 +17,7 @@ import os
 import shutil
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -358,6 +359,7 @@ def _results(
     for future in finished:
         item = items.pop(future.key)
         result = _result(future, item)
+        _warn(item, result.pop("warnings", ()))
         if "draft" in result:
             segments = range(result["draft"])
             parts = [submit(tasks.code, item, list(segments[first : first + split])) for first in segments[::split]]
@@ -365,6 +367,12 @@ def _results(
             continue
         shutil.rmtree(_folder(folder, item), ignore_errors=True)
         yield item, result
+
+
+def _warn(item: Item, given: Iterable[tuple[type[Warning], str]]) -> None:
+    """Give the warnings of a task in this process, each with the name of its clip."""
+    for category, text in given:
+        warnings.warn(text if item.shown in text else f"{item.shown}: {text}", category, stacklevel=2)
 
 
 def _folder(folder: str, item: Item) -> str:

@@ -25,18 +25,19 @@ from athcodec.batch.settings import coding_options, loop_frames, reading_options
 from athcodec.decoding import container as ct
 from athcodec.encoding import CodedSegment, Draft
 from athcodec.encoding.segments.segmentation import split_segments
-from athcodec.errors import AthError, ClipError, GuessWarning, SourceWarning
+from athcodec.errors import AthError, AthWarning, ClipError, GuessWarning, SourceWarning
 from athcodec.files.atomic import check_target, is_url, keeping
 from athcodec.files.shown import redacted
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
-from athcodec.sources import listed
+from athcodec.sources import listed, warn_of_still
 from athcodec.sources.branches import find_or_load
 from athcodec.untyped import JsonObject, Keywords
 
 Result = JsonObject
-"""Of a task: "failed" with a reason, or "done" with figures, "draft" with the number of segments, "kept", "part"."""
+"""Of a task: "failed" with a reason, or "done" with figures, "draft" with the number of segments, "kept", "part".
+"warnings" holds the category and the text of each warning that the task gave: a worker has no terminal of its own."""
 
 
 def _task(work: Callable[..., Result]) -> Callable[..., Result]:
@@ -44,15 +45,23 @@ def _task(work: Callable[..., Result]) -> Callable[..., Result]:
 
     @wraps(work)
     def task(item: Item, folder: str, *arguments: Any, **options: Any) -> Result:
-        try:
-            with suppress(FileExistsError):
-                os.mkdir(folder)  # the run's own is there as long as the run
-            return work(item, folder, *arguments, **options)
-        except Exception as error:
-            reason = one_line(error).replace(_local_path(item, folder), item.shown)
-            return {"failed": reason.replace(item.input, item.shown)}  # a URL may hold keys
+        with warnings.catch_warnings(record=True, action="always", category=AthWarning) as caught:
+            try:
+                with suppress(FileExistsError):
+                    os.mkdir(folder)  # the run's own is there as long as the run
+                result = work(item, folder, *arguments, **options)
+            except Exception as error:
+                result = {"failed": _about(one_line(error), item, folder)}
+        given = [(each.category, _about(str(each.message), item, folder)) for each in caught]
+        of_athcodec = [entry for entry in given if issubclass(entry[0], AthWarning)]
+        return result | ({"warnings": of_athcodec} if of_athcodec else {})
 
     return task
+
+
+def _about(message: str, item: Item, folder: str) -> str:
+    """Return a message with the name of the input as it is shown: its URL may hold keys."""
+    return message.replace(_local_path(item, folder), item.shown).replace(item.input, item.shown)
 
 
 @_task
@@ -153,7 +162,9 @@ def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # the record says it
         warnings.simplefilter("always", GuessWarning)
-        opened = athcodec.read(path, **reading_options(item.settings))
+        how = reading_options(item.settings)
+        opened = athcodec.read(path, **how)
+        warn_of_still(opened, path, how.get("format"), how.get("axes"))
     with opened as source_clip:
         clip = source_clip
         if "strength" in item.settings:

@@ -208,6 +208,7 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(_names),
         help="names of the clips that are loops: their first frame follows their last; all: every clip is",
     )
+    verb.add_argument("--still", action="store_true", help="a source of a single frame is meant: do not warn of it")
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",

@@ -26,7 +26,7 @@ from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
 from athcodec.options import HOST, MAX_MEMORY
-from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed
+from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed, warn_of_still
 from athcodec.sources.branches import find_or_load
 from athcodec.sources.numbering import each_once
 from athcodec.untyped import JsonObject
@@ -48,6 +48,8 @@ def clip_to_encode(
         parts = []
         for path, called in each_once(paths):
             whole = opened.enter_context(read(path) if read else read_clip(args, path))
+            if not read and not args.still:
+                warn_of_still(whole, path, args.source_format, args.axes)
             parts += [(name, called, part) for name, part in athcodec.split(whole).items()]
         names = args.names or [name or (stem if len(parts) > 1 else "") for name, stem, _ in parts]
         loops = _checked_names(names, len(parts), args)

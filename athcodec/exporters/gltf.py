@@ -55,7 +55,7 @@ from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import new_file
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
-from athcodec.sources.scene_objects import GUESSED
+from athcodec.sources.scene_objects import BONES, GUESSED
 from athcodec.untyped import JsonMapping, JsonObject
 
 MOST_JOINTS = 65536
@@ -171,7 +171,7 @@ def write_bound(motion: Motion, path: FilePath, bones: Any, facts: JsonMapping) 
     lists["first"] = np.flatnonzero(bones.side).tolist()
     slices = bones.slices
     lists |= {"slices": slices} if slices["bone"] else {}
-    extras = {"ATH_bones": {**lists, "error": facts["max_error_of_plant"]}}
+    extras = {BONES: {**lists, "error": facts["max_error_of_plant"]}}
     root = glb.node(name="plant", extras=extras, **root_transform(motion))
     count = len(bones.rest)
     bind = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))

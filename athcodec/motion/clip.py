@@ -376,13 +376,17 @@ class MotionClip:
         for start in range(0, self.frame_count, length):
             yield start, self.block(start, min(start + length, self.frame_count))
 
+    @property
+    def chunk_frames(self) -> int:
+        """Frames that the source unpacks together, 1 if it has no chunks."""
+        return int(np.max((getattr(self.positions, "chunks", None) or (1,))[0]))  # dask names the size of each.
+
     def _block_length(self, max_frames: int | None) -> int:
         if max_frames is not None and (max_frames := whole("max_frames", max_frames)) < 1:
             raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
         length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))
         length = min(length, max_frames or length)
-        chunk_frames = int(np.max((getattr(self.positions, "chunks", None) or (1,))[0]))  # dask names the size of each.
-        return length - length % chunk_frames if chunk_frames <= length else length
+        return length - length % self.chunk_frames if self.chunk_frames <= length else length
 
     def _check_branches(self, vertex_count: int) -> None:
         if self.vertex_branch is None and self.branch_parent is None:

@@ -70,15 +70,17 @@ def clip_of_steps(
     unchanged: Any = None,
     parts: Sequence[Part] = (),
     not_read: Mapping[str, list[str]] | None = None,
+    is_own: bool = False,
 ) -> MotionClip:
     """Return the clip of a result at (T,) times.
 
     `static` holds the data per point that do not change, and `parts` the objects that the points form one after the
-    other, "" for one without a name. Raises ClipError if nothing moves, or if it is not clear what does.
+    other, "" for one without a name. is_own: athcodec's exporter wrote the file, so points that do not move stand
+    still. Raises ClipError if nothing moves, or if it is not clear what does.
     """
     first = _padded(steps.points(0))
     fixed = steps.fixed_points()
-    moved_by = _displacement(steps, fixed, len(time), options)
+    moved_by = _displacement(steps, fixed, 1 if is_own else len(time), options)
     if moved_by and moved_by.lower() == AMBIGUOUS and options.field is None:
         warnings.warn(
             f"{name}: the points do not move, and {moved_by} was taken for the displacement that moves them; pass "

@@ -13,7 +13,7 @@ from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.json import entries, entry, extension
 from athcodec.files.gltf.motion import EXTENSION
 from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
-from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
+from athcodec.sources.scene_objects import BONES, FLIPPED, GUESSED, OWN
 from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:
@@ -23,17 +23,18 @@ INSTANCING, LIGHTS, VARIANTS = "EXT_mesh_gpu_instancing", "KHR_lights_punctual",
 INSTANCE_PARTS = {"TRANSLATION": 3, "ROTATION": 4, "SCALE": 3}
 READ = (POINTER, NODE_VISIBILITY, EXTENSION, INSTANCING, LIGHTS, "KHR_mesh_quantization", *MESHOPT)
 OF_MATERIALS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "ADOBE_materials_")
-READ_EXTRAS = {  # Members of extras that are read, of the parts that may have them.
-    "asset": frozenset(("fps", "start_frame", "loop", "athcodec")),
+READ_EXTRAS = {  # Members of extras that are read or that athcodec's exporter derives, of the parts that may have them.
+    # The nodes turn and scale vertices from "unit" and "up_axis" to glTF's metres and y, which are what is read.
+    "asset": frozenset(("fps", "start_frame", "loop", "unit", "up_axis", OWN)),
     "animation": frozenset(("fps", "start_frame", "loop")),
-    "node": frozenset((COPIES,)),
+    "node": frozenset((COPIES, BONES)),
 }
 ARRAYS = ("POSITION", "TEXCOORD_0", "COLOR_0")  # Attributes that are read of every mesh.
 
 
 def not_read(scenes: Sequence[Scene], nodes: Sequence[GltfNode], keeps_normals: bool = True) -> dict[str, list[str]]:
     """Return what is in the file and is not read with these nodes, as they move in each of these scenes; parts of a
-    node by the node's name. keeps_normals: whether normals are read."""
+    node by the node's name. keeps_normals: whether normals are read, or were made by athcodec's exporter."""
     scene = scenes[0]
     file, unread = scene.file, _unused(scene)
     for index in scene.order:
@@ -93,12 +94,13 @@ def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[
         slots += 1
     read = {*ARRAYS, *(f"{kind}_{slot}" for kind in ("JOINTS", "WEIGHTS") for slot in range(slots))}
     read |= {"NORMAL"} if keeps_normals else set()
+    moving = {"POSITION", "NORMAL"} if keeps_normals else {"POSITION"}
     instancing = extension(scene.nodes[node.index], INSTANCING)
     attributes = () if instancing is None else entry(instancing, "attributes")
     targets = (target for primitive in node.primitives for target in entries(primitive, "targets"))
     return [
         *(key for key in node.attributes if key not in read and not key.startswith("_")),
-        *dict.fromkeys(f"targets.{key}" for target in targets for key in target if key != "POSITION"),
+        *dict.fromkeys(f"targets.{key}" for target in targets for key in target if key not in moving),
         *(key for key in attributes if key not in INSTANCE_PARTS and not key.startswith("_")),
     ]
 

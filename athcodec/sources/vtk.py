@@ -26,6 +26,7 @@ from athcodec.sources import ReadOptions
 from athcodec.sources.fields import clip_of_steps
 from athcodec.sources.file_series import Kind, Series, StatedTime, series_of, time_in_text
 from athcodec.sources.mesh import same_values
+from athcodec.sources.scene_objects import OWN
 from athcodec.sources.vtk_grid import STEP_NAMES, Grid, joined
 from athcodec.sources.vtk_legacy import is_legacy, read_legacy
 from athcodec.sources.vtk_xml import VtkXml
@@ -72,6 +73,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
             unchanged=steps.unchanged,
             parts=steps.parts,
             not_read=series.not_read | steps.not_read,
+            is_own=steps.is_own,
         )
     except _BROKEN as error:
         text = " ".join(str(error).split())
@@ -87,7 +89,8 @@ class _Steps:
         self.unchanged = FileWatch(*(file for frame in series.frames for file in frame))
         self._now: tuple[int, Grid] | None = None
         first = self._grid(0)
-        self._cells, self.metadata, self.parts = first.cells, first.metadata, first.parts
+        self._cells, self.metadata, self.parts = first.cells, dict(first.metadata), first.parts
+        self.is_own = self.metadata.pop(OWN, False)  # Whether athcodec's exporter wrote the files.
         self.stated = [_time_of(first)]
         self.topology = first.topology()
         self._fields, self.elsewhere = list(first.point_data), dict.fromkeys(first.cell_data, "cell")

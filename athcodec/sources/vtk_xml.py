@@ -121,7 +121,7 @@ class VtkXml:
             for element in field:
                 name, is_number = element.get("Name", ""), element.get("type") in _TYPES
                 if name == OWN and element.get("type") == "UInt8":
-                    metadata |= scene_of_json(self._array(element).tobytes())
+                    metadata |= {OWN: True} | scene_of_json(self._array(element).tobytes())
                 elif is_number and name.lower() in (*TIME_NAMES, *STEP_NAMES):
                     times.setdefault(name, self._array(element))
                 else:

@@ -33,7 +33,7 @@ from spec.robust import Row, ended
 
 HERE = Path(__file__).resolve().parent
 CORE = HERE.parent.parent / "athcodec" / "core"
-TIMEOUT = 300.0  # seconds after which a process counts as hung
+TIMEOUT = 300.0  # Seconds after which a process counts as hung, beside those that its job was given.
 RACE_FOUND = 66  # ThreadSanitizer's exit code
 LIBRARIES = "-lm", "-lpthread", "-ldl"
 GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
@@ -42,13 +42,15 @@ GET_HANDLER = 305  # index of PyDataMem_GetHandler in NumPy's table of functions
 # ---- processes ----
 
 
-def job(name: str, *words: object) -> tuple[int, dict]:
-    """Return (exit code, result) of one job of this file in a process of its own."""
+def job(name: str, *words: object, seconds: float = 0.0) -> tuple[int, dict]:
+    """Return (exit code, result) of one job of this file in a process of its own. seconds: that it may use."""
     root = str(HERE.parent.parent)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([root, os.environ.get("PYTHONPATH", "")])}
     try:
         done = ended(
-            [sys.executable, "-m", "spec.robust.load", name, *map(str, words)], env=environment, timeout=TIMEOUT
+            [sys.executable, "-m", "spec.robust.load", name, *map(str, words)],
+            env=environment,
+            timeout=seconds + TIMEOUT,
         )
     except subprocess.TimeoutExpired:
         return -1, {"error": "hung"}
@@ -333,7 +335,7 @@ def _error_of(call: Call) -> BaseException | None:
 
 def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
     """Return every allocation of an array in every call fails once."""
-    code, result = job("allocations", path, seconds)
+    code, result = job("allocations", path, seconds, seconds=seconds)
     row = Row("the n-th allocation of an array fails", sum(result.get("tried", {}).values()), crashes=int(code != 0))
     row.wrong = len(result.get("wrong", []))
     notes = [f"in {len(result.get('tried', {}))} calls, {result.get('raised', 0)} raised", *result.get("wrong", [])[:3]]

@@ -82,8 +82,14 @@ def _some_frames(frame_count: int) -> np.ndarray:
 
 
 def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the positions (N, 3) float64 of the clip in each of these frames."""
-    return (clip.block(frame, frame + 1)[0].astype(np.float64) for frame in frames.tolist())
+    """Yield the positions (N, 3) float64 of the clip in each of these frames. Frames in one chunk of the source are
+    read together, so that it is unpacked once."""
+    chunk_frames = clip.chunk_frames
+    for _, chosen in itertools.groupby(frames.tolist(), lambda frame: frame // chunk_frames):
+        run = list(chosen)
+        block = clip.block(run[0], run[-1] + 1)
+        for frame in run:
+            yield block[frame - run[0]].astype(np.float64)
 
 
 def _branch_sizes(pose: np.ndarray, first: np.ndarray) -> np.ndarray:
