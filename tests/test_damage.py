@@ -439,6 +439,15 @@ ALL_READINGS |= {error.name for error in (NotAnAthFile, UnsupportedVersion, Unsu
 ALL_READINGS |= {error.name for error in (BadHeader, BadChunkTable, UnknownChunk, LimitExceeded)}
 
 
+def test_a_front_of_one_level_is_refused_for_its_chunk_table_first_as_the_document_does(data, parts):
+    """That a file has a level behind its first one follows from its branches, which stand behind the front."""
+    header = replace(parts.header, full_level_count=1, level_count=1, stages=parts.header.stages[:1])
+    chunks = [chunk for chunk, _ in parts.chunks]
+    for table in (chunks, [chunks[1], chunks[0], *chunks[2:]]):
+        front = bytes(ct.pack_front(header, table, parts.errors[:1]))
+        both_readings(with_checksum(front) + data[chunks[0].offset :], Limits())
+
+
 @pytest.mark.vectors
 @pytest.mark.parametrize("count", [1500, pytest.param(30_000, marks=pytest.mark.slow)])
 def test_the_core_reads_a_front_as_the_document_does(count, data, parts):

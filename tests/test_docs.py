@@ -208,6 +208,13 @@ def test_the_javascript_program_has_the_positions_of_python(files, tmp_path):
     assert run("node", tmp_path / "example.mjs", files / "tree.ath") == b"0 3003\n"
 
 
+def test_the_report_on_tiers_of_tests_is_that_of_the_stored_results():
+    from spec.tiers import as_markdown
+
+    results = json.loads((ROOT / "spec" / "tiers.json").read_text())
+    assert (ROOT / "spec" / "tiers.md").read_text() == as_markdown(results)
+
+
 def test_the_report_on_robustness_is_that_of_the_stored_results_and_names_the_commit_of_each():
     from spec.robustness import as_markdown
 

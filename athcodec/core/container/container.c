@@ -170,7 +170,7 @@ int ath_read_header(const uint8_t *bytes, size_t available, const ath_limits *li
     code_stages(&coder, header);
     header->stage_count = header->stages[header->level_count - 1] + 1;
     int32_t deepest = header->stages[header->full_level_count - 1];
-    if (is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, deepest + 1, 2, ATH_LEVELS)) return fault->code;
+    if (is_outside(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, deepest + 1, 1, ATH_LEVELS)) return fault->code;
     double size =
         (double)TABLE_ENTRY * ((double)header->chunk_count + (double)header->level_count * header->segment_count);
     if (is_outside(fault, ATH_LIMIT_EXCEEDED, ATH_FIELD_TABLE_SIZE, size, 0, limits->table_bytes)) return fault->code;
