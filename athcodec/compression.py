@@ -130,7 +130,7 @@ def encode(
     out = io.BytesIO() if target is None else target
     with clip_of(source, **of_source) as (clip, converted):
         if isinstance(source, (str, PathLike)):
-            from athcodec.sources import warn_of_still  # The sources take long to import.
+            from athcodec.sources.one_frame import warn_of_still  # The sources take long to import.
 
             warn_of_still(clip, source, axes=of_source.get("axes"))
         summary = replace(encode_clip(clip, out, **settings), converted=converted)

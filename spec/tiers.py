@@ -29,7 +29,9 @@ CODE = ("athcodec", "bench", "spec", "tests", ":!spec/robustness.*", ":!spec/tie
 DEFAULT = "first"  # The tier that runs without -m.
 COUNTS = ("passed", "failed", "error", "skipped")
 ENDING = 60.0  # Seconds that a stopped file has to clean up.
-RUNNING = re.compile(r"^(tests/\S+::.*?) *$", re.MULTILINE)  # A test without an outcome behind it.
+RUNNING = re.compile(
+    r"^(tests/\S+::(?:(?! (?:PASSED|FAILED|ERROR|SKIPPED|XFAIL)).)*?) *$", re.MULTILINE
+)  # A test without an outcome.
 NOT_PASSED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.MULTILINE)
 
 

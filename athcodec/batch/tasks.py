@@ -31,8 +31,9 @@ from athcodec.files.shown import redacted
 from athcodec.motion.branches.result import with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import in_wind
-from athcodec.sources import listed, warn_of_still
+from athcodec.sources import listed
 from athcodec.sources.branches import find_or_load
+from athcodec.sources.one_frame import warn_of_still
 from athcodec.untyped import JsonObject, Keywords
 
 Result = JsonObject

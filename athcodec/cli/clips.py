@@ -26,9 +26,10 @@ from athcodec.motion.branches.result import with_branches as clip_with_branches
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.joining import BLEND, in_wind
 from athcodec.options import HOST, MAX_MEMORY
-from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed, warn_of_still
+from athcodec.sources import ATH, LISTED, ReadOptions, find_format, listed
 from athcodec.sources.branches import find_or_load
 from athcodec.sources.numbering import each_once
+from athcodec.sources.one_frame import warn_of_still
 from athcodec.untyped import JsonObject
 
 if TYPE_CHECKING:

@@ -55,7 +55,8 @@ from athcodec.exporters.surface import MovingNormals, Surface
 from athcodec.files.atomic import new_file
 from athcodec.files.plain import FilePath
 from athcodec.motion.protocol import Motion
-from athcodec.sources.scene_objects import BONES, GUESSED
+from athcodec.sources.gltf_scene import BONES
+from athcodec.sources.scene_objects import GUESSED
 from athcodec.untyped import JsonMapping, JsonObject
 
 MOST_JOINTS = 65536

@@ -26,7 +26,7 @@ from athcodec.files.kinds import HEAD_BYTES, UNKNOWN, kind_of
 from athcodec.files.plain import open_plain
 from athcodec.files.reading import closing_on_failure, naming_file
 from athcodec.motion.clip import NOT_KEPT, MotionClip
-from athcodec.motion.positions import FRAMES, Order, parse_order
+from athcodec.motion.positions import Order, parse_order
 from athcodec.motion.scene import in_scene
 from athcodec.motion.units import checked_axis, checked_unit, size_of, stated_scene
 from athcodec.options import MAX_MEMORY, SAMPLES, set_numbers
@@ -84,15 +84,6 @@ NO_SOURCES = {
 """What is no source, by its suffix: what it is, and what to do with it in Python and on the command line."""
 _MESHES = (".obj", ".ply")
 _VTK = (".vtu", ".vtp", ".vtk", ".vts", ".pvtu", ".pvtp", ".pvts", ".vtm", ".vtpd", ".vtpc")
-STILL_ADVICE = {
-    "gltf": "no animation in it moves a vertex; exporters keep the motion of bones and shape keys, but not that of "
-    "modifiers, physics or geometry nodes: bake it to shape keys, or export Alembic (.abc) or USD (.usdc)",
-    "usd": "it has no samples in time; export it with its animation, over the range of frames",
-    "alembic": "it has no samples in time; export it with its animation, over the range of frames",
-    "sequence": "each file of this format is a frame; number the files of a motion and name any one of them",
-    "vtk": "each file of this format is a frame; number the files of a motion and name any one of them",
-    "xdmf": "it has no series in time; write each step as a grid of a temporal collection",
-}  # What a format of that name says of a file of one frame, and what to do for a motion.
 FRAME_SUFFIXES = (*_MESHES, *_VTK)  # Formats that have one file per frame.
 SERIES = ".series"  # The suffix, behind that of the files, of ParaView's indices in JSON.
 NUMBER_PATTERN = re.compile(r"([^#%]*)(#+|%0?(\d?)d)([^#%]*)", re.DOTALL)
@@ -379,51 +370,12 @@ def read(
         return in_scene(clip, unit, up_axis)
 
 
-def warn_of_still(
-    clip: MotionClip, path: str | PathLike[str], format: str | None = None, axes: str | Sequence[str] | None = None
-) -> None:
-    """Warn of a source of one frame that is about to be encoded: a file without a motion looks like one that lost it.
-
-    Parameters
-    ----------
-    clip : MotionClip
-        What `read` returned.
-    path : str or path
-        The file.
-    format : str, optional
-        The name of its format, if `read` was told that.
-    axes : str or sequence of str, optional
-        The axes that `read` was told: those of a single frame ask for it.
-    """
-    order = None if axes is None else parse_order(axes)
-    if clip.frame_count != 1 or order is not None and not any(FRAMES in axis for axis in order):
-        return
-    kind = find_format(path) if format is None else format_named(format, formats())
-    if not kind.has_series and _numbered_beside(path):  # `read` has warned of that.
-        return
-    advice = STILL_ADVICE.get(kind.name, "for a motion, write several frames")
-    warnings.warn(
-        f"{os.fspath(path)}: holds a single frame, so the plant stands still: {advice}; if one pose is meant, pass "
-        "--still (in Python, encode the clip of athcodec.read)",
-        GuessWarning,
-        stacklevel=3,
-    )
-
-
-def _numbered_beside(path: str | PathLike[str]) -> list[str]:
-    """Return the names of other files that are numbered like frames of the same motion."""
-    from athcodec.sources.numbering import numbered_files  # It imports this module.
-
-    with suppress(ClipError, OSError):
-        return [file.name for file in numbered_files(path).paths if file != Path(path)]
-    return []
-
-
 def _warn_of_frames(path: str | PathLike[str]) -> None:
     """Warn of a file whose format has all frames in one file, where others beside it are numbered like frames."""
-    from athcodec.sources.numbering import some  # It imports this module.
+    from athcodec.sources.numbering import some  # They import this module.
+    from athcodec.sources.one_frame import numbered_beside
 
-    if others := _numbered_beside(path):
+    if others := numbered_beside(path):
         warnings.warn(
             f"{os.fspath(path)}: read as one frame, without {some(others)}: numbered files of this format are not read "
             "as one motion; write all frames into one file, or numbered OBJ, PLY or VTK files",

@@ -23,6 +23,7 @@ from athcodec.motion.quaternions import normalized, rotation_matrices
 from athcodec.untyped import JsonObject
 
 TRS = {"translation": [0.0, 0.0, 0.0], "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 1.0, 1.0]}
+BONES = "ATH_bones"  # In the extras of a glTF node that athcodec wrote: what turns the bones below it.
 COPIES = "copies"  # true in the extras of a node: those below show one shape, and are one object; false: or are not
 POINTER, NODE_VISIBILITY = "KHR_animation_pointer", "KHR_node_visibility"
 PLAYED = (*TRS, "weights", "visible")  # Properties of nodes that animations move.

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from athcodec.files.gltf.document import MESHOPT, GltfFile
 from athcodec.files.gltf.json import entries, entry, extension
 from athcodec.files.gltf.motion import EXTENSION
-from athcodec.sources.gltf_scene import COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
-from athcodec.sources.scene_objects import BONES, FLIPPED, GUESSED, OWN
+from athcodec.sources.gltf_scene import BONES, COPIES, NODE_VISIBILITY, POINTED, POINTER, Scene
+from athcodec.sources.scene_objects import FLIPPED, GUESSED, OWN
 from athcodec.untyped import JsonObject, JsonValue
 
 if TYPE_CHECKING:

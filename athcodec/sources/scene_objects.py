@@ -31,7 +31,6 @@ CHANGING = (
     ": points that appear or vanish cannot be read; write them as copies of a mesh with ids, or read other objects "
     "with --only"
 )
-BONES = "ATH_bones"  # In the extras of a glTF node that athcodec wrote: what turns the bones below it.
 GUESSED = "guessed"  # In what our writers add: names of what the clip does not state, so that it is not read as stated.
 SCHEME = "subdivisionScheme"  # The key of USD's word in the details of a mesh; without it the faces are the surface.
 SURFACE = ("holes", "holeIndices", "creaseIndices", "cornerIndices", "interpolateBoundary")  # They shape that surface.
