@@ -12,6 +12,8 @@ import athcodec
 from athcodec import Thresholds, encoding
 from athcodec.decoding import container as ct
 from athcodec.encoding import decisions
+from athcodec.encoding.assembly.assembly import FileAssembly
+from athcodec.encoding.assembly.segment_coding import SegmentCoder
 from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.segments.layers import layer_ratios
 from athcodec.encoding.segments.levels import MOST_JERK, SourceFrames
@@ -398,3 +400,45 @@ def test_layers_are_finer_where_too_few_coarse_ones_move_as_smoothly_as_the_sour
         assert len(before.levels) < len(after.levels)
     coded = encoding.code_segments(clip, made, range(made.segment_count))
     assert encoding.write(clip, made, coded, tmp_path / "parts.ath").path.read_bytes() == finer
+
+
+def test_segments_that_were_coded_to_count_levels_are_coded_once_if_they_are_joined_to_no_other(monkeypatch):
+    plants = {
+        name: plant(seed=4, branches=5, longest=5, frames=frames) for name, frames in (("calm", 16), ("gale", 20))
+    }
+    clip, coded, motion = athcodec.join(plants), [], SegmentCoder._motion
+
+    def counted(coder, index, *rest):
+        coded.append(index)
+        return motion(coder, index, *rest)
+
+    monkeypatch.setattr(SegmentCoder, "_motion", counted)
+    monkeypatch.setattr(decisions, "LEVELS_BYTES", 1 << 20)
+    athcodec.encode(clip, rel_error=1e-4, effort="fast")
+    assert sorted(coded) == [0, 1]
+
+
+def test_levels_are_counted_by_the_errors_that_a_file_states(monkeypatch):
+    """Those of frames that another pose stands for included."""
+    clip, tables, chosen = plant(seed=4, branches=5, longest=5, frames=16), [], FileAssembly._chosen_levels
+    positions = np.repeat(clip.positions, 2, axis=0)
+    positions[1::2] += 1e-6 * np.linalg.norm(np.ptp(clip.rest, axis=0))
+    held = clip.replace(positions=positions, time=np.arange(32) / 30)
+
+    def kept(assembly, errors, *rest):
+        tables.append(errors)
+        return chosen(assembly, errors, *rest)
+
+    monkeypatch.setattr(FileAssembly, "_chosen_levels", kept)
+    monkeypatch.setattr(decisions, "LEVELS_BYTES", 0)
+    athcodec.encode(held, rel_error=1e-3, ladder="decades", effort="fast")
+    counted, *_, stated = tables
+    assert len(tables) > 1 and np.array_equal(counted, stated)
+
+
+def test_coding_segments_to_count_levels_counts_as_work(monkeypatch):
+    clip = plant(seed=4, branches=5, longest=5, frames=32)
+    monkeypatch.setattr(decisions, "LEVELS_BYTES", 0)
+    monkeypatch.setattr(decisions.FileDecisions, "_typical_work", lambda *_: 1e30)
+    draft = encoding.draft(clip, rel_error=1e-4, segment_frames=16)
+    assert "levels" in draft.choice.untried

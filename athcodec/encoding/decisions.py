@@ -162,27 +162,48 @@ class FileDecisions:
             if len(decided.layers.each) == 1:
                 options = dataclasses.replace(options, ladder=())
             decided = dataclasses.replace(holding, options=options)._of_choice(choice, decided.ath.thresholds)
-        decided = holding._with_levels(decided)
+        decided = holding._with_levels(decided, work)
         untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
         decided.choice = dataclasses.replace(decided.choice, untried=untried)
         return decided
 
-    def _with_levels(self, decided: Decided) -> Decided:
+    def _with_levels(self, decided: Decided, work: Work) -> Decided:
         """Return what is decided with finer layers where motion moves less smoothly in coarse ones than in the source,
         as in calms between gusts, so that too few stages are fit for levels."""
-        if not self._has_usual_ladder or len(decided.layers.each) == 1 or self._estimated_bytes(decided) < LEVELS_BYTES:
+        if not self._has_usual_ladder or len(decided.layers.each) == 1:
             return decided
-        options = dataclasses.replace(self.options, segment_frames=decided.source.segment_frames)
-        decisions, most = dataclasses.replace(self, options=options), self._level_count(decided)
-        best, choice = decided, decided.choice
-        for part in FINER_LADDERS:
-            if most >= LEAST_LEVELS:
-                break
-            finer = dataclasses.replace(choice, ladder=tuple(part * error for error in options.ladder))
-            other = decisions._of_choice(finer, decided.ath.thresholds)
-            count = self._level_count(other)
-            best, most = (other, count) if count > most else (best, most)
-        return best
+        with work.trying("levels"):
+            if not self._may_code_typical_segments(decided, work) or self._estimated_bytes(decided) < LEVELS_BYTES:
+                return decided
+            options = dataclasses.replace(self.options, segment_frames=decided.source.segment_frames)
+            decisions, most = dataclasses.replace(self, options=options), self._level_count(decided)
+            best, choice, each = decided, decided.choice, self._typical_work(decided)
+            for part in FINER_LADDERS:
+                if most >= LEAST_LEVELS or not work.fits(each):
+                    break
+                work.add(each)
+                finer = dataclasses.replace(choice, ladder=tuple(part * error for error in options.ladder))
+                other = decisions._of_choice(finer, decided.ath.thresholds)
+                count = self._level_count(other)
+                best, most = (other, count) if count > most else (best, most)
+            return best
+
+    def _may_code_typical_segments(self, decided: Decided, work: Work) -> bool:
+        """Return whether typical segments are coded, or there is work left to code them. It counts unless the file
+        takes all of them as they are then."""
+        typical = [segment for segment, _ in typical_segments(decided.source)]
+        if all(segment in decided.tried or decided.source.stands_alone(segment) for segment in typical):
+            return True
+        each = self._typical_work(decided)
+        if not work.fits(each):
+            return False
+        work.add(each)
+        return True
+
+    def _typical_work(self, decided: Decided) -> float:
+        """Return the work of coding typical segments."""
+        frames = sum(decided.source.frames_of(segment) for segment, _ in typical_segments(decided.source))
+        return self._coding_work(decided.choice.settings.bound, frames)
 
     def _level_count(self, decided: Decided) -> int:
         """Return the number of levels of a file, as far as typical segments tell."""

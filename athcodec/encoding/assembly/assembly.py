@@ -228,7 +228,7 @@ class FileAssembly:
             if segment.index not in missing:
                 raise ValueError(f"segments: got {segment.index} twice or beyond the last, expected each once")
             missing.remove(segment.index)
-            errors[:, segment.index] = segment.errors + decided.source.replaced_error
+            errors[:, segment.index] = self._errors(segment)
             joins[:, segment.index] = segment.joins
             flaws[:, segment.index] = segment.flaws
             for (stage, kind), payload in segment.chunks.items():
@@ -244,9 +244,14 @@ class FileAssembly:
 
     def levels_of(self, coded: Sequence[CodedSegment]) -> list[int]:
         """Return which stages become levels, as far as some of the segments tell."""
-        errors, flaws = (np.stack([getattr(one, name) for one in coded], axis=1) for name in ("errors", "flaws"))
+        errors = np.stack([self._errors(one) for one in coded], axis=1)
+        flaws = np.stack([one.flaws for one in coded], axis=1)
         frames = [self.decided.source.segments[one.index] for one in coded]
         return self._chosen_levels(errors, [[stop - start for start, stop in frames]], flaws)
+
+    def _errors(self, segment: CodedSegment) -> np.ndarray:
+        """Return the errors of a segment about the source, (stages, 3), and not about what is coded in its place."""
+        return segment.errors + self.decided.source.replaced_error
 
     def _chosen_levels(self, errors: np.ndarray, frames: Sequence[Sequence[int]], flaws: np.ndarray) -> list[int]:
         """Return which stages become levels; frames: of each segment of each clip."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -26,10 +27,16 @@ class SegmentCoder:
     report: Progress = silent
 
     def coded(self, segments: Sequence[int]) -> Iterator[CodedSegment]:
-        """Yield coded segments, as many at a time as there is memory for."""
+        """Yield coded segments, as many at a time as there is memory for, after those that were coded to compare and
+        are joined to no other."""
         decided, source = self.decided, self.decided.source
-        if len(source.segments) == 1 and decided.tried:
-            return iter(decided.tried.values())
+        alone = {index for index in segments if index in decided.tried and source.stands_alone(index)}
+        others = [index for index in segments if index not in alone]
+        tried = (decided.tried[index] for index in sorted(alone))
+        return chain(tried, self._coded(others)) if others else tried
+
+    def _coded(self, segments: Sequence[int]) -> Iterator[CodedSegment]:
+        decided, source = self.decided, self.decided.source
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
 

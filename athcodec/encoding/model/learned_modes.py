@@ -17,6 +17,7 @@ import numpy as np
 from athcodec._native import SHAPE_MODES, address, lib
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import LEARNED_NUMBERS, LearnedModes, Plan, SegmentMotion
+from athcodec.files.threads import ranges
 from athcodec.motion.algebra import multiply, principal, solve
 
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
@@ -147,6 +148,9 @@ def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
 
 def estimated_bits(integers: np.ndarray, pieces: np.ndarray, piece_count: int) -> np.ndarray:
     """Return about how many bits integers (K, ...) of pieces (K,) take in a stream, (piece_count,)."""
-    busy = np.flatnonzero(integers)
-    bits = 2.0 * qz.bits(np.abs(integers.reshape(-1)[busy]).astype(np.float64)) + 1.0
-    return np.bincount(pieces[busy // math.prod(integers.shape[1:])], bits, piece_count)
+    total, size = np.zeros(piece_count), math.prod(integers.shape[1:])
+    for start, stop in ranges(len(pieces), size):
+        busy = np.flatnonzero(integers[start:stop])
+        bits = 2.0 * qz.bits(np.abs(integers[start:stop].reshape(-1)[busy]).astype(np.float64)) + 1.0
+        total += np.bincount(pieces[start + busy // size], bits, piece_count)  # Parts of bits add up exactly.
+    return total

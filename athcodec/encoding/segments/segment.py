@@ -240,6 +240,10 @@ class Source:
         following = {segment + 1, *self.clip_range_starts} - {len(self.segments)}
         return any(self.segment_before(other) == segment for other in following)
 
+    def stands_alone(self, segment: int) -> bool:
+        """Return whether a segment is all of its clip, so that it is joined to no other."""
+        return self.segment_before(segment) is None and not self.goes_on(segment)
+
     @cached_property
     def mesh(self) -> Mesh | None:
         """Faces that rest poses may go by."""
