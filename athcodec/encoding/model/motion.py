@@ -142,6 +142,11 @@ class Plan:
     def stage_count(self) -> int:
         return self.height + 2
 
+    @property
+    def bases_bytes(self) -> int:
+        """Bytes of the bases."""
+        return 0 if self.bases is None else self.bases.nbytes
+
     def set_rest(self, rest: np.ndarray, bases: bool = True, like: Plan | None = None) -> None:
         """Set the decoded rest pose, (N, 3) float64, and build the bases on it, if they are wanted. like: a plan whose
         bases serve if it has the same pose and pieces."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.options.features import Feature
 from athcodec.encoding.options.shape import LENGTH_STEP
 from athcodec.encoding.search.choices import rest
 from athcodec.encoding.search.choices.forms import first_forms
@@ -58,8 +59,11 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
         lags=rest.lags(source, settings.rest_step, settings.details),
         coarsest_rest_step=qz.single(LENGTH_STEP * source.rest_error),
     )
-    refined = rest.connected_if_smaller(source, ath, refined)
     size = rest.judge(source, ath, layered_poses_size)
+    rings = rest.ring_lags(refined)
+    if Feature.ADAPTIVE not in source.without and not np.array_equal(rings, refined.lags):
+        refined = min(refined, replace(refined, lags=rings), key=lambda settings: size(settings, ratios))
+    refined = rest.connected_if_smaller(source, ath, refined)
     return at_once if size(at_once, ratios) < AT_ONCE_SHARE * size(refined, ratios) else refined
 
 

@@ -33,6 +33,7 @@ from athcodec.encoding.segments.segment import (
     stage_streams,
     thread_count,
     time_components,
+    uncoded_plan,
 )
 from athcodec.encoding.segments.settings import Key, Settings
 from athcodec.encoding.segments.time_bases import TimeComponents
@@ -44,6 +45,7 @@ TimeComponentsOfSamples: TypeAlias = list[dict[int | None, TimeComponents]]
 """For each sample its components over time by stage; None: those of all stages."""
 
 PRELUDES_KEPT = 6  # Hierarchies and rest poses that are kept between trials.
+PRELUDE_BYTES = 1 << 28  # Bytes that the bases of those of a large plant may take, unless one alone takes more.
 
 
 @dataclass(eq=False)
@@ -170,7 +172,8 @@ class Trials:
                 squares = float(np.square(prelude.plan.pieces["count"]).sum())
                 self.work.add(progress.POSE * self.source.clip.vertex_count + progress.PIECE * squares)
             self._preludes[key] = prelude
-            while len(self._preludes) > PRELUDES_KEPT:
+            most = min(PRELUDES_KEPT, max(1, PRELUDE_BYTES // max(1, prelude.plan.bases_bytes)))
+            while len(self._preludes) > most:
                 self._preludes.pop(next(iter(self._preludes)))
         return prelude
 
@@ -272,7 +275,9 @@ class Trials:
         return stages * sample.scale
 
     def _keeps_bound(self, settings: Settings) -> bool:
-        """Return whether a rest pose keeps the bound; its prelude is there for later calls."""
+        """Return whether a rest pose keeps the bound; its prelude is there for later calls, if there is room for it."""
+        if settings.prelude_key in self._seen_preludes:
+            return True
         try:
             self.prelude(settings)
         except BoundError:
@@ -294,7 +299,7 @@ class Trials:
         key = *_before_modes(settings), settings.stage_steps.tobytes(), settings.periodic, only_common
         if key not in self._time_components:
             prelude = self.prelude(settings)  # Layers learn about the coded pose of the last one.
-            plan = prelude.plan if self.is_layered else prelude.uncoded_plan
+            plan = prelude.plan if self.is_layered else self._uncoded_plan(settings)
             stages = [*(stage for stage in range(self.stages) if plan.has_stems(stage) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
@@ -306,13 +311,18 @@ class Trials:
             self._time_components[key] = settings.step, learned
         return self._time_components[key]
 
+    def _uncoded_plan(self, settings: Settings) -> Plan:
+        """Return the plan on the rest pose before it is coded. What is learned on it is kept, and it is not: its bases
+        may take more memory than the positions of a segment."""
+        return uncoded_plan(self.source, self.ath, settings)
+
     def _learn_modes(self, settings: Settings) -> Components:
         """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
         coded, count = settings.learned_coded, len(self.source.segments)
         key = _before_modes(settings) + (settings.prelude_key if coded else ())
         if key not in self._components:
             prelude = self.prelude(settings)
-            plan = prelude.plan if coded else prelude.uncoded_plan
+            plan = prelude.plan if coded else self._uncoded_plan(settings)
             chosen = spread(count, LEARNING_SEGMENTS)
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)

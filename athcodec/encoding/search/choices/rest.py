@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from athcodec._native import SHEET
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.options.features import Feature
@@ -102,14 +103,21 @@ def best_slack(settings: Settings, trials: Trials) -> Settings:
     return trials.cheapest([best, with_best_rest(source, trials.ath, best)])
 
 
+def ring_lags(settings: Settings) -> np.ndarray:
+    """Return the lags of the settings, (B,) int32, but for tubes the vertices of a ring: a tube's vertices go on from
+    the two rings before them, however thin the tube is."""
+    return np.where(settings.forms > SHEET, settings.forms, settings.lags).astype(np.int32)
+
+
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
-    """Return settings whose stems have other lags (FORMAT.md, Lag): at most 1, at least 1, 1 for all, or for short
-    stems as many as they have vertices, so that each is coded about the one before it."""
+    """Return settings whose stems have other lags (FORMAT.md, Lag): at most 1, at least 1, 1 for all, for short stems
+    as many as they have vertices, so that each is coded about the one before it, or for tubes those of a ring."""
     if Feature.ADAPTIVE in source.without:
         return []
     best, count = settings.lags, source.hierarchy.stem_count
     no_beam = np.maximum(best, 1)
     others = [np.minimum(best, 1), no_beam, np.ones_like(best), np.where(count <= qz.SHORT_STEM, count, no_beam)]
+    others.append(ring_lags(settings))
     if source.still:
         others += [np.full_like(best, 3), np.full_like(best, 4), np.minimum(2 * no_beam, qz.MOST_LAG)]
     tried = {lag.astype(np.int32).tobytes() for lag in others} - {best.tobytes()}
