@@ -77,7 +77,7 @@ FIXED: Mapping[str, Sequence[str]] = {
     "streams": ("FIRST", "LAST"),
     "survey": ("MAX_DEPTH", "_READ_VALUES", "_WORK_VERTICES"),
     "time_bases": ("LEAST_STEP", "MOST_STEP"),
-    "trials": ("PRELUDES_KEPT",),
+    "trials": ("PRELUDES_KEPT", "PRELUDE_BYTES"),
     "writing": ("BY_STEP", "BY_RATE", "ONE_BY_ONE", "IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
     "polygons": ("PLACES_IN_ROWS", "CORNERS_OF_REST", "FACES_OF_REST", "MESH_PARTS"),
     "attachment": ("QUERY",),
