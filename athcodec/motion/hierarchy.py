@@ -1,7 +1,7 @@
 """The branch hierarchy: the parent of every branch, and the vertex order in which every subtree is one range.
 
-Built from branch labels, or derived from an edge graph by following the larger subtree at every fork, so that
-branch orders count as botanists count them (trunk 0, its branches 1 ...). Edge graphs are rooted by an Euler
+Built from branch labels, or derived from an edge graph by going straight on at every fork, so that branch orders count
+as botanists count them (trunk 0, its branches 1 ...) and a stem has no kinks, which would move as no beam does. Edge graphs are rooted by an Euler
 tour and pointer doubling (Tarjan and Vishkin, "An efficient parallel biconnectivity algorithm", SIAM J.
 Comput. 14(4), 1985), which takes a logarithmic number of array operations however deep the tree is. It looks
 at the rest pose only, never at the motion.
@@ -20,6 +20,7 @@ from athcodec.motion.protocol import Motion
 from athcodec.options import whole
 
 MAX_VERTICES = 2**31 - 1
+STRAIGHT = 64  # Steps of the cosine of an angle at a fork, within which ways are as straight: about 10 degrees at 0.
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -191,17 +192,17 @@ def branches_from_edges(
 
     edges (E, 2) joins vertices 0 .. vertex_count - 1 in either direction; an edge given twice counts once.
     Each connected part is rooted at the vertex of `root` that lies in it, else at its lowest vertex along
-    up_axis ("y", "z", "-z" ...) in rest (N, 3). At a fork the stem goes on into the subtree with most
-    vertices (the lowest vertex number, if equal) and the others start branches. Branches are numbered in
-    depth-first preorder, siblings from base to tip.
+    up_axis ("y", "z", "-z" ...) in rest (N, 3). At a fork the stem goes straight on, as far as rest shows it, else
+    into the subtree with most vertices (the lowest vertex number, if equal), and the others start branches. Branches
+    are numbered in depth-first preorder, siblings from base to tip.
 
     Raises ClipError if the edges close a cycle (it names one edge of it) or root is not usable.
     """
     edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)
-    roots = _choose_roots(tour.part, np.asarray(rest, np.float64), root, up_axis)
-    parent, subtree_size = tour.rooted_at(roots)
-    head, stem_index = _follow_larger_subtree(parent, subtree_size)
+    points = np.asarray(rest, np.float64)
+    parent, subtree_size = tour.rooted_at(_choose_roots(tour.part, points, root, up_axis))
+    head, stem_index = _follow_straight(parent, subtree_size, points)
 
     heads = np.flatnonzero(head == np.arange(vertex_count))
     vertex_branch = np.searchsorted(heads, head)
@@ -333,10 +334,13 @@ def _parse_axis(up_axis: str) -> tuple[int, float]:
     return "xyz".index(name), -1.0 if str(up_axis).startswith("-") else 1.0
 
 
-def _follow_larger_subtree(parent: np.ndarray, subtree_size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _follow_straight(
+    parent: np.ndarray, subtree_size: np.ndarray, rest: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the first vertex of every vertex's stem, and the vertex's place on that stem."""
     children = np.flatnonzero(parent >= 0)
-    by_fork = children[np.lexsort((children, -subtree_size[children], parent[children]))]
+    straightness = np.round(STRAIGHT * _cosines(parent, children, rest))
+    by_fork = children[np.lexsort((children, -subtree_size[children], -straightness, parent[children]))]
     goes_on = by_fork[np.unique(parent[by_fork], return_index=True)[1]]
     head = np.arange(len(parent))
     head[goes_on] = parent[goes_on]
@@ -344,6 +348,18 @@ def _follow_larger_subtree(parent: np.ndarray, subtree_size: np.ndarray) -> tupl
     for _ in range(len(parent).bit_length()):
         place, head = place + place[head], head[head]
     return head, place
+
+
+def _cosines(parent: np.ndarray, children: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return the cosine of the angle by which the way turns at the parent of each child, (C,); 0 at a root, and where
+    two of the vertices coincide."""
+    fork = parent[children]
+    after = rest[children] - rest[fork]
+    before = np.where(parent[fork, None] >= 0, rest[fork] - rest[parent[fork]], 0.0)
+    product, square, other = ((a * b).T for a, b in ((before, after), (before, before), (after, after)))
+    lengths = np.sqrt(square[0] + square[1] + square[2]) * np.sqrt(other[0] + other[1] + other[2])
+    cosines: np.ndarray = (product[0] + product[1] + product[2]) / np.where(lengths > 0, lengths, 1.0)
+    return cosines
 
 
 def _closing_edge(edges: np.ndarray, vertex_count: int) -> int:

@@ -14,10 +14,10 @@ import numpy as np
 from athcodec.encoding.clip.places import PlacedClip
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.motion.branches.grown_pose import with_grown_branches
-from athcodec.motion.branches.result import Found
+from athcodec.motion.branches.result import Found, hierarchy_on
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.frames import Frames
-from athcodec.motion.hierarchy import Hierarchy, build_hierarchy
+from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import Polygons
 
 
@@ -39,13 +39,14 @@ def hierarchy_and_pose(
     """Return the hierarchy of a clip's places, and the pose that their motion is coded about, (P, 3) float64 in file
     order: the rest pose, or one that shows more of the plant. branches: those that were found for a clip without."""
     clip = placed.clip
-    on = clip if branches is None else branches
-    assert on.vertex_branch is not None and on.branch_parent is not None
     if options.keeps_rest:
         pose = host_rest(clip) if options.host_rest else clip.rest
     else:
         pose = placed.grown_pose
-    hierarchy = build_hierarchy(on.vertex_branch, on.branch_parent, pose, clip.edges, on.stem_index)
+    if branches is None:
+        assert clip.vertex_branch is not None and clip.branch_parent is not None
+        branches = Found(clip.vertex_branch, clip.branch_parent, clip.stem_index, "file")
+    hierarchy = hierarchy_on(branches, pose, clip.edges)
     if not options.keeps_rest:
         pose = with_grown_branches(pose, clip, hierarchy)
     return hierarchy, pose[hierarchy.vertex_source].astype(np.float64)

@@ -84,7 +84,8 @@ class PlacedClip:
         of_place = self.places.of_vertex[other.places.first]
         branch = branches.vertex_branch[of_place]
         stem_index = None if branches.stem_index is None else stem_index_of(branch, branches.stem_index[of_place])
-        return replace(branches, vertex_branch=branch, stem_index=stem_index)
+        links = None if branches.links is None else other.places.of_vertex[self.places.first[branches.links]]
+        return replace(branches, vertex_branch=branch, stem_index=stem_index, links=links)
 
 
 def find_places(

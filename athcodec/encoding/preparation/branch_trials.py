@@ -20,10 +20,10 @@ from athcodec.encoding.search.still import STILL_SHARE
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
 from athcodec.motion.branches.finding import candidates, named_labels
-from athcodec.motion.branches.result import Found, with_branches
+from athcodec.motion.branches.result import Found, hierarchy_on, with_branches
 from athcodec.motion.branches.still import clip_among, joined, still_parts
 from athcodec.motion.clip import MotionClip, stands_still
-from athcodec.motion.hierarchy import branch_orders, hierarchy_of
+from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_SEGMENT
 
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
@@ -106,7 +106,7 @@ class Trial:
         """Return about the bytes of the whole clip's file on these branches, and whether its motion is predicted;
         infinite if the bound cannot be kept."""
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
-        hierarchy = hierarchy_of(clip)
+        hierarchy = hierarchy_on(branches, clip.rest, clip.edges)
         self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
         coded = CodedClip(
             PlacedClip.of(clip),

@@ -113,7 +113,10 @@ def carried(branches: Found, frames: np.ndarray) -> Found | None:
     above = np.append(np.where(roots, len(parent), parent), -1)
     index = None if branches.stem_index is None else place
     return dataclasses.replace(
-        checked_branches(label, above, place, branches.method), stem_index=index, array_name=branches.array_name
+        checked_branches(label, above, place, branches.method),
+        stem_index=index,
+        array_name=branches.array_name,
+        links=branches.links,
     )
 
 

@@ -376,7 +376,8 @@ def _by_runs(seen: Seen, root: int | None) -> Found | None:
     if links is None:
         return None
     bases = base_points(frames, links, root)
-    return Found(*branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist()), "runs")
+    branches = branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist())
+    return Found(*branches, "runs", links=links)
 
 
 def _by_motion(seen: Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec.motion.clip import MotionClip, check_branches, check_stem_index
-from athcodec.motion.hierarchy import branch_orders
+from athcodec.motion.hierarchy import Hierarchy, branch_orders, build_hierarchy
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,6 +26,9 @@ class Found:
         How they were found: "attributes", "skeleton", "edges", "components", "runs", "motion", or "file".
     array_name : str, optional
         The name of the array that was taken for the numbers of branches.
+    links : (L, 2) integer array, optional
+        Pairs of vertices, of a branch and of its parent, by which the encoder hangs branches on each other; a branch
+        without one hangs on the vertex of its parent that is nearest to its base.
 
     Examples
     --------
@@ -39,6 +42,7 @@ class Found:
     stem_index: np.ndarray | None
     method: str
     array_name: str = ""
+    links: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f"<Found: {self}>"
@@ -57,6 +61,18 @@ class Found:
 def checked_branches(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: np.ndarray, method: str) -> Found:
     vertex_branch, parent = check_branches(vertex_branch.astype(np.int64), parent.astype(np.int64), len(vertex_branch))
     return Found(vertex_branch, parent, check_stem_index(stem_index.astype(np.int64), vertex_branch), method)
+
+
+def hierarchy_on(branches: Found, rest: np.ndarray, edges: np.ndarray | None) -> Hierarchy:
+    """Return the hierarchy of branches that were found for a clip with a rest pose, (N, 3), and edges."""
+    links = [pairs for pairs in (edges, branches.links) if pairs is not None]
+    return build_hierarchy(
+        branches.vertex_branch,
+        branches.branch_parent,
+        rest,
+        np.concatenate(links) if links else None,
+        branches.stem_index,
+    )
 
 
 def with_branches(clip: MotionClip, branches: Found) -> MotionClip:

@@ -158,7 +158,12 @@ def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) 
         place[some] = source_stem_index(branches.vertex_branch) if index is None else index
     above = standing.branch_parent.astype(np.int64)
     parent = np.concatenate([moving.branch_parent, np.where(above < 0, -1, above + first)])
-    branches = checked_branches(label, parent, place, moving.method)
+    joint = checked_branches(label, parent, place, moving.method)
     if moving.stem_index is None and standing.stem_index is None:
-        branches = replace(branches, stem_index=None)
-    return replace(branches, array_name=moving.array_name)
+        joint = replace(joint, stem_index=None)
+    links = [
+        np.flatnonzero(some)[branches.links]
+        for some, branches in ((~still, moving), (still, standing))
+        if branches.links is not None
+    ]
+    return replace(joint, array_name=moving.array_name, links=np.concatenate(links) if links else None)
