@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from athcodec.motion.branches.forest import cheapest_forest
+from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
 from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
@@ -29,6 +29,8 @@ RELATED = 0.5  # Cost factor for each word that the names of two branches have i
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
 ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
 WORTH_LEVELS = 0.01  # Part of the bits of roots that hanging saves at least: a few in levels of their own cost more.
+LEVEL = 400.0  # Bits of a level beside those of its branches: components over time, statistics.
+LEVEL_SHARE = 0.003  # The same of many branches, as a share of all bits.
 MOST_STRAIN = 30.0  # Bits at most that a contact costs because it is far or does not stay.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
@@ -83,12 +85,10 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
     if root is not None:
         alone += hanging.sum() + alone.sum()
         alone[label[root]] = 0.0
-    every = np.arange(count)
-    chosen = cheapest_forest(
-        *(count, np.append(child, every), np.append(parent, np.full(count, count)), np.append(hanging, alone))
-    )
+    arcs = np.append(child, np.arange(count)), np.append(parent, np.full(count, count)), np.append(hanging, alone)
+    chosen = without_needless_orders(*arcs, cheapest_forest(count, *arcs), LEVEL, LEVEL_SHARE)
     hangs = chosen < len(child)
-    if (alone - np.append(hanging, alone)[chosen]).sum() < WORTH_LEVELS * alone.sum():
+    if (alone - arcs[2][chosen]).sum() < WORTH_LEVELS * alone.sum():
         hangs[:] = False
     base, above = _stillest(frames, label), np.full(count, -1)
     base[hangs], above[hangs] = vertices[chosen[hangs], 0], parent[chosen[hangs]]

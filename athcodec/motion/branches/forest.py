@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from athcodec.motion.branches.seen import cheapest_of_each
+from athcodec.motion.hierarchy import branch_orders
 
 
 def cheapest_forest(count: int, child: np.ndarray, parent: np.ndarray, cost: np.ndarray) -> np.ndarray:
@@ -47,3 +48,23 @@ def _cycles(above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     is_in_cycle[step] = True  # What many steps lead to: cycles, all of which they reach, and the hub.
     is_in_cycle[-1] = False
     return is_in_cycle, np.where(is_in_cycle, least, every)
+
+
+def without_needless_orders(
+    child: np.ndarray, parent: np.ndarray, cost: np.ndarray, chosen: np.ndarray, price: float, share: float
+) -> np.ndarray:
+    """Return the choice of arcs, (B,), without the highest orders whose branches cost little more at lower ones: all
+    together at most the price of a level, and a share of all cost. Arcs are as in `cheapest_forest`, and every branch
+    has one as a root, whose parent is the number of branches."""
+    chosen, count = chosen.copy(), len(chosen)
+    most = price + share * float(cost[chosen].sum())
+    while True:
+        order = np.append(branch_orders(np.where(parent[chosen] == count, -1, parent[chosen])), -1)
+        highest = order.max()
+        lower = np.flatnonzero((order[child] == highest) & (order[parent] < highest - 1))
+        if highest < 1:
+            return chosen
+        best = lower[cheapest_of_each(child[lower], cost[lower])]
+        if (cost[best] - cost[chosen[child[best]]]).sum() > most:
+            return chosen
+        chosen[child[best]] = best
