@@ -3,6 +3,7 @@ compressed; what was found can be kept, edited and used again."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections import Counter
 from pathlib import Path
@@ -20,6 +21,7 @@ from athcodec.encoding.preparation.branch_trials import best_branches
 from athcodec.encoding.search.progress import Work, allowed_work
 from athcodec.errors import ClipError
 from athcodec.motion.branches import finding, saving, seen
+from athcodec.motion.branches.result import Found, hierarchy_on
 from athcodec.motion.clip import Skin, source_stem_index
 from athcodec.motion.hierarchy import branch_orders
 from bench.odd.grass import ORDERS, grass
@@ -246,6 +248,21 @@ def test_loose_points_of_a_tree_get_its_centre_lines():
         ours = np.sort(np.stack([order[:-1], order[1:]], axis=1)[along], axis=1)
         edges = set(map(tuple, np.sort(sample.edges, axis=1).tolist()))
         assert sum(tuple(pair) in edges for pair in ours.tolist()) > 0.98 * len(ours)
+
+
+def test_stems_of_loose_points_end_where_those_of_the_tree_do():
+    with athcodec.read_hdf5(athcodec.sample_path()) as sample:
+        found = athcodec.find_branches(bare(sample, edges=None))
+        order = np.lexsort((found.stem_index, found.vertex_branch))
+        along = found.vertex_branch[order[1:]] == found.vertex_branch[order[:-1]]
+        assert (sample.vertex_branch[order[1:]] == sample.vertex_branch[order[:-1]])[along].all()
+
+
+def test_a_branch_that_was_found_hangs_on_the_vertex_that_its_link_names():
+    rest = np.array([[0, 0, 0], [0, 1, 0], [0, 2, 0], [0.1, 2, 0], [1, 2, 0]], float)
+    found = Found(np.array([0, 0, 0, 1, 1]), np.array([-1, 0]), None, "runs", links=np.array([[1, 3]]))
+    assert hierarchy_on(found, rest, None).attach.tolist() == [-1, 1]
+    assert hierarchy_on(dataclasses.replace(found, links=None), rest, None).attach.tolist() == [-1, 2]
 
 
 def sheet(frames: int = 24) -> np.ndarray:

@@ -118,18 +118,40 @@ def test_each_part_is_rooted_at_its_lowest_vertex(forest):
         assert rest[base, 2] == rest[h.vertex_source[first:stop], 2].max()
 
 
+def turned_by(rest, before, fork, after):
+    """The cosine of the angle by which a way turns, 0 where two vertices coincide."""
+    ways = rest[fork] - rest[before], rest[after] - rest[fork]
+    lengths = np.prod([np.linalg.norm(way) for way in ways])
+    return ways[0] @ ways[1] / lengths if lengths else 0.0
+
+
 @given(random_forests())
-def test_the_stem_goes_on_into_the_larger_subtree(forest):
+def test_the_stem_goes_straight_on_or_else_into_the_larger_subtree(forest):
     edges, count, rest = forest
     labels, parent, places = branches_from_edges(edges, count, rest)
     h = build_hierarchy(labels, parent, rest, edges, places)
+    rest = rest[h.vertex_source]
     for b in np.flatnonzero(h.attach >= 0):
-        stem_end = h.first_vertex[h.branch_parent[b]] + h.stem_count[h.branch_parent[b]]
+        stem, fork = h.branch_parent[b], h.attach[b]
+        stem_end = h.first_vertex[stem] + h.stem_count[stem]
         side = np.subtract(*h.subtree_range(b)[::-1])
-        siblings = np.flatnonzero(h.branch_parent == h.branch_parent[b])
-        later = siblings[h.attach[siblings] > h.attach[b]]
-        ahead = stem_end - 1 - h.attach[b] + sum(np.subtract(*h.subtree_range(c)[::-1]) for c in later)
-        assert ahead >= side
+        siblings = np.flatnonzero(h.branch_parent == stem)
+        later = siblings[h.attach[siblings] > fork]
+        ahead = stem_end - 1 - fork + sum(np.subtract(*h.subtree_range(c)[::-1]) for c in later)
+        assert fork + 1 < stem_end  # No stem ends where it forks.
+        before = fork - 1 if fork > h.first_vertex[stem] else h.attach[stem]
+        ways = (fork + 1, h.first_vertex[b])
+        on, aside = (0.0, 0.0) if before < 0 else (turned_by(rest, before, fork, way) for way in ways)
+        assert on > aside - 1 / 32
+        assert ahead >= side or on > aside + 1e-9
+
+
+def test_a_limb_of_many_vertices_at_the_end_of_a_trunk_does_not_take_its_tip():
+    #   0-1-2-3-4 the trunk, 2-5-6-7-8 a limb that leaves it to the side
+    edges = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [2, 5], [5, 6], [6, 7], [7, 8]])
+    rest = np.array([[0, 0], [0, 1], [0, 2], [0.1, 3], [0, 4], [1, 2.5], [2, 3], [3, 3.5], [4, 4]])
+    labels, parent, _ = branches_from_edges(edges, 9, np.column_stack([rest, np.zeros(9)]))
+    assert labels.tolist() == [0, 0, 0, 0, 0, 1, 1, 1, 1] and parent.tolist() == [-1, 0]
 
 
 def test_orders_count_from_the_trunk_outwards():

@@ -7,7 +7,9 @@ import pytest
 
 import athcodec
 from athcodec import MotionClip
-from athcodec.motion.branches.forest import cheapest_forest
+from athcodec.motion.branches import finding
+from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
+from athcodec.motion.hierarchy import branch_orders
 from bench.scenes import fields
 
 FRAMES = 32
@@ -87,6 +89,23 @@ def test_the_cheapest_forest_is_the_one_that_trying_all_finds():
             end = np.take_along_axis(step, end, axis=1)
         is_forest = (end == 5).all(axis=1)
         assert total == pytest.approx(cost[np.arange(5), every[is_forest]].sum(axis=1).min())
+
+
+def test_no_order_of_branches_is_kept_for_a_few_that_cost_little_more_without_it():
+    # Nodes 0 to 3 hang in a chain; each may hang on the root instead, or be one, for some more.
+    child, parent = np.array([[0, 4], [1, 0], [2, 1], [3, 2], [2, 0], [3, 0], [1, 4], [2, 4], [3, 4]]).T
+    cost = np.array([5.0, 1, 1, 1, 2, 3, 90, 90, 90])
+    chosen = cheapest_forest(4, child, parent, cost)
+    assert parent[chosen].tolist() == [4, 0, 1, 2]
+    for price, expected in ((0.5, [4, 0, 1, 2]), (3.5, [4, 0, 0, 0])):
+        assert parent[without_needless_orders(child, parent, cost, chosen, price, 0.0)].tolist() == expected
+
+
+def test_leaves_of_shrubs_hang_no_deeper_than_they_grow():
+    clip = fields.stems(seed=3, plants=6).clip
+    bare = clip.replace(vertex_branch=None, branch_parent=None, stem_index=None)
+    found = next(finding.candidates(bare))
+    assert branch_orders(found.branch_parent).max() == branch_orders(clip.branch_parent).max() == 1
 
 
 def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():

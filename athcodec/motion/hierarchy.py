@@ -334,9 +334,7 @@ def _parse_axis(up_axis: str) -> tuple[int, float]:
     return "xyz".index(name), -1.0 if str(up_axis).startswith("-") else 1.0
 
 
-def _follow_straight(
-    parent: np.ndarray, subtree_size: np.ndarray, rest: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _follow_straight(parent: np.ndarray, subtree_size: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the first vertex of every vertex's stem, and the vertex's place on that stem."""
     children = np.flatnonzero(parent >= 0)
     straightness = np.round(STRAIGHT * _cosines(parent, children, rest))

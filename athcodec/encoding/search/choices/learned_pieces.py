@@ -11,12 +11,14 @@ from athcodec.encoding.model.learned_modes import estimated_bits
 from athcodec.encoding.model.motion import LearnedModes
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import progress
+from athcodec.encoding.search.choices import learned_bases
 from athcodec.encoding.search.choices.forms import in_each_basis
 from athcodec.encoding.search.choices.steps import walked
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
+HOPELESS_UNTURNED = 1.1  # Motion that is so many times larger without rotations is not tried with learned modes.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
@@ -46,6 +48,9 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
+    if any(settings.rotation_step_factors) and any(settings.learned_bases):
+        unturned = trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials))
+        starts += [unturned] if trials.cost(unturned) <= HOPELESS_UNTURNED * trials.cost(settings) else []
     return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
 
 
