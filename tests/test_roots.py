@@ -97,8 +97,8 @@ def test_no_order_of_branches_is_kept_for_a_few_that_cost_little_more_without_it
     cost = np.array([5.0, 1, 1, 1, 2, 3, 90, 90, 90])
     chosen = cheapest_forest(4, child, parent, cost)
     assert parent[chosen].tolist() == [4, 0, 1, 2]
-    for price, expected in ((0.5, [4, 0, 1, 2]), (3.5, [4, 0, 0, 0])):
-        assert parent[without_needless_orders(child, parent, cost, chosen, price, 0.0)].tolist() == expected
+    for price, each, expected in ((0.5, 9, [4, 0, 1, 2]), (9, 0.5, [4, 0, 1, 2]), (3.5, 9, [4, 0, 0, 0])):
+        assert parent[without_needless_orders(child, parent, cost, chosen, price, each)].tolist() == expected
 
 
 def test_leaves_of_shrubs_hang_no_deeper_than_they_grow():

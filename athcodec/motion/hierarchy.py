@@ -1,10 +1,10 @@
 """The branch hierarchy: the parent of every branch, and the vertex order in which every subtree is one range.
 
-Built from branch labels, or derived from an edge graph by going straight on at every fork, so that branch orders count
-as botanists count them (trunk 0, its branches 1 ...) and a stem has no kinks, which would move as no beam does. Edge graphs are rooted by an Euler
-tour and pointer doubling (Tarjan and Vishkin, "An efficient parallel biconnectivity algorithm", SIAM J.
-Comput. 14(4), 1985), which takes a logarithmic number of array operations however deep the tree is. It looks
-at the rest pose only, never at the motion.
+Built from branch labels, or derived from an edge graph by going straight on at every fork, so that branch orders
+count as botanists count them (trunk 0, its branches 1 ...) and no stem has a kink, which would move as no beam does.
+Edge graphs are rooted by an Euler tour and pointer doubling (Tarjan and Vishkin, "An efficient parallel biconnectivity
+algorithm", SIAM J. Comput. 14(4), 1985), which takes a logarithmic number of array operations however deep the tree
+is. It looks at the rest pose only, never at the motion.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ RELATED = 0.5  # Cost factor for each word that the names of two branches have i
 ALIKE = 4.0  # Cost factor of two branches of the same size: no leaf grows on a leaf.
 ROOT_SIZE = 0.25  # Part of the largest branch's diagonal below which a branch is no root.
 WORTH_LEVELS = 0.01  # Part of the bits of roots that hanging saves at least: a few in levels of their own cost more.
-LEVEL = 400.0  # Bits of a level beside those of its branches: components over time, statistics.
-LEVEL_SHARE = 0.003  # The same of many branches, as a share of all bits.
+LEVEL = 200.0  # Bits of a level beside those of its branches: components over time, statistics.
+LOWER = 10.0  # Bits, for each of its branches, up to which those are not surely better there than at lower levels.
 MOST_STRAIN = 30.0  # Bits at most that a contact costs because it is far or does not stay.
 IN_ORDER = 0.7  # Rank correlation of the source's order with the distance from the base that keeps the source's order.
 SMALL = 8  # Vertices of a branch up to which the source's order is always kept.
@@ -86,7 +86,7 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
         alone += hanging.sum() + alone.sum()
         alone[label[root]] = 0.0
     arcs = np.append(child, np.arange(count)), np.append(parent, np.full(count, count)), np.append(hanging, alone)
-    chosen = without_needless_orders(*arcs, cheapest_forest(count, *arcs), LEVEL, LEVEL_SHARE)
+    chosen = without_needless_orders(*arcs, cheapest_forest(count, *arcs), LEVEL, LOWER)
     hangs = chosen < len(child)
     if (alone - arcs[2][chosen]).sum() < WORTH_LEVELS * alone.sum():
         hangs[:] = False

@@ -51,13 +51,12 @@ def _cycles(above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def without_needless_orders(
-    child: np.ndarray, parent: np.ndarray, cost: np.ndarray, chosen: np.ndarray, price: float, share: float
+    child: np.ndarray, parent: np.ndarray, cost: np.ndarray, chosen: np.ndarray, price: float, each: float
 ) -> np.ndarray:
-    """Return the choice of arcs, (B,), without the highest orders whose branches cost little more at lower ones: all
-    together at most the price of a level, and a share of all cost. Arcs are as in `cheapest_forest`, and every branch
-    has one as a root, whose parent is the number of branches."""
+    """Return the choice of arcs, (B,), without the highest orders whose branches cost little more at lower ones: at
+    most `each` in the mean, and all together at most the price of a level. Arcs are as in `cheapest_forest`, and every
+    branch has one as a root, whose parent is the number of branches."""
     chosen, count = chosen.copy(), len(chosen)
-    most = price + share * float(cost[chosen].sum())
     while True:
         order = np.append(branch_orders(np.where(parent[chosen] == count, -1, parent[chosen])), -1)
         highest = order.max()
@@ -65,6 +64,6 @@ def without_needless_orders(
         if highest < 1:
             return chosen
         best = lower[cheapest_of_each(child[lower], cost[lower])]
-        if (cost[best] - cost[chosen[child[best]]]).sum() > most:
+        if (cost[best] - cost[chosen[child[best]]]).sum() > min(price, each * len(best)):
             return chosen
         chosen[child[best]] = best
