@@ -48,7 +48,7 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
-    if any(settings.rotation_step_factors) and any(settings.learned_bases):
+    if any(settings.rotation_step_factors) and any(settings.learned_bases) and not trials.is_layered:
         unturned = trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials))
         starts += [unturned] if trials.cost(unturned) <= HOPELESS_UNTURNED * trials.cost(settings) else []
     return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
