@@ -155,7 +155,7 @@ def test_a_frame_rate_that_is_none_is_refused(forked, tmp_path, fps):
 def test_branches_are_derived_from_edges_along_the_up_axis(forked, tmp_path):
     path = write_source(tmp_path / "a.h5", forked, ["vertex_branch", "branch_parent"])
     with read_hdf5(path) as clip:
-        assert clip.vertex_branch.tolist() == [0, 0, 0, 1, 0, 0]
+        assert clip.vertex_branch.tolist() == [0, 0, 0, 0, 1, 1]
         assert clip.branch_parent.tolist() == [-1, 0]
     with read_hdf5(path, root=3) as clip:
         assert clip.vertex_branch.tolist() == [0, 0, 0, 0, 1, 1]

@@ -67,7 +67,7 @@ def holds(folder, suffix: str, clip, place: dict, wide: bool, options: dict, cap
     how = {"animation": "morphs"} if suffix == "glb" else {}
     source = athcodec.write(made, folder / f"a.{suffix}", **how).files[0]
     encoded = str(folder / "a.ath")
-    code = cli.main(["encode", str(source), encoded, *words_of(options)])
+    code = cli.main(["encode", str(source), encoded, "--still", *words_of(options)])
     err = capsys.readouterr().err
     if code:
         assert any(reason in err for reason in REFUSALS), err
