@@ -43,10 +43,11 @@ OF_VIEWS += ["attributes", "metadata", "clip_ranges"]
 
 @contextmanager
 def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
-    """Give a source as a clip, and a sentence on how its numbers were converted, empty if they were not.
+    """Yield (clip, sentence): the source as a MotionClip, and a sentence that says how its type of number was
+    converted, "" if it was not. A file that is opened for this is closed when the block ends.
 
-    The options are OF_ARRAYS, OF_FILES and OF_PATHS, as far as they are given. A file that is opened here is closed
-    when the block ends. Raises ClipError, ValueError, and the errors of `read`.
+    `options` may have the names in OF_PATHS if the source is a path, in OF_ARRAYS and OF_FILES if it is an array, and
+    none if it is a clip. Raises ClipError, ValueError, and the exceptions of `read`.
     """
     is_path, is_view = isinstance(source, (str, os.PathLike)), isinstance(source, (Decoder, ClipView))
     allowed = OF_PATHS if is_path else () if is_view or isinstance(source, MotionClip) else (*OF_ARRAYS, *OF_FILES)
@@ -67,6 +68,7 @@ def clip_of(source: Source, **options: Any) -> Iterator[tuple[MotionClip, str]]:
 
 
 def _clip_of_array(source: Source, options: Keywords) -> tuple[MotionClip, str]:
+    """Return (clip, sentence) as `clip_of` does, for an array of positions. Raises ClipError."""
     if isinstance(source, np.ma.MaskedArray) and np.ma.is_masked(source):
         raise ClipError("positions: got an array with masked items, expected a number for each; fill them first")
     if hasattr(source, "keys") and not hasattr(source, "shape"):

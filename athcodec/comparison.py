@@ -48,6 +48,7 @@ class Comparison:
     promised: np.ndarray
 
     def __repr__(self) -> str:
+        """Return a line with the number of levels and frames and the largest error."""
         levels, frames = self.max_error.shape
         largest = self.max_error.max(axis=1)
         coarse = f", {largest[0]:.3g} at level 0" if levels > 1 else ""
@@ -63,6 +64,8 @@ class Comparison:
         return self._report()._repr_html_()
 
     def _report(self) -> Report:
+        """Return the table that `str` and notebooks show: for each level the promised, largest and RMS error, and the
+        frame, time and vertex of the largest."""
         rows = []
         for level, (largest, rms) in enumerate(zip(self.max_error, self.rms_error)):
             frame = int(largest.argmax())
@@ -78,20 +81,21 @@ def compare(source: Source, file: Decoder | Openable, **options: Any) -> Compari
     Parameters
     ----------
     source : (frames, vertices, 3) array, MotionClip, Decoder, str or path-like
-        As for `encode`; of several clips the one that has the name of the file's.
+        The source, as for `encode`. If it has several clips, the one with the same name as the file's clip is measured.
     file : Decoder, or str, path-like, bytes or binary file object
-        The file, or a decoder, of which the clip is compared.
+        The .ath file, whose first clip is compared, or a decoder, whose clip is compared.
     **options
-        Parameters of `open`: clip, host_mesh ...
+        Parameters of `open`, such as clip, which names another clip to compare, and host_mesh.
 
     Returns
     -------
     Comparison
+        The error of each level in each frame, in scene units.
 
     Raises
     ------
     ClipError
-        If frames or vertices of source and file are not equally many.
+        If source and file differ in the number of frames or vertices.
     FormatError
         If the file is damaged.
 

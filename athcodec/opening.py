@@ -33,25 +33,26 @@ def open(
         A path, a URL (`pip install "athcodec[remote]"`), the bytes of a file (any buffer, such as a memoryview), or a
         file object, which stays open when the decoder is closed; one that cannot seek is read whole.
     clip : str, optional
-        The name of the clip to play; by default the first.
+        The name of the clip to play; by default the file's first clip.
     strict : bool
-        Refuse a file that is shorter or longer than its header says.
+        Raise an error for a file that is shorter or longer than its header states.
     allow_partial : bool
-        Read all of the file now; a damaged level hides itself and those after it instead of raising.
+        Read the whole file now. If a level is damaged, only the levels before it can be used, and nothing is raised.
     limits : Limits, optional
-        What the file may ask for; by default those of FORMAT.md.
+        The largest sizes, counts and memory that the file may ask for; by default those of FORMAT.md.
     host_mesh : (N, 3) array, MotionClip, str or path-like, optional
         The mesh that is the rest pose, for files that do not hold one (`encode`, host_rest): positions in the source's
         order (see AthFile.set_host_mesh), or a file of any format that `read` knows, of which the rest pose, or else
         the first frame, is brought to the unit and axes of this file. Without it such a file opens, and says what it
         holds.
     gltf_motion : str, optional
-        Of a GLB that has several motions, the name of the one to open; "motion 0" and so on where they have none.
+        The name of the motion to open, if the file is a GLB with several motions; "motion 0", "motion 1" and so on if
+        they have no names.
 
     Returns
     -------
     Decoder
-        To be closed, or used in a `with` statement.
+        The clip, as an array of positions (frames, vertices, 3). Close it, or use it in a `with` statement.
 
     Raises
     ------
@@ -85,8 +86,8 @@ def open(
 
 
 def set_host_mesh_of(file: AthFile, path: str | os.PathLike[str]) -> None:
-    """Read a mesh in the unit and axes of an .ath file and hand it over, if the file needs one. Raises ClipError,
-    WrongHostMesh, OSError."""
+    """Read the mesh in `path` in the unit and axes of an .ath file, and set it as the file's rest pose, if the file
+    needs one. Raises ClipError, WrongHostMesh, OSError."""
     if not file.needs_host_mesh:
         return
     from athcodec.sources import read  # The sources take long to import, and most files need no mesh.

@@ -34,16 +34,17 @@ def truncate(
     source : str or path-like
         The file to shorten, or a GLB whose vertices one moves (ATH_motion).
     target : str or path-like
-        The file to write; it appears when it is complete. Of a GLB to a name that ends in ``.glb``: the GLB with the
-        shorter file in it.
+        The file to write; it appears when it is complete. If the source is a GLB and this name ends in ``.glb``, the
+        GLB is written with the shorter file in it.
     level : int, optional
         The last level to keep.
     max_error : float or str, optional
-        Scene units, or text such as "5cm": keep the levels down to the first whose largest error this is or less.
+        A length in scene units, or text such as "5cm": keep the levels down to the first whose largest error is at
+        most this.
     target_size : int or str, optional
-        Bytes, or text such as "2kB": keep as many levels as fit.
+        A size in bytes, or text such as "2kB": keep as many levels as fit into it.
     gltf_motion : str, optional
-        Of a GLB that has several motions, the name of the one to shorten.
+        The name of the motion to shorten, if the source is a GLB with several motions.
 
     Returns
     -------
@@ -57,7 +58,8 @@ def truncate(
     FormatError
         If the source is damaged, or was cut off before that level.
     ClipError
-        If a GLB is to be written and the source is none, or one that has no such motion, or several.
+        If a GLB is to be written and the source is no GLB, has no motion of that name, or has several motions and none
+        is named.
     OSError
         If a file cannot be read or written.
     TypeError
@@ -106,9 +108,10 @@ def truncate(
 
 
 def _shortened(file: AthFile, level: int) -> tuple[bytes, list[ct.Chunk]]:
-    """Return the front of a file that is cut off after a level, and the chunks it keeps, which follow the front.
+    """Return (front, chunks) of a file cut off behind `level`: the bytes of its new front, and the chunks that follow
+    it.
 
-    Chunks of unknown kinds are kept as FORMAT.md, "Rewriting", says of a file that is cut off behind a level.
+    Chunks of unknown kinds are kept if FORMAT.md, "Rewriting", says that they survive a cut.
     """
     chunks = [chunk for chunk in file.chunks.all if not chunk.is_motion or chunk.level <= level]
     if file.tables.rest_is_missing:

@@ -79,30 +79,30 @@ def find(
     settings: JsonMapping | None = None,
     patterns: Mapping[str, JsonMapping] | None = None,
 ) -> list[Item]:
-    """List the clips of a batch.
+    """List the clips that a batch encodes, each with its output file and its settings.
 
     Parameters
     ----------
     inputs : iterable of str or path
-        Files, directories, patterns of names, URLs.
+        Files, folders (with all clips below them), patterns of names such as "*.h5", and URLs.
     output : str or path
         The directory of the .ath files, a path or a URL.
     settings : dict, optional
-        Those of all clips; see `check_settings`.
+        Settings of all clips; see `check_settings`.
     patterns : dict of str to dict, optional
         Further settings by pattern of the clips' names; see `load_settings`.
 
     Returns
     -------
     list of Item
-        In the order of their names.
+        The clips in the order of their names.
 
     Raises
     ------
     ClipError
-        Where an input names no clip, a setting does not exist, or two inputs would have the same output.
+        If an input stands for no clip, a setting does not exist, or two inputs would have the same output.
     OSError
-        Where an input does not exist.
+        If an input does not exist.
     """
     default = check_settings(settings or {})
     checked = {pattern: check_settings(stated, f'["{pattern}"]') for pattern, stated in (patterns or {}).items()}
@@ -120,8 +120,8 @@ def find(
 
 
 def _target(output: str, name: str) -> str:
-    """Return the path or URL of the output file `name` in the folder `output`. Raises ClipError for a URL with a
-    query."""
+    """Return the absolute path, or the URL, of the file `name` in the folder `output`. Raises ClipError for a URL with
+    a query or of several file systems."""
     if not is_url(output):
         return os.path.abspath(os.path.join(output, name))
     if "::" in output or "?" in output:
@@ -141,8 +141,8 @@ def _stem(name: str, path: str) -> str:
 
 
 def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
-    """Yield the name and the path or URL of each clip that files, folders, patterns and URLs stand for. Raises
-    ClipError where one stands for none."""
+    """Yield (name, path or URL) of each clip that the inputs, which are files, folders, patterns and URLs, stand for.
+    Raises ClipError if an input stands for none."""
     for text, called in each_once(os.fspath(each) for each in inputs):
         pairs = list(_remote(text) if is_url(text) else _local(text, called))
         yield from pairs
@@ -153,8 +153,8 @@ def _named(inputs: Iterable[FilePath]) -> Iterator[tuple[str, str]]:
 
 
 def _local(text: str, called: str) -> Iterator[tuple[str, str]]:
-    """Yield the files of a path, each with what it is called. `called` is the name of a plain file without its
-    suffix."""
+    """Yield (name, path) of each clip that a local path stands for: a file, a folder with all below it, or a pattern.
+    `called` is the name of a single file without its suffix. Raises FileNotFoundError."""
     if os.path.isdir(text):
         yield from _below(
             text,
@@ -203,7 +203,8 @@ def _fixed_part(pattern: str, separator: str) -> str:
 
 
 def _remote(url: str) -> Iterator[tuple[str, str]]:
-    """Yield the name and URL of each clip at a URL: of a single file, or of all that a folder or a pattern has."""
+    """Yield (name, URL) of each clip that a URL stands for: a single file, a folder with all below it, or a pattern.
+    Raises RemoteError, ClipError."""
     shown = without_secrets(url)
     is_folder = url.endswith("/")
     if not is_folder and not glob.has_magic(url.partition("?")[0]):
@@ -223,7 +224,8 @@ def _remote(url: str) -> Iterator[tuple[str, str]]:
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """Return fsspec's file system of a URL, and the path in it. Raises MissingExtra, RemoteError."""
+    """Return (file system, path): fsspec's file system for a URL, and the path of the URL in it. Raises MissingExtra,
+    RemoteError."""
     try:
         import fsspec
 
@@ -236,7 +238,7 @@ def file_system(url: str) -> tuple[Any, str]:
 
 
 def download(url: str, path: str) -> str:
-    """Download a file to `path` and return its SHA-256. Raises RemoteError, OSError."""
+    """Download the file at `url` to the local `path`, and return its SHA-256 as text. Raises RemoteError, OSError."""
     system, source = file_system(url)
     try:
         system.get_file(source, path)
@@ -248,7 +250,8 @@ def download(url: str, path: str) -> str:
 
 
 def upload(path: str, url: str) -> JsonObject:
-    """Store an .ath file, whole, in place of one at most; its identity there. Raises RemoteError, OSError."""
+    """Store the .ath file `path` at `url`, where it may replace an .ath file but nothing else. Return its identity
+    there, as `remote_identity` does. Raises RemoteError, OSError."""
     system, target = file_system(url)
     try:
         others = system.exists(target) and system.cat_file(target, start=0, end=len(MAGIC)) not in (b"", MAGIC)
@@ -296,7 +299,8 @@ def _files_identity(paths: list[str]) -> JsonObject:
 
 
 def remote_identity(url: str) -> JsonObject:
-    """Return present facts of a file: listings may be old, or tell times more exactly. Raises RemoteError."""
+    """Return the size, and tags such as ETag, that a server states now for the file at `url`, by which a later change
+    shows. Raises RemoteError."""
     system, path = file_system(url)
     system.invalidate_cache()
     try:

@@ -35,6 +35,7 @@ class Manifest:
     """An open manifest, locked: `records` are the last ones, by output. Raises ManifestError, OSError."""
 
     def __init__(self, path: FilePath):
+        """Open and lock the manifest `path`, or begin a new one. Raises ManifestError, OSError."""
         self.path = os.fspath(path)
         is_new = not os.path.exists(self.path)
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | PLAIN_OPEN, 0o666)
@@ -49,7 +50,8 @@ class Manifest:
             raise
 
     def add(self, record: Record) -> None:
-        """Append a line, and waits until it is on the disk. Raises OSError, and the manifest is as before."""
+        """Append a record as a line, and return when it is on the disk. If this raises OSError, the manifest stays as
+        before."""
         line = json.dumps({"output": record["output"]} | record).encode() + b"\n"
         try:
             os.lseek(self._file, self._length, os.SEEK_SET)
@@ -81,6 +83,8 @@ class Manifest:
         return b"".join(parts)
 
     def _lock(self) -> None:
+        """Lock the manifest for this process. Raises ManifestError if another run has it open, or if it cannot be
+        locked."""
         try:
             if fcntl is None:
                 os.lseek(self._file, FAR, os.SEEK_SET)
@@ -107,8 +111,8 @@ def read_records(path: FilePath) -> dict[str, Record]:
 
 
 def _parse(path: str, content: bytes) -> tuple[dict[str, Record], int]:
-    """Return records, and the length of the lines that are whole. Raises ManifestError for what no run can have
-    left."""
+    """Return (records, length): the last record of each output, and the length in bytes of all complete lines. Raises
+    ManifestError if the content is no manifest; a last line that was cut off is allowed."""
     *lines, rest = content.split(b"\n")
     records, length = {}, 0
     for number, line in enumerate([*lines, rest] if rest else lines, 1):

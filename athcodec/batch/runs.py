@@ -134,18 +134,18 @@ def run(
     redo: bool = False,
     report: Callable[[str], None] | None = None,
 ) -> Outcome:
-    """Encode those clips of a batch whose files are not up to date.
+    """Encode the clips of a batch whose .ath files are missing or not up to date.
 
     Parameters
     ----------
     items : sequence of Item
-        See `find`.
+        The clips, from `find`.
     output : str or path
-        The directory of their outputs, a path or a URL.
+        The folder of the .ath files, a path or a URL.
     manifest : str or path, optional
-        The manifest, athcodec-batch.jsonl in `output` by default; it must be given where that is a URL. A clip that it
-        has as done, with the same settings and input, and whose file has the recorded checksum, is kept; of a file
-        behind a URL, what its server says must be as recorded.
+        The file that records which clips are done, by default athcodec-batch.jsonl in `output`; pass it if `output` is
+        a URL. A clip that the manifest has as done is kept if its settings and input are the same and its file has the
+        recorded checksum or, behind a URL, what its server states of it is as recorded.
     workers : int, optional
         Processes on this machine, one per core by default.
     scheduler : str, optional
@@ -156,25 +156,25 @@ def run(
     verify : bool, optional
         Open each file and decode every level of it before it is recorded.
     redo : bool, optional
-        Keep nothing.
+        Encode all clips again, even those that are up to date.
     report : callable, optional
         Called with a line of text when a clip is done or has failed.
 
     Returns
     -------
     Outcome
-        Also with the clips that failed: they do not stop the others.
+        The clips that were encoded, kept and failed. A clip that fails does not stop the others.
 
     Raises
     ------
     MissingExtra
-        Where dask.distributed is missing.
+        If the package dask.distributed is missing.
     ManifestError
-        Where the manifest is in use, or is none.
+        If the manifest is in use by another run, or is no manifest.
     SchedulerError
-        Where the scheduler cannot be reached, or has no worker when the run begins.
+        If the scheduler cannot be reached, or has no worker when the run begins.
     OSError
-        Where the manifest cannot be written.
+        If the manifest cannot be written.
     """
     if find_spec("distributed") is None:
         raise MissingExtra('batch: needs dask.distributed: pip install "athcodec[batch]"')
@@ -228,8 +228,8 @@ def _key(item: Item, output: FilePath) -> str:
 
 
 def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
-    """Return whether a clip has to be encoded and why. record: the manifest's record of its last run, None for a new
-    clip."""
+    """Return whether a clip has to be encoded, and why. `record` is what the manifest has of its last run, None for a
+    new clip; with `redo`, every clip is encoded."""
     if redo or record is None:
         return Todo(item, "to be redone" if record else "new")
     if record["status"] != "done":
@@ -241,8 +241,8 @@ def _todo(item: Item, record: Record | None, redo: bool) -> Todo:
 
 
 def _fault_of_output(item: Item, record: Record) -> str:
-    """Return what is wrong with the output of an earlier run, which its record describes: "" if it is as it was
-    written."""
+    """Return what is wrong with the output of a clip's earlier run, compared with that run's record: "output is
+    missing", "output was changed", or "" if nothing is."""
     if is_url(item.output):
         try:
             return "" if remote_identity(item.output) == record.get("stored") else "output was changed"
@@ -255,7 +255,8 @@ def _fault_of_output(item: Item, record: Record) -> str:
 
 
 def _todo_by_input(item: Item, record: Record) -> Todo:
-    """Return whether a clip whose output is intact has to be encoded again because its input is another one now."""
+    """Return whether a clip whose output is intact has to be encoded again because its input has changed since the run
+    of `record`."""
     before = {name: value for name, value in record["source"].items() if name != "sha256"}
     try:
         now = identity(item)
@@ -272,7 +273,8 @@ def _todo_by_input(item: Item, record: Record) -> Todo:
 
 
 def _cluster(workers: int) -> DaskObject:
-    """Start processes on this machine, with one thread each. Raises SchedulerError."""
+    """Start a Dask cluster of `workers` processes on this machine, with one thread each, and return it. Raises
+    SchedulerError."""
     import dask
     import distributed
 
@@ -296,7 +298,8 @@ def _cluster(workers: int) -> DaskObject:
 
 @contextmanager
 def _client(workers: int | None, scheduler: str | None) -> Iterator[DaskObject]:
-    """Yield a client of Dask: of a scheduler that is there, or of processes of our own, which go with it."""
+    """Yield a Dask client of the scheduler at the address `scheduler` or, without one, of `workers` processes on this
+    machine, which end with the block. Raises SchedulerError."""
     import distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # The manifest records workers that die.
@@ -318,10 +321,10 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[DaskObject]:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Keep Ctrl-C from threads that begin in the block, and from processes that they start at any time.
+    """Keep Ctrl-C from threads that start in the block, and from all processes that these start.
 
-    A terminal sends Ctrl-C to all processes, but this thread ends them. It sees a Ctrl-C that came meanwhile when the
-    block ends.
+    A terminal sends Ctrl-C to every process, but only this thread is meant to end the others. A Ctrl-C during the block
+    takes effect here when the block ends.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -337,7 +340,8 @@ def _interrupts_held_back() -> Iterator[None]:
 def _results(
     client: DaskObject, todo: Sequence[Todo], folder: str, split: int, verify: bool
 ) -> Iterator[tuple[Item, Result]]:
-    """Encode clips and yield the result of each one as soon as it is there. Raises SchedulerError."""
+    """Encode the clips of `todo` and yield (clip, result) as soon as each is done. `folder` is the scratch folder; a
+    clip of more than `split` segments is coded that many at a time. Raises SchedulerError."""
     import distributed
 
     items: dict[str, Item] = {}  # by key of a future
@@ -381,8 +385,8 @@ def _folder(folder: str, item: Item) -> str:
 
 
 def _result(future: DaskObject, item: Item) -> Result:
-    """Return the result of a task. A task that failed, or whose workers died, gives {"failed": reason}. Raises
-    SchedulerError if the scheduler was lost."""
+    """Return the result of a clip's task; {"failed": reason} if it failed or its workers died. Raises SchedulerError if
+    the scheduler was lost."""
     import distributed
 
     try:
@@ -400,7 +404,8 @@ def _result(future: DaskObject, item: Item) -> Result:
 
 
 def _noted(item: Item, result: Result, output: FilePath, notes: Manifest, outcome: Outcome) -> str:
-    """Put the result of a clip into the manifest and the outcome, and return it as text."""
+    """Add a clip's result to the manifest `notes` and to `outcome`, and return it as a line of text. `output` is the
+    folder of all outputs."""
     if "kept" in result:
         outcome.kept.append(item)
         return "kept"

@@ -59,8 +59,8 @@ def load_settings(path: FilePath) -> dict[str, Settings]:
     Parameters
     ----------
     path : str or path
-        A table of settings under each pattern of names (fnmatch); of all patterns that a name fits, later ones win.
-        Paths in it are relative to its folder.
+        A TOML file with a table of settings under each pattern of clip names (as in fnmatch). If a name matches
+        several patterns, later ones win. Paths in the file are relative to its folder.
 
     Returns
     -------
@@ -70,9 +70,9 @@ def load_settings(path: FilePath) -> dict[str, Settings]:
     Raises
     ------
     ClipError
-        Where it is no TOML, or a setting does not exist or has a value that it cannot have.
+        If the file is no TOML, or a setting does not exist or has a value that it cannot have.
     OSError
-        Where it cannot be opened.
+        If the file cannot be opened.
     """
     with open(path, "rb") as file:
         try:
@@ -93,13 +93,13 @@ def check_settings(settings: JsonMapping, where: str = "settings", folder: FileP
     Parameters
     ----------
     settings : dict
-        Keywords of `athcodec.encode`, of `athcodec.read` (its format as source_format), hierarchy, loop,
-        loop_blend, strength and heading.
-        Lengths and sizes may be text with a unit, "1mm".
+        Values by name. Names are keywords of `athcodec.encode` and of `athcodec.read` (whose format is called
+        source_format), hierarchy, loop, loop_blend, strength and heading. Lengths and sizes may be text with a unit,
+        such as "1mm".
     where : str, optional
-        What error messages begin with.
+        Text that error messages begin with.
     folder : str or path, optional
-        What paths are relative to.
+        The folder that relative paths in the settings start from.
 
     Returns
     -------
@@ -109,7 +109,7 @@ def check_settings(settings: JsonMapping, where: str = "settings", folder: FileP
     Raises
     ------
     ClipError
-        Where a setting does not exist or has a value that it cannot have.
+        If a setting does not exist or has a value that it cannot have.
     """
     checked = {}
     for name, value in settings.items():
@@ -128,7 +128,9 @@ def check_settings(settings: JsonMapping, where: str = "settings", folder: FileP
 
 
 def settings_of(names: tuple[str, ...], default: Settings, patterns: Mapping[str, Settings]) -> Settings:
-    """Return the settings of a clip that is called any of `names`: those of all patterns that fit one of them."""
+    """Return the settings of a clip: `default`, then the settings of each pattern that matches one of `names`, in
+    order, so that later ones override earlier ones. If a pattern sets an error bound or file size, it replaces such
+    limits of every kind."""
     merged = dict(default)
     for pattern, settings in patterns.items():
         if any(fnmatchcase(name, pattern) for name in names):
@@ -207,7 +209,8 @@ def _whole(low: int, high: int) -> Callable[[JsonValue], int]:
 
 
 def _tam(value: JsonValue) -> list[JsonValue]:
-    """Return the four thresholds EPS, ETA, XI and LAMBDA of a list or of text with commas. Raises ValueError."""
+    """Return the four thresholds of the acceptance test, EPS, ETA, XI and LAMBDA, from a list or from text with commas.
+    Raises ValueError."""
     parts = value.split(",") if isinstance(value, str) else list(value)
     if len(parts) != 4:
         raise ValueError("expected four values: EPS, ETA, XI, LAMBDA")

@@ -42,7 +42,8 @@ Result = JsonObject
 
 
 def _task(work: Callable[..., Result]) -> Callable[..., Result]:
-    """Return `work` as a task for a worker: an exception of `work` becomes {"failed": reason}, without keys of URLs."""
+    """Return `work` as a function for a worker that makes the clip's folder first and turns an exception into
+    {"failed": reason}, without secrets of URLs."""
 
     @wraps(work)
     def task(item: Item, folder: str, *arguments: Any, **options: Any) -> Result:
@@ -69,8 +70,13 @@ def _about(message: str, item: Item, folder: str) -> str:
 def begin(
     item: Item, folder: str, *, split: int, verify: bool, version: str, known: JsonObject | None = None
 ) -> Result:
-    """Return a clip of up to `split` segments, encoded; the draft of a longer one. folder: the clip's own, in the
-    scratch folder. known: the record of an output that is up to date unless the content of its input has changed."""
+    """Begin a clip: return {"done": record} if it has at most `split` segments and was encoded as a whole, {"draft":
+    number of segments} if it is longer, or {"kept": True ...} if its input has not changed.
+
+    `folder` is the clip's own folder for temporary files. `verify` decodes the file before it counts as done. `version`
+    is the version of athcodec that the worker has to have. `known` is the record of an output that is up to date unless
+    the content of its input has changed.
+    """
     if version != athcodec.__version__:
         raise AthError(f"worker: has athcodec {athcodec.__version__}, expected {version} as where the run was started")
     start = time.perf_counter()
@@ -93,8 +99,8 @@ def begin(
 
 @_task
 def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
-    """Code the segments of a long clip with these numbers, and return the path of the file in `folder` that holds
-    them."""
+    """Code the segments of a long clip with these numbers into a file in `folder`, and return {"part": its path,
+    "seconds": the time that it took}."""
     start = time.perf_counter()
     path = os.path.join(folder, f"segments_{segments[0]}")
     if os.path.exists(path):
@@ -107,7 +113,8 @@ def code(item: Item, folder: str, segments: Sequence[int]) -> Result:
 
 @_task
 def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) -> Result:
-    """Return the file of a long clip, from the results of `code`."""
+    """Put the file of a long clip together from the results of `code`, `parts`, and return {"done": record}, or the
+    first result that failed. `verify` decodes the file before it counts as done."""
     if failed := [part for part in parts if "failed" in part]:
         return failed[0]
     start = time.perf_counter()
@@ -121,8 +128,9 @@ def finish(item: Item, folder: str, parts: Sequence[Result], *, verify: bool) ->
 def _done(
     item: Item, source: JsonObject, summary: encoding.Summary, verified: MotionClip | None, start: float
 ) -> Result:
-    """Return what is recorded of a clip that is done. verified: the clip, where the file is to be decoded before it
-    counts as done."""
+    """Return {"done": record} of an encoded clip, after uploading its file if the output is a URL. If `verified` is
+    passed, the file is decoded first, with this clip as the mesh of the host. `start` is when the work began, by
+    `time.perf_counter`."""
     assert summary.path is not None  # It was encoded into a file.
     if verified is not None:
         with athcodec.open(summary.path, strict=True, host_mesh=verified) as decoder:
@@ -154,8 +162,8 @@ def _done(
 
 @contextmanager
 def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]:
-    """Yield the clip as a loop and on the branches, if its settings ask for that. Raises ClipError where it
-    is another than `source` was, at the beginning or at the end."""
+    """Yield the clip as the settings ask for it: with its wind, as a loop, on branches. `source` is the identity of its
+    input; ClipError is raised if the input has changed when the block begins or ends."""
     _check_source(item, source)
     path = _local_path(item, folder)
     if is_url(item.input) and (not os.path.exists(path) or sha256(path) != source["sha256"]):

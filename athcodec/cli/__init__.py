@@ -32,7 +32,7 @@ OUTCOMES = {"batch": "; the same command goes on from here", "view": "", "demo":
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line `argv` (default: that of the process) and return its exit code.
+    """Run the command line `argv`, by default that of this process, and return its exit code: 0 if it succeeded.
 
     Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 on SIGTERM.
     """
@@ -62,7 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _messages_escaped() -> Iterator[None]:
-    """Let warnings, and what libraries log, reach the terminal as all else does."""
+    """Print warnings, and what libraries log, on stderr as the command line prints its own messages, with control
+    characters escaped."""
 
     def warned(message: Warning | str, *_: object) -> None:
         print(f"athcodec: warning: {shown(str(message))}".replace("\n", " "), file=sys.stderr)
@@ -83,7 +84,7 @@ class _Escaping(logging.StreamHandler[TextIO]):
 
 @contextmanager
 def _termination_unwinds() -> Iterator[None]:
-    """Let SIGTERM end the block as an exception does, so that unfinished files are removed."""
+    """Turn the signal SIGTERM into SystemExit while the block runs, so that unfinished files are removed."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -64,6 +64,7 @@ class _Completion(argparse.Action):
     def __call__(
         self, parser: argparse.ArgumentParser, args: argparse.Namespace, shell: Any, option: Any = None
     ) -> None:
+        """Print the completion script for `shell` and exit."""
         try:
             import shtab
         except ImportError:
@@ -77,6 +78,7 @@ class _Completion(argparse.Action):
 
 
 def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line, with one subparser for each verb."""
     shared = _Parser(add_help=False)
     shared.add_argument("--debug", action="store_true", default=argparse.SUPPRESS, help=TRACEBACK)
     shared.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -167,6 +169,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _encode_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec encode` to the verb's parser."""
     verb.usage = "athcodec encode IN [IN ...] OUT.ath [options]"
     verb.add_argument(
         "input",
@@ -251,6 +254,7 @@ class _Output(argparse.Action):
 
 
 def _batch_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec batch` to the verb's parser."""
     verb.add_argument(
         "inputs",
         metavar="IN",
@@ -306,6 +310,7 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _coding_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options that say how motion is coded, which `encode` and `batch` share, to a verb's parser."""
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
         "--max-error",
@@ -404,6 +409,7 @@ def _coding_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _source_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options that say how files of other programs are read to a verb's parser."""
     source = verb.add_argument_group("reading the source")
     source.add_argument(
         "--source-format",
@@ -468,6 +474,7 @@ def _source_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _decode_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec decode` to the verb's parser."""
     verb.add_argument("input", metavar="IN.ath", help=READ_OR_PIPED)
     verb.add_argument("output", metavar="OUT", help=f"{WRITTEN}; its suffix says the format, see `athcodec formats`")
     verb.add_argument("--format", metavar="NAME", help="name of the format to write, whatever the suffix")
@@ -602,6 +609,7 @@ def _stats_argument(verb: argparse.ArgumentParser) -> None:
 
 
 def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec hierarchy` to the verb's parser."""
     verb.add_argument("input", metavar="IN", help="a clip in one of the formats that `athcodec formats` lists")
     verb.add_argument(
         "--method",
@@ -621,6 +629,7 @@ def _hierarchy_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _info_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec info` to the verb's parser."""
     verb.add_argument("file", metavar="FILE.ath", help=READ_OR_PIPED)
     verb.add_argument(
         "--motion",
@@ -634,6 +643,7 @@ def _info_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _verify_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec verify` to the verb's parser."""
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     _stats_argument(verb)
     verb.add_argument(
@@ -649,6 +659,7 @@ def _verify_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec truncate` to the verb's parser."""
     verb.add_argument("input", metavar="IN.ath", help="or a GLB whose vertices such a file moves (ATH_motion)")
     verb.add_argument("output", metavar="OUT.ath", help=f"{WRITTEN}; of a GLB also OUT.glb: the same with less motion")
     kept = verb.add_mutually_exclusive_group(required=True)
@@ -669,6 +680,7 @@ def _truncate_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _view_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec view` to the verb's parser."""
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     verb.add_argument(
         "--port", metavar="PORT", type=_argument(_whole), default=0, help="port of the address (default: a free one)"
@@ -700,6 +712,7 @@ def _counted(text: str) -> tuple[str, float]:
 
 
 def _picture_arguments(verb: argparse.ArgumentParser) -> None:
+    """Add the options of `athcodec picture` to the verb's parser."""
     verb.add_argument("file", metavar="FILE.ath", help=READ)
     kind = verb.add_mutually_exclusive_group(required=True)
     kind.add_argument("--gif", metavar="OUT.gif", help="write one round of the clip as a GIF")
@@ -751,7 +764,8 @@ def _demo_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def _argument(parse: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Return `parse` for argparse, which shows the message of its own kind of error only."""
+    """Return a function for argparse that parses the text of an argument as `parse` does. Its errors become those whose
+    message argparse shows."""
 
     def parsed(text: str) -> Any:
         try:

@@ -43,8 +43,8 @@ ROUNDING = 1e-6
 def clip_to_encode(
     paths: Sequence[str], args: argparse.Namespace, read: Callable[[str], MotionClip] | None = None
 ) -> MotionClip:
-    """Return the clip in a file, or all of several files and of their takes, as one; `read` opens one (default
-    read_clip)."""
+    """Return the clip to encode, as the options in `args` say. All clips and takes in the files `paths` are joined into
+    one. `read` opens a file; by default it is `read_clip`."""
     with ExitStack() as opened:
         parts = []
         for path, called in each_once(paths):
@@ -67,7 +67,8 @@ def clip_to_encode(
 
 
 def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
-    """Return the GLB whose vertices --into gives a motion. ClipError for what says otherwise how to read it."""
+    """Return the GLB in `paths` whose vertices get a motion (`--into`). Raises ClipError if there is more than one
+    path, it is no GLB, or an option says otherwise how to read it."""
     from athcodec.exporters.gltf_into import Into
 
     if len(paths) != 1 or args.output:
@@ -89,7 +90,8 @@ def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
 
 
 def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespace) -> Sequence[str]:
-    """Return the names of the loops. ClipError where they do not fit the clips."""
+    """Return the names of the clips that become loops. `names` has a name for each clip. Raises ClipError if names and
+    options do not fit the clips."""
     if len(names) != clip_count:
         raise ClipError(f"--names: got {len(names)}, expected {clip_count}, one for each clip")
     loops = names if args.loop == ["all"] else args.loop or []
@@ -102,8 +104,8 @@ def _checked_names(names: Sequence[str], clip_count: int, args: argparse.Namespa
 
 
 def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[float, ...]]:
-    """Return strength and heading of each clip; empty where none is given. ClipError where they do not fit the
-    clips."""
+    """Return (strength, heading) of the wind for each clip, or an empty tuple if the options state none. Raises
+    ClipError if their number is not that of the clips."""
     winds = {"--strength": args.strength, "--heading": args.heading}
     if args.strength is None and args.heading is not None:
         raise ClipError("--heading: got no strengths, expected some with --strength")
@@ -116,7 +118,8 @@ def _checked_winds(clip_count: int, args: argparse.Namespace) -> Sequence[tuple[
 
 
 def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
-    """Return the part of a file to decode: frames of a clip, or all clips."""
+    """Return the frames to decode, as `--clip`, `--frames`, `--level` and `--max-error` choose them; by default all
+    clips of the file. Raises ClipError."""
     level, of_one = args.level, args.clip is not None or len(decoder.file.clips) == 1
     if args.max_error is not None:
         level = (decoder if of_one else decoder.file).level_within(args.max_error)
@@ -129,7 +132,8 @@ def view_to_decode(decoder: Decoder, args: argparse.Namespace) -> ClipView:
 
 
 def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
-    """Return the mesh of `--onto`, bound to the plant and moving with it. The caller closes it."""
+    """Return the mesh in the file `--onto`, bound to the decoded plant so that it moves with it. The caller has to
+    close it."""
     with naming(args.onto), warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below
         warnings.simplefilter("always", GuessWarning)
@@ -142,7 +146,8 @@ def mesh_onto(view: ClipView, args: argparse.Namespace) -> OntoMesh:
 def with_sources(
     decoder: Decoder, args: argparse.Namespace, opened: ExitStack
 ) -> list[tuple[Decoder, str, MotionClip]]:
-    """Return the clips to verify, and what to compare each with: a clip of a file."""
+    """Return the clips to verify as (decoder of the clip, path of its source, source clip). The list is empty without
+    `--against`. Sources are closed with `opened`. Raises ClipError if there is not one for each clip."""
     if not args.against:
         return []
     played = [decoder] if args.clip is not None else [decoder.play(clip.name) for clip in decoder.file.clips]
@@ -157,7 +162,8 @@ def with_sources(
 
 
 def _source_of(decoder: Decoder, args: argparse.Namespace, path: str) -> MotionClip:
-    """Return the clip in `path`; of a GLB that a motion was put into, what moves in it as the motion has it."""
+    """Return the clip in the source `path`. If the decoded motion lies inside a GLB and the source is glTF, it is the
+    motion of the vertices that were put into the GLB."""
     from athcodec.files.gltf.motion import GltfMotion
 
     if not isinstance(decoder.file.source, GltfMotion) or find_format(path).name != "gltf":
@@ -174,7 +180,7 @@ def _gltf_options(args: argparse.Namespace) -> ReadOptions:
 
 
 def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
-    """Return the clip in `path`, read as the options of _source_arguments say."""
+    """Return the clip in the file `path`, read as the options in `args` say, and print what is not read."""
     rest = getattr(args, "rest", "auto")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SourceWarning)  # said below, with what is no shape
@@ -200,7 +206,8 @@ def read_clip(args: argparse.Namespace, path: str) -> MotionClip:
 
 
 def _say_not_read(clip: MotionClip, path: str) -> None:
-    """Print what of a source was left out of the clip: other animations, and parts that have no place in it."""
+    """Print what the file `path` holds and the clip does not: other animations, and parts that a clip has no place
+    for."""
     not_read = dict(clip.not_read)
     if others := not_read.pop("animation", None):
         played = ", ".join(clip.metadata.get("animations", ["none"]))
@@ -211,7 +218,8 @@ def _say_not_read(clip: MotionClip, path: str) -> None:
 
 
 def motions_of(path: str, args: argparse.Namespace) -> list[str | None]:
-    """Return the names of the motions to open, one after the other; [None] where there is nothing to choose."""
+    """Return the names of the motions to open in `path`, which is a GLB with several motions; [None] if it has one at
+    most."""
     from athcodec.files.gltf.motion import motions_in
 
     if args.gltf_motion is not None or is_url(path):
@@ -233,7 +241,7 @@ def open_file(path: str | Path, stats: bool = False, **options: Any) -> Iterator
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
-    """Let the errors of the block say which file they are about."""
+    """Make the messages of errors in the block begin with the file `path`."""
     try:
         with naming_file(path):
             yield
@@ -263,7 +271,8 @@ def _frames(bounds: tuple[int | None, int | None], frame_count: int) -> range:
 
 
 def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[JsonObject]:
-    """Return one entry per level: what it promises, and how far off the source it is."""
+    """Return for each level of a file the error that it promises and the errors measured against the source clip, which
+    is called `source` in messages. Raises ClipError if the clip has other numbers of frames or vertices."""
     with naming(source), clip.watched(), progress() as report:
         if isinstance(blend := decoder.metadata.get(BLEND), int) and BLEND not in clip.metadata:
             clip = athcodec.looped(clip, blend)
@@ -287,7 +296,8 @@ def measure_against(decoder: Decoder, source: str, clip: MotionClip) -> list[Jso
 
 
 def tick_ratios(decoder: Decoder) -> list[list[float | None]]:
-    """Return how much more each clip jerks near seams than in its median frame, at each complete level."""
+    """Return for each clip, at each complete level, how many times larger accelerations are near seams between segments
+    than in the median frame; None where this cannot be measured."""
     ratios: list[list[float | None]] = []
     with progress() as report:
         for clip in decoder.file.clips:
@@ -310,8 +320,8 @@ def _measured(level: Level, meter: MotionMeter) -> JsonObject:
 
 
 def refuse_broken_promises(result: JsonObject, measured: JsonObject) -> None:
-    """Raise AthError if a measured level is further off than the file states. result: facts of the file; measured:
-    those of one of its clips."""
+    """Raise AthError if a level's measured error is larger than the file states. `result` has the facts about the file,
+    and `measured` those about one of its clips (`measure_against`)."""
     levels = measured["levels"]
     broken = [(level, level["promised_max_error"]) for level in levels if not level["kept"]]
     if levels[-1]["max_error"] > result["max_error_bound"]:
@@ -331,8 +341,8 @@ def check_output(path: str, *inputs: str | None, suffix: str | None = None) -> N
 
 
 def check_name(output: str, suffix: str, inputs: Sequence[str] = ()) -> None:
-    """Raise ClipError where an output has another suffix; with the commands that may have been meant where it was the
-    last of several names and is a source like these `inputs`."""
+    """Raise ClipError unless the output's name ends in `suffix`. If the output is a source like the `inputs`, the user
+    probably forgot to name an output, and the message shows commands that do."""
     if output.lower().endswith(suffix):
         return
     is_source = False

@@ -84,6 +84,7 @@ def answer(args: argparse.Namespace, facts: JsonObject, text: str) -> None:
 
 
 def print_demo(facts: JsonObject, diagonal: float) -> None:
+    """Print the table of levels that `athcodec demo` shows. `diagonal` is the diagonal of the clip in scene units."""
     seconds = facts["frames"] / facts["fps"]
     columns = [*(head(name, facts["unit"]) for name in ("max", "RMS")), "max/diag", "RMS/diag", "B/s"]
     cells = []
@@ -100,7 +101,8 @@ def print_demo(facts: JsonObject, diagonal: float) -> None:
 
 
 def written_facts(written: Written, motion: ClipView | MotionClip, level: Level) -> JsonObject:
-    """Return the files that are there now, and what their format costs."""
+    """Return the facts about files that `athcodec decode` wrote: names, frames, vertices, level, and how much error
+    their format adds."""
     counts = {"frames": motion.frame_count, "vertices": motion.vertex_count}
     facts = {
         name: written.facts[name]
@@ -112,6 +114,7 @@ def written_facts(written: Written, motion: ClipView | MotionClip, level: Level)
 
 
 def print_written(facts: JsonObject) -> None:
+    """Print the facts about written files that `written_facts` returns."""
     names, instances, how = facts["files"], facts.get("instances"), facts.get("animation", "textures")
     samples = f" in {counted(facts['samples'], 'sample')}" if "samples" in facts else ""
     echo(
@@ -125,6 +128,7 @@ def print_written(facts: JsonObject) -> None:
 
 
 def print_verdict(result: JsonObject) -> None:
+    """Print what `athcodec verify` found out about a file."""
     for clip in result["clips"]:
         if clip["name"]:
             echo(f"{clip['name']}, against {clip['against']}:")
@@ -147,7 +151,7 @@ def _print_errors(levels: Sequence[JsonObject], unit: JsonValue) -> None:
 
 
 def _print_looks(levels: Sequence[JsonObject]) -> None:
-    """Print smoothness and shape, with the columns for which the clip has values."""
+    """Print the tables of smoothness and shape of all levels, with the columns for which there are values."""
     shape = levels[0]["shape"]
     captions = {
         "smoothness": "second differences over frames, of the error in bounds; tick ratio: those of the motion near "
@@ -166,6 +170,7 @@ def _print_looks(levels: Sequence[JsonObject]) -> None:
 
 
 def print_preview(todo: Sequence[Any], as_json: bool) -> None:
+    """Print which clips a batch would encode and why, as a table or as JSON. `todo` has an entry for each clip."""
     if as_json:
         print_json(
             {
@@ -195,8 +200,8 @@ def print_preview(todo: Sequence[Any], as_json: bool) -> None:
 
 
 def print_outcome(outcome: Any, args: argparse.Namespace) -> None:
-    """Print what a batch did: how many files were encoded, kept and failed, and their bytes; as JSON if `--json` was
-    passed."""
+    """Print the outcome of a batch: how many clips were encoded, kept and failed, and the bytes of their files; as JSON
+    if `--json` was passed."""
     if args.json:
         failed = [{name: record[name] for name in ("input", "output", "reason")} for record in outcome.failed]
         print_json(
@@ -227,8 +232,7 @@ def print_json(facts: JsonObject) -> None:
 
 
 def _finite(value: JsonValue) -> JsonValue:
-    """Return `value` for JSON, which knows neither infinity nor NaN: they become null; URLs as people are shown
-    them."""
+    """Return `value` as JSON can hold it: numbers that are infinite or NaN become None, and URLs lose their secrets."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -243,7 +247,8 @@ def say(kind: str, message: str) -> None:
 
 
 def say_seam(seam: Seam, path: str) -> None:
-    """Print how far vertices move over the seam of a loop, and whether it jumps there."""
+    """Print how far vertices move from the last frame of a loop to its first, and whether that is a visible jump.
+    `path` is the name of a clip without one."""
     jumps = seam.step > JUMP * seam.step_beside + seam.error
     say(
         "loop",
@@ -264,7 +269,8 @@ def one_line(error: Exception) -> str:
 
 @contextmanager
 def progress() -> Iterator[Report | None]:
-    """Yield a function for encode()'s `progress` that draws a bar on stderr; None where that is no terminal."""
+    """Yield a function `report(phase, fraction)` that draws a progress bar on stderr, or None if stderr is no
+    terminal."""
     if not sys.stderr.isatty():
         yield None
         return

@@ -38,7 +38,8 @@ class Streams:
         return self._read(ATH) if path == STREAM else path
 
     def source(self, path: str, format: str | None) -> str:
-        """Return the source to read in place of `path`. Raises ClipError where nothing says its format, OSError."""
+        """Return the file to read for `path`. If it is "-", standard input is copied to a file first, whose format is
+        `format` or is told by its first bytes. Raises ClipError if the format remains unknown, OSError."""
         if path != STREAM:
             return path
         if format is not None or self._input:
@@ -59,7 +60,8 @@ class Streams:
         return self._output
 
     def send(self) -> None:
-        """Copy the written file to standard output. Raises ClipError where it is more than one file, OSError."""
+        """Copy the written file to standard output if the output is "-". Raises ClipError if the format made several
+        files, OSError."""
         if not self.writes:
             return
         made = os.listdir(os.path.dirname(self._output))

@@ -76,6 +76,7 @@ ROUNDING_SHARE = 0.05  # Part of a level's error above which decode names what f
 
 
 def encode(args: argparse.Namespace) -> int:
+    """Run `athcodec encode` and return its exit code."""
     paths = [args.input, *(args.paths or ())]
     output = args.into or args.output or paths.pop()
     if args.into:
@@ -106,6 +107,8 @@ def _last_motion(path: str) -> str:
 
 
 def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
+    """Encode the motion of a GLB and write a GLB that holds the motion and moves by it (`--into`). Return the encoder's
+    summary."""
     from athcodec.sources import listed
 
     with gltf_to_fill(paths, args) as host, scratch_folder(args.into) as folder:
@@ -119,6 +122,8 @@ def _encode_into(paths: list[str], args: argparse.Namespace) -> Summary:
 
 
 def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, **options: Any) -> Summary:
+    """Encode a clip into the file `output` as `args` and further options say, and return the encoder's summary. `path`
+    is the source's name in messages."""
     with naming(path), progress() as report:
         summary = athcodec.encode(
             with_branches(clip, args.hierarchy),
@@ -147,6 +152,7 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
 
 
 def batch(args: argparse.Namespace) -> int:
+    """Run `athcodec batch` and return its exit code, 1 if a clip failed."""
     from athcodec import batch
 
     inputs = [*args.inputs, *(_listed(args.list) if args.list else ())]
@@ -175,8 +181,7 @@ def _listed(path: str) -> list[str]:
 
 
 def _batch_settings(args: argparse.Namespace) -> JsonObject:
-    """Return the settings for the clips of a batch that differ from the defaults, by the options of the command
-    line."""
+    """Return the settings of a batch's clips that the command line sets to other values than the defaults."""
     from athcodec.batch.settings import BOUNDS, READING
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
@@ -200,6 +205,7 @@ def _batch_settings(args: argparse.Namespace) -> JsonObject:
 
 
 def hierarchy(args: argparse.Namespace) -> int:
+    """Run `athcodec hierarchy` and return its exit code."""
     if args.save:
         check_output(args.save, args.input, suffix=".json")
     with read_clip(args, args.input) as clip, naming(args.input), progress() as report:
@@ -244,6 +250,8 @@ def decode(args: argparse.Namespace) -> int:
 
 
 def _decode(args: argparse.Namespace, quiet: bool) -> int:
+    """Decode a file and write it in another format, as `args` say, and return the exit code. With `quiet`, facts are
+    not printed."""
     from athcodec.exporters import format_to_write
     from athcodec.sources import listed
 
@@ -315,7 +323,8 @@ def _blurs(args: argparse.Namespace) -> bool:
 
 
 def _write_views(motions: Sequence[ClipView], args: argparse.Namespace) -> Written:
-    """Write what decoders show, in the format that is asked for. Several go back into a GLB."""
+    """Write the decoded frames in the format that `args` ask for. Motions that come from a GLB and go into one again
+    are written back into it."""
     from athcodec.files.gltf.motion import GltfMotion
 
     if _goes_back(args) and isinstance(motions[0].decoder.file.source, GltfMotion):
@@ -328,7 +337,7 @@ def _write_views(motions: Sequence[ClipView], args: argparse.Namespace) -> Writt
 
 
 def _write_clip(motion: ClipView | MotionClip, args: argparse.Namespace) -> Written:
-    """Write a clip in the format that is asked for."""
+    """Write a clip in the format that `args` ask for, and return which files were written."""
     from athcodec import exporters
 
     name = exporters.format_to_write(args.output, args.format).name
@@ -345,6 +354,7 @@ def info(args: argparse.Namespace) -> int:
 
 
 def _info(args: argparse.Namespace, called: str) -> int:
+    """Print facts about a file and return the exit code. `called` is the file's name as it is printed."""
     rows = []
     for name in motions_of(args.file, args):
         with open_file(args.file, args.stats, host_mesh=args.host_mesh, gltf_motion=name) as decoder:
@@ -359,6 +369,7 @@ def _called(path: str, motion: str | None) -> str:
 
 
 def verify(args: argparse.Namespace) -> int:
+    """Run `athcodec verify` and return its exit code, 1 if the file is damaged or breaks a promise."""
     names: list[str | None] = [None]
     with suppress(AthError):  # which is said below, as of any damaged file
         names = motions_of(args.file, args)
@@ -374,6 +385,8 @@ def verify(args: argparse.Namespace) -> int:
 
 
 def _verified(args: argparse.Namespace, name: str | None) -> JsonObject:
+    """Return the result of verifying a file: "ok", "error" if it is not, and measured errors. `name` names the motion
+    of a GLB, None if there is nothing to choose."""
     result: JsonObject = {"file": _called(args.file, name), "ok": False, "clips": []}
     try:
         how = {"strict": True, "clip": args.clip, "host_mesh": args.host_mesh, "gltf_motion": name}
@@ -395,6 +408,7 @@ def _verified(args: argparse.Namespace, name: str | None) -> JsonObject:
 
 
 def truncate(args: argparse.Namespace) -> int:
+    """Run `athcodec truncate` and return its exit code."""
     if not args.output.lower().endswith(".glb"):
         check_name(args.output, ATH)
     check_output(args.output, args.input)
@@ -417,6 +431,7 @@ def truncate(args: argparse.Namespace) -> int:
 
 
 def formats(args: argparse.Namespace) -> int:
+    """Run `athcodec formats` and return its exit code."""
     from athcodec import exporters, sources
 
     read, written = ({kind.name: kind for kind in module.formats()} for module in (sources, exporters))
@@ -453,6 +468,7 @@ def _needs(row: JsonObject) -> str:
 
 
 def view(args: argparse.Namespace) -> int:
+    """Run `athcodec view` and return its exit code."""
     from athcodec.viewer import view
 
     file = args.file
@@ -482,6 +498,7 @@ def _say_where(args: argparse.Namespace, address: str) -> None:
 
 
 def picture(args: argparse.Namespace) -> int:
+    """Run `athcodec picture` and return its exit code."""
     from athcodec.viewer import picture
 
     kind = next(name for name in picture.FORMATS if getattr(args, name))
@@ -495,6 +512,7 @@ def picture(args: argparse.Namespace) -> int:
 
 
 def demo(args: argparse.Namespace) -> int:
+    """Run `athcodec demo` and return its exit code."""
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)
         source = athcodec.sample_path(args.sample)
@@ -528,7 +546,8 @@ def demo(args: argparse.Namespace) -> int:
 
 
 def _export_demo(encoded: Path, page: Path, floor: Floor | None) -> bool:
-    """Write the page, and return whether that could be done."""
+    """Write the demo's web page, and return whether that succeeded. `floor` has further clips of the scene and their
+    shares."""
     from athcodec.viewer import view
 
     try:

@@ -41,7 +41,8 @@ class Affines:
 
 
 def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, subject: str) -> Affines:
-    """Return a frame of the file as matrices, from its segment as prepared at the level. Raises BadChunk."""
+    """Return frame `frame` of the file as an affine matrix for each part of the plant. `ready` is the frame's segment,
+    prepared at `level`; `subject` begins messages. Raises BadChunk if no matrix fits the positions."""
     core, parts, hierarchy = file.core, file.core.cut(level), file.hierarchy
     nodes, stems = parts[parts["branch"] >= 0], file.tables.exact_branches(parts)
     positions = np.empty((core.info.place_count, 3))
@@ -66,7 +67,9 @@ def affines_of(file: AthFile, ready: core_file.Segment, level: int, frame: int, 
 
 
 def residual_of(parts: Affines, positions: np.ndarray, vertex_source: np.ndarray, subject: str) -> np.ndarray:
-    """Return what the matrices leave out of positions in source order, (N, 3) float64. Raises BadChunk."""
+    """Return for each vertex, in source order, the point (N, 3) float64 that its part's matrix takes to its position.
+    It lies in the space of the level's rest pose. `positions` (N, 3) are in source order, and `vertex_source` (N,) has
+    the source's number of each vertex in file order. `subject` begins messages. Raises BadChunk."""
     full = positions[vertex_source]
     if not np.isfinite(full).all():
         raise BadChunk(f"{subject}: got positions that are not finite; expected those of a plant")

@@ -17,6 +17,8 @@ class _Method:
         self.__doc__ = getattr(np.ndarray, name).__doc__
 
     def __get__(self, instance: Any, owner: type) -> Any:
+        """Return a function that decodes the array `instance` and calls this method of numpy.ndarray on it."""
+
         def method(*arguments: Any, **options: Any) -> Any:
             return getattr(np.asarray(instance), self._name)(*arguments, **options)
 

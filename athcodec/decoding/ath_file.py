@@ -114,6 +114,8 @@ class AthFile:
         host_mesh: HostMesh | None = None,
         gltf_motion: str | None = None,
     ):
+        """Open the .ath file `path`, which may also be a URL, bytes or a file object, and read its front. The other
+        parameters are those of `athcodec.open`."""
         self._bytes = FileBytes(path, strict, limits, gltf_motion)
         self.core = self._bytes.core
         self._place = _place_of(path)
@@ -163,6 +165,8 @@ class AthFile:
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Return how pickle opens the file again: by its path, URL or bytes. Raises TypeError for a file object,
+        ValueError if the file is closed."""
         if self.is_closed:
             raise ValueError("AthFile: is closed; expected an open file to pickle")
         if not self._bytes.closes_source:
@@ -284,9 +288,9 @@ class AthFile:
         Parameters
         ----------
         max_error : float or str
-            Scene units, or text such as "5cm".
+            A length in scene units, or text such as "5cm".
         segments : range, optional
-            Numbers of segments in the whole file; by default all.
+            Numbers of the segments, in the whole file, in which the error counts; by default all.
 
         Returns
         -------
@@ -296,9 +300,9 @@ class AthFile:
         Raises
         ------
         LevelUnavailable
-            If the deepest level's largest error is above it.
+            If the largest error of every level is above `max_error`.
         BoundError
-            If it is text that is no length, or has a unit and the file states none.
+            If `max_error` is text that is no length, or has a unit and the file states none.
         """
         segments = segments or range(self.segment_count)
         wanted = length_of(max_error, "max_error")
@@ -408,7 +412,8 @@ class AthFile:
         return hashlib.sha256(self.core.prelude.tobytes()).hexdigest()
 
     def table1(self) -> dict[str, float]:
-        """Return Table 1 of the paper: depth (levels of nodes), nodes, leaves, and the encoder's thresholds."""
+        """Return the figures of Table 1 of the ATH paper (Song, Yang and Peng 2011): "depth" (levels of the node tree),
+        "nodes", "leaves" (nodes without children), and the encoder's four thresholds if the file states them."""
         branches = self.tables.branches
         whole, inside = branches["flags"] & WHOLE > 0, np.zeros(len(branches) + 1, np.int64)
         np.add.at(inside, np.flatnonzero(whole) + 1, 1)
@@ -424,7 +429,7 @@ class AthFile:
         }
 
     def info(self) -> JsonObject:
-        """Return what `athcodec info --json` prints, of the whole file with all its clips."""
+        """Return the facts that `athcodec info --json` prints about the file and all its clips, as a JSON object."""
         return {
             "vertices": self.vertex_count,
             "frames": self.frame_count,
@@ -454,7 +459,7 @@ class AthFile:
         return self.levels[1].max_error / self.max_error_bound
 
     def _clip_info(self, clip: Clip) -> JsonObject:
-        """Return the facts of one clip of the file, for `info`."""
+        """Return the facts about one clip that `info` lists: name, frames, duration, wind, errors and so on."""
         metadata = metadata_of(self.metadata, clip.name)
         strength, heading = wind_of(metadata)
         return {
@@ -470,9 +475,9 @@ class AthFile:
         }
 
     def check(self, decode: bool = True) -> None:
-        """Read every chunk and decode every level. Raises FormatError, the first fault in the file.
+        """Read every chunk and decode every level, and raise the first fault of the file as a FormatError.
 
-        Without `decode`, compare checksums and read static data only, which needs no mesh of the host's.
+        With `decode` False, only compare checksums and read static data, which needs no mesh of the host application.
         """
         if not self.complete:
             raise Truncated(f"file: got {self.available_length} bytes; expected {self.file_length}; {self.missing}")

@@ -32,7 +32,8 @@ class Blending:
         self._prepared: dict[tuple[int, int], core_file.Segment] = {}  # By (segment, level).
 
     def positions(self, shares: Sequence[Share]) -> np.ndarray:
-        """Return positions, (N, 3) float32, of up to four shares blended along the branches."""
+        """Return the positions (N, 3) float32 of up to four clips of the file, each at its own time, blended by weight
+        along the branches."""
         file = self._file
         with self._lock:
             before, self._prepared = self._prepared, {}

@@ -85,7 +85,8 @@ class Chunks(Sequence[Chunk]):
             return self._bytes.read(chunk.offset, chunk.length, str(chunk))
 
     def payload(self, chunk: Chunk) -> bytes:
-        """Return the stored bytes of a chunk, one of `all`. Raises Truncated, BadChecksum."""
+        """Return the bytes stored in a chunk of the file. Raises Truncated if the file ends before, BadChecksum if they
+        are damaged."""
         with self._bytes.lock:
             data = self._bytes.read(chunk.offset, chunk.length, str(chunk))
             try:
@@ -95,7 +96,8 @@ class Chunks(Sequence[Chunk]):
         return data
 
     def first_damaged_level(self) -> int | None:
-        """Read all motion that is there, and return the first level of which a chunk is damaged, or None."""
+        """Read all chunks of motion that are in the file, and return the level of the first damaged one, or None if all
+        are intact."""
         with self._bytes.lock:
             self._bytes.announce([(0, self._bytes.file_length)])
         for chunk in self:

@@ -65,6 +65,7 @@ class ClipView:
         self._runs = [(clip, _checked(frames, clip.frame_count)) for clip in played]
 
     def __repr__(self) -> str:
+        """Return a line with the names, size, level and error of the frames."""
         names = ", ".join(repr(clip_range.name) for clip_range in self.clip_ranges if clip_range.name)
         unit = self.metadata.get("unit")
         return (

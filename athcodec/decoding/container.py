@@ -101,7 +101,7 @@ class Limits:
 
     @classmethod
     def small(cls) -> Limits:
-        """Return the limits of the small profile, which telephones and web pages decode."""
+        """Return the limits of the format's small profile, which phones and web pages are expected to decode."""
         return cls(
             chunks=1 << 16,
             table_bytes=1 << 20,
@@ -183,9 +183,10 @@ class Chunk:
 
 
 def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """Return all in front of the chunks; the header gets their count and File_Length.
+    """Return the bytes of the file before the chunks: header, counts, chunk table, errors and checksums. This sets
+    `header.chunk_count` and `header.file_length`.
 
-    errors: (levels, segments, 3) in scene units, of the measures in their order; they are rounded up.
+    `errors` (levels, segments, 3) are in scene units, in the order of `MEASURES`; they are rounded up.
     """
     header.chunk_count = len(chunks)
     stream = _front_stream(header, chunks, short_floats(errors))
@@ -198,7 +199,8 @@ def pack_front(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes
 
 
 def _front_stream(header: Header, chunks: list[Chunk], errors: np.ndarray) -> bytes:
-    """Return the front stream (FORMAT.md, "Front stream")."""
+    """Return the compressed counts, chunk table and errors at the front of a file (FORMAT.md, "Front stream"). `errors`
+    (levels, segments, 3) has the error measures of each segment as the format's short floats."""
     names = (name for name, _ in _native.Header._fields_ if name != "stages" and hasattr(header, name))
     counts = _native.Header(**{name: getattr(header, name) for name in names})
     first = header.stages[-1] + 1 if header.stages else 0
@@ -284,7 +286,8 @@ def _check_window(data: bytes, expected: int, subject: str) -> None:
 
 
 def zstd_decompress_exact(data: bytes, expected: int, subject: str, limits: Limits) -> bytes:
-    """Return the content of a zstd frame that announces and holds `expected` bytes. Raises BadChunk, LimitExceeded."""
+    """Return the content of a zstd frame. `subject` begins messages. Raises BadChunk unless the frame states and holds
+    `expected` bytes, LimitExceeded if these are too many."""
     if expected > limits.decoded_chunk_bytes:
         raise LimitExceeded(f"{subject}: got {expected} bytes; the limit is {limits.decoded_chunk_bytes}")
     _check_window(data, expected, subject)
@@ -299,7 +302,8 @@ def zstd_decompress_exact(data: bytes, expected: int, subject: str, limits: Limi
 
 
 def parse_array(data: bytes, subject: str, limits: Limits) -> tuple[str, np.ndarray]:
-    """Return the name and array of ATTRIBUTE."""
+    """Return (name, array) from the bytes of an ATTRIBUTE chunk. `subject` begins messages. Raises BadChunk,
+    LimitExceeded."""
     if len(data) < ARRAY_HEAD.size:
         raise BadChunk(f"{subject}: got {len(data)} bytes; expected at least {ARRAY_HEAD.size}")
     code, dimensions, length, size = ARRAY_HEAD.unpack_from(data)
@@ -328,7 +332,8 @@ def _array_type(code: int, size: int, subject: str) -> np.dtype:
 
 
 def _array_name(text: bytes, subject: str, limits: Limits) -> str:
-    """Return the name of an array from its bytes. Raises LimitExceeded, BadChunk."""
+    """Return the name of an array from its UTF-8 bytes. `subject` begins messages. Raises LimitExceeded if it is too
+    long, BadChunk if it is no text."""
     if len(text) > limits.string_bytes:
         raise LimitExceeded(f"{subject}: got a name of {len(text)} bytes; the limit is {limits.string_bytes}")
     try:
@@ -341,6 +346,7 @@ def _array_name(text: bytes, subject: str, limits: Limits) -> str:
 
 
 def parse_metadata(data: bytes, limits: Limits) -> JsonObject:
+    """Return the JSON object in the bytes of a METADATA chunk. Raises BadChunk, LimitExceeded."""
     if not data or data[0] > 1:
         raise BadChunk("METADATA: got an unknown method; expected 0 or 1")
     text = data[1:]
@@ -361,6 +367,8 @@ def parse_metadata(data: bytes, limits: Limits) -> JsonObject:
 
 
 def _parse_json(text: bytes, subject: str) -> JsonObject:
+    """Return the JSON object in `text`. Raises BadChunk, which begins with `subject`, for anything else, for a repeated
+    key and for numbers that are not finite."""
     try:
         value = json.loads(text.decode(), object_pairs_hook=_unique, parse_constant=_refuse, parse_float=_finite)
         json.dumps(value, ensure_ascii=False).encode()  # Raises for lone surrogates.

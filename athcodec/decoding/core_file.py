@@ -175,6 +175,8 @@ class File:
     """An opened file. It raises CoreError, and several threads may use it, each with its Work."""
 
     def __init__(self, prelude: bytes, memory: int, limits: Limits):
+        """Open a file in the C core. `prelude` are the bytes up to the first chunk of motion, `memory` is the size in
+        bytes of the memory that the core needs. Raises CoreError."""
         self._prelude, self._memory, fault = as_bytes(prelude), aligned(memory), Fault()
         self._file = self._memory.ctypes.data
         self._check(
@@ -216,7 +218,7 @@ class File:
             self.has_rest = True
 
     def refine(self, level: int) -> None:
-        """Compute what the segments share at a level, unless that is done."""
+        """Compute the tables that all segments share at a level, unless this has been done."""
         with self._building:
             if level <= self._refined:
                 return
@@ -243,9 +245,10 @@ class File:
         return view.view(dtype).copy()
 
     def polygons(self, kind: int, most: int) -> Polygons:
-        """Return FACES or EDGES, whose bytes are fed. Edges that follow from the branches are `derived` and empty.
+        """Return the faces or edges in a chunk of `kind` FACES or EDGES, whose bytes have been given to the core. Edges
+        that follow from the branches are marked `derived` and empty.
 
-        Raises LimitExceeded if there are more than `most` faces and corners.
+        Raises LimitExceeded if there are more than `most` faces and corners together.
         """
         shape, fault = CorePolygons(), Fault()
         self._check(lib.ath_polygons_of(self._file, kind, byref(shape), byref(fault)), fault)
@@ -312,7 +315,8 @@ class File:
         return self._array(lib.ath_chunks(self._file), CHUNK, self.info.chunk_count)
 
     def check_chunk(self, index: int, offset: int, data: bytes) -> None:
-        """Compare the checksum of a chunk at an offset of the file with its bytes, which are not kept."""
+        """Compare the bytes of chunk `index`, which lies at `offset` of the file, with the checksum that the file
+        states. Raises CoreError if they differ."""
         array, fault = as_bytes(data), Fault()
         self.feed(array, offset)
         try:
@@ -429,10 +433,11 @@ class File:
         *,
         to: np.ndarray | None = None,
     ) -> None:
-        """Decode a segment at a refined level, from the beginning or from a segment of which goes_on() is true.
+        """Decode a segment at a level into `into`, from its beginning or, if `before` is given, onward from this
+        prepared segment at a coarser level.
 
-        `joined_to` is the segment that it is joined to, if that is ready at the level. `to` is a contiguous array of
-        the file's type, which gets the positions if the core can write there (`into.is_delivered`).
+        `joined_to` is the prepared segment whose end the segment is joined to. `to` (k, N, 3) is a contiguous array of
+        the file's type that gets the positions if the core can write there (`into.is_delivered`). Raises CoreError.
         """
         fault, keeping = Fault(), self._room_to_keep(level, into)
         place, rooms = (work.pointer, len(work.memory), self._file), (into.pointer, len(into.memory))
@@ -468,7 +473,8 @@ class File:
         return lib.ath_frame_at(self._file, clip, seconds, AS_MARKED)
 
     def blended(self, shares: list[tuple[list[Segment], float, float]], order: int = SOURCE_ORDER) -> np.ndarray:
-        """Return several clips at once, (rows(order), 3) float32, from the segments, frame and weight of each."""
+        """Return a blend of several clips, float32, with a row for each vertex in `order`. `shares` has for each clip
+        the prepared segments around the frame, the frame, which may lie between two, and the weight."""
         arrays = [(c_void_p * len(segments))(*(segment.pointer for segment in segments)) for segments, _, _ in shares]
         records = (Share * len(shares))(
             *(
@@ -485,7 +491,8 @@ class File:
         return out
 
     def matrices(self, segment: Segment, frame: float, node_count: int) -> np.ndarray:
-        """Return the maps of the cut's nodes from rest positions to positions, (nodes, 3, 4) float64."""
+        """Return for each of the level's `node_count` nodes the matrix from rest positions to positions at a frame,
+        (node_count, 3, 4) float64."""
         out = np.empty((node_count, 3, 4))
         self._check(
             lib.ath_matrices_float64(

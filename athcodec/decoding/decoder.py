@@ -89,6 +89,8 @@ class Decoder(ArrayLike):
     """
 
     def __init__(self, file: AthFile, clip: str | None = None, *, closes_file: bool = False, level: int | None = None):
+        """Play a clip of an opened file, by default its first one, at `level`, by default the deepest complete one.
+        With `closes_file`, closing the decoder closes the file, too."""
         self.file, self._closes_file, self._level = file, closes_file, level
         if level is not None:
             self._level = self._checked_level(level)
@@ -148,6 +150,7 @@ class Decoder(ArrayLike):
         return partial(type(self), closes_file=self._closes_file, level=self._level), (self.file, self.clip.name)
 
     def __repr__(self) -> str:
+        """Return a line with the clip's name, size, level and error."""
         name = f" {self.clip.name!r}" if self.clip.name else ""
         last = self.file.level_count - 1
         shown = self.levels[last if self._level is None else self._level]
@@ -340,12 +343,13 @@ class Decoder(ArrayLike):
         Parameters
         ----------
         seconds : float or array of float
-            Time since the first frame. A loop goes on from its first frame; another clip keeps its first or last one.
+            Times in seconds since the first frame. A loop goes on from its first frame; any other clip stays at its
+            first frame before its beginning and at its last frame after its end.
 
         Returns
         -------
         numpy.ndarray
-            (N, 3) float32, scene units, after the dimensions of `seconds`.
+            Positions, `seconds.shape` + (N, 3), float32, scene units.
 
         Raises
         ------
@@ -368,14 +372,14 @@ class Decoder(ArrayLike):
         Parameters
         ----------
         level, dtype, frames
-            As for `positions`.
+            The level, the type of the arrays and the frames to decode, as for `positions`.
 
         Yields
         ------
         start : int
-            The first frame of the block.
+            Number of the block's first frame in the clip.
         block : numpy.ndarray
-            (k, N, 3), scene units.
+            Positions (k, N, 3) of the block's k frames, scene units.
         """
         level, (first, last) = self._checked_level(level), self._checked_run(frames)
         segments = self._segments_of(first, last)
@@ -415,7 +419,7 @@ class Decoder(ArrayLike):
         seconds: float | Mapping[str, float],
         level: int | None | Mapping[str, int] = None,
     ) -> np.ndarray:
-        """Return several clips of the file at once, blended along the branches.
+        """Return positions that blend several clips of the file, branch by branch.
 
         Branches stay attached, and edges along stems are as long as the weighted mean of those in the clips.
 
@@ -424,19 +428,19 @@ class Decoder(ArrayLike):
         weights : mapping of str to float
             Weights by name of clip; up to four are above 0. They need not add up to 1.
         seconds : float or mapping of str to float
-            Time since the first frame, for all clips or for each; loops wrap around.
+            Time in seconds since the first frame, one for all clips or one for each by its name; loops wrap around.
         level : int or mapping of str to int, optional
-            Level of detail, for all clips or for each; by default the deepest that is complete.
+            Level of detail, one for all clips or one for each by its name; by default the deepest complete level.
 
         Returns
         -------
         numpy.ndarray
-            (N, 3) float32, scene units. If only one clip has a weight, its positions unchanged.
+            Positions (N, 3) float32, scene units. If only one clip has a weight above 0, these are its own positions.
 
         Raises
         ------
         ValueError
-            If no weight is above 0, one is not finite, or more than four are above 0.
+            If no weight or more than four weights are above 0, or a weight is not finite.
         ClipUnavailable
             If no clip has that name.
         """
@@ -532,7 +536,8 @@ class Decoder(ArrayLike):
         return self.level if level is None else self.file.tables.checked_level(level, WITHIN)
 
     def _indexed(self, index: Any, level: int, dtype: np.dtype) -> np.ndarray:
-        """Return what a NumPy index picks of all positions, after decoding the frames that it reads."""
+        """Return the items of the positions array that a NumPy index selects, after decoding only the frames that it
+        needs."""
         frames, of_frames = split_index(index, self.frame_count)
         shown = np.empty((len(frames), *self.shape[1:]), dtype if dtype in SHOWN_TYPES else self.dtype)
 
@@ -558,7 +563,8 @@ class Decoder(ArrayLike):
         return shown.astype(dtype, copy=False)[of_frames]
 
     def _runs_of(self, frames: np.ndarray) -> Iterator[range]:
-        """Yield the segments of the file that hold these ascending frames, in runs without a gap."""
+        """Yield ranges of segments, numbered over the whole file, that hold the given ascending frames of the clip.
+        Each range has no gap."""
         run, read = range(0), 0
         while read < len(frames):
             segment = self._segment_of(int(frames[read]))
@@ -578,9 +584,10 @@ class Decoder(ArrayLike):
 
     @contextmanager
     def _prepared(self, segment: int, level: int, to: np.ndarray | None = None) -> Iterator[core_file.Segment]:
-        """Give the caller alone a segment of the file at a level; the last one is kept. Raises as `positions`.
+        """Yield a segment of the file, prepared at a level, that only the caller uses until the block ends. The last
+        one stays in memory for the next call.
 
-        `to` is that of `AthFile.segments.prepare`.
+        `to` is an array for the positions, as in `AthFile.segments.prepare`, whose exceptions this raises.
         """
         place = segment, level
         with self._lock:

@@ -32,8 +32,9 @@ TICK_RATIO = Column("tick ratio")
 def facts_of(
     path: str | os.PathLike[str], decoder: Decoder, tick_ratios: Sequence[Sequence[float | None]] | None = None
 ) -> JsonObject:
-    """Return decoder.file.info(), and per level what it adds to the file cut before it. tick_ratios: of each clip at
-    each level, where they were measured."""
+    """Return the facts about a file: `decoder.file.info()` and, for each level, its bytes beyond those of the levels
+    before it. `tick_ratios` has for each clip, at each level, how much larger accelerations are near seams than in the
+    median frame, if it was measured."""
     facts: JsonObject = {"file": os.fspath(path)} | decoder.file.info()
     facts |= {"unit": decoder.metadata.get("unit"), "missing": decoder.file.missing}
     facts["raw_bytes"] = facts["frames"] * decoder.file.vertex_count * 12
@@ -51,7 +52,7 @@ def facts_of(
 
 
 def parts_of(facts: JsonObject) -> Iterator[str | Table]:
-    """Yield the lines and tables that `athcodec info` prints of the facts of a file."""
+    """Yield the lines of text and the tables that `athcodec info` prints, from the facts about a file."""
     ath = facts["ath"]
     rate = f" at {facts['fps']:.6g} per second" if facts["fps"] else ""
     yield (
@@ -81,7 +82,8 @@ def parts_of(facts: JsonObject) -> Iterator[str | Table]:
 
 
 def _presence(clip: JsonObject) -> str:
-    """Return the objects that some frame does not show, the first `NAMED_OBJECTS` of them, and the frames that do."""
+    """Return a line that names objects which some frames do not show, up to `NAMED_OBJECTS` of them, and the frames
+    that show them; "" if there are none."""
     named = [
         f"{name} in {', '.join(f'{first} to {stop - 1}' for first, stop in runs) or 'none'}"
         for name, runs in list(clip["presence"].items())[:NAMED_OBJECTS]
@@ -102,7 +104,7 @@ def _rest(facts: JsonObject) -> str:
 
 
 def _clips(facts: JsonObject) -> Table:
-    """Return errors at the seam are those of the deepest stored level."""
+    """Return the table of a file's clips. The column of errors at a loop's seam is for the deepest stored level."""
     rows = [
         [
             clip["name"],
@@ -121,7 +123,7 @@ def _clips(facts: JsonObject) -> Table:
 
 
 def _levels(facts: JsonObject) -> Table:
-    """Return the table of a file's levels: bytes and errors."""
+    """Return the table of a file's levels: their nodes, bytes and errors."""
     measures = {"max": "max_error", "99 %": "p99_error", "RMS": "rms_error"}
     columns = ["bytes so far", *(head(f"{name} error", facts["unit"]) for name in measures)]
     cells = [
@@ -135,7 +137,8 @@ def _levels(facts: JsonObject) -> Table:
 
 
 def level_rows(facts: JsonObject, cells: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return one row per level, ending in its `cells`, between what the file holds before and behind them."""
+    """Return the rows of a table of levels: one for the bytes before the first level, one for each level, which ends
+    with the level's texts from `cells`, and one for the bytes behind the last level."""
     levels, total = facts["levels"], facts["bytes"]
 
     def row(level: str, name: str, nodes: str, size: int) -> list[str]:

@@ -41,6 +41,8 @@ class FileBytes:
     is_closed = False  # Whether `close` has closed the file; a file object of a caller stays open.
 
     def __init__(self, path: Any, strict: bool, limits: Limits | None, gltf_motion: str | None) -> None:
+        """Open `path`, a path, URL, bytes or file object, and read the front of the file. With `strict`, its length has
+        to be the stated one. `gltf_motion` names the motion of a GLB."""
         self.limits = limits or Limits()
         self.bytes_read = 0
         self.lock = threading.Lock()
@@ -86,7 +88,7 @@ class FileBytes:
             return self._read_some(0, self.available_length)
 
     def _read_some(self, offset: int, length: int) -> bytes:
-        """Return `length` bytes, or fewer at the end; a file object may give fewer at a time than it was asked for."""
+        """Return up to `length` bytes from `offset` on, fewer only at the end of the file."""
         self.source.seek(offset)
         parts, size = [], 0
         while size < length and (part := self.source.read(length - size)):
@@ -108,8 +110,8 @@ class FileBytes:
             self.source.prefetch(ranges)
 
     def _open_core(self) -> core_file.File:
-        """Read as much of the front as the core needs, and return the file opened by the core. Raises the errors of
-        damaged files."""
+        """Read as much of the front as the C core needs, and return the file as the core has opened it. Raises
+        FormatError."""
         limits, data = core_file.Limits.of(self.limits), b""
         try:
             needed, memory, lacking = core_file.front(data, limits)
@@ -125,7 +127,7 @@ class FileBytes:
             raise self.refusal(error) from None
 
     def _no_ath_file(self) -> NotAnAthFile:
-        """Return the exception for another file, which says what it looks like and how to encode it."""
+        """Return the exception for a file that is not .ath, which says what it looks like and how to encode it."""
         head, name = self._read_some(0, HEAD_BYTES), self._name
         kind = kind_of_bytes(head, self.available_length)
         looks = f"it looks like {kind}" if kind != UNKNOWN else "got first bytes of no format that athcodec knows"
@@ -148,7 +150,8 @@ class FileBytes:
 
     @contextmanager
     def fed(self, ranges: list[tuple[int, int]], subject: str) -> Iterator[None]:
-        """Give the core these bytes, (offset, size), for as long as the context lasts. Raises as `prepare`."""
+        """Give the C core the bytes of these ranges (offset, size) of the file until the block ends. `subject` begins
+        messages. Raises LevelUnavailable if the file is cut off before, FormatError if the core finds a fault."""
         if any(offset + size > self.available_length for offset, size in ranges):
             raise LevelUnavailable(
                 f"{subject}: not in the file; it is cut off at {self.available_length} of {self.file_length} bytes"
@@ -167,7 +170,8 @@ class FileBytes:
 
 
 def _opened(path: Any, gltf_motion: str | None) -> Any:
-    """Return the file object of a path, a URL, bytes, a file object, or a motion inside a GLB."""
+    """Return a seekable binary file for a path, a URL, bytes, a file object, or the motion called `gltf_motion` inside
+    a GLB."""
     if hasattr(path, "read"):
         if isinstance(path, io.TextIOBase):
             raise TypeError("path: got a file opened as text; expected one opened with mode 'rb'")

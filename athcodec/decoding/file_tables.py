@@ -104,7 +104,7 @@ class FileTables:
 
     @cached_property
     def clips(self) -> tuple[Clip, ...]:
-        """The clips that the file holds, in its order."""
+        """The clips in the file, in their order."""
         return tuple(
             Clip(
                 *(clip.name.decode(), clip.first_frame, clip.frame_count, clip.first_segment, clip.segment_count),
@@ -179,7 +179,7 @@ class FileTables:
 
     @cached_property
     def missing(self) -> str:
-        """One line on what a cut-off or damaged file lacks; empty for a complete one."""
+        """A line that says what a cut-off or damaged file lacks; "" if it is complete."""
         late = self._chunks.table[self._is_late]
         parts = []
         for level in np.unique(late["level"]).tolist():
@@ -220,7 +220,8 @@ class FileTables:
         return np.flatnonzero(self.branches["first"] < ends[run])
 
     def levels_in(self, segments: range) -> list[Level]:
-        """Return the stored levels, coarse to fine, with their errors in some segments of the whole file."""
+        """Return the stored levels, coarse to fine. Their errors are those within `segments`, numbered over the whole
+        file."""
         return [
             Level(
                 level,

@@ -16,7 +16,8 @@ BETWEEN = "; at(seconds) shows the motion between frames"
 
 
 def split_index(index: Any, frame_count: int) -> tuple[np.ndarray, Any]:
-    """Return the frames that an index reads, ascending, and the index that picks its items from these frames alone.
+    """Return (frames, rest): the frames that a NumPy index of the positions needs, ascending, and the index that
+    selects the same items from an array of these frames alone.
 
     Raises
     ------

@@ -45,9 +45,9 @@ class SegmentDecoder:
         level : int
             A stored level.
         spare : core_file.Segment, optional
-            A prepared segment that nobody needs any more. If it is this one at a coarser level of all vertices, or the
-            one that this is joined to, decoding goes on from there and does not read its bytes again. Otherwise its
-            memory is reused if it is large enough.
+            A prepared segment that nobody needs any more. If it is the wanted segment at a coarser level of all
+            vertices, or the segment that the wanted one is joined to, decoding goes on from it and does not read its
+            bytes again. Otherwise only its memory is reused, if it is large enough.
         to : (k, N, 3) array, optional
             Array for the positions of the k frames, of the file's type, contiguous, in the source's order. The array
             stays untouched if decoding cannot write there directly.
@@ -55,14 +55,15 @@ class SegmentDecoder:
         Returns
         -------
         core_file.Segment
-            Argument for `core.positions` and `core.matrices`, unless `is_delivered`: then they are in the array.
+            The prepared segment, from which `core.positions` and `core.matrices` give frames. If its `is_delivered` is
+            true, the positions are in the array `to` instead.
 
         Raises
         ------
         LevelUnavailable
             If the file was cut off before the segment.
         FormatError
-            If it is damaged, or needs more memory than is allowed.
+            If the segment is damaged, or needs more memory than the limits allow.
         """
         segment, level = whole("segment", segment), whole("level", level)
         subject = f"level {level}, segment {segment}"
@@ -82,11 +83,11 @@ class SegmentDecoder:
         return ready
 
     def show_all(self, segments: range, level: int, show: Show, room: Room) -> None:
-        """Decode segments of the file at a level, in runs that threads share.
+        """Decode a range of segments of the file at a level, in runs of consecutive segments that threads share.
 
-        `room` takes a segment's number and returns the array that `prepare` has as `to`. For segments whose positions
-        did not go there, threads call `show` with the number and the prepared segment, whose memory the next one takes
-        over. Raises as `prepare`.
+        `room(segment)` returns the array for the positions of a segment, the parameter `to` of `prepare`, or None. If
+        the positions of a segment did not go into that array, a thread calls `show(segment, prepared)` with the
+        prepared segment, whose memory the next segment takes over afterwards. Raises the exceptions of `prepare`.
         """
         subject = f"level {level}, segments {segments.start} to {segments.stop - 1}"
         with self._bytes.lock, self._bytes.fed(self._core.missing(level, segments[0], segments[-1]), subject):
@@ -105,9 +106,11 @@ class SegmentDecoder:
         return needed
 
     def _runs(self, segments: range, level: int, subject: str) -> tuple[bool, list[range]]:
-        """Return whether memory allows to go on from a segment to one joined to it, and one run for each thread.
+        """Return (goes_on, runs): whether memory allows to keep a segment while the segment joined to it is decoded,
+        and one range of consecutive segments for each thread.
 
-        The first segment of a run is decoded with the one that it is joined to: no other thread has its end yet.
+        The first segment of a run is decoded together with the segment that it is joined to, because no other thread
+        has that one ready.
         """
         joined = any(self._core.joined_to(segment, level) >= 0 for segment in segments)
         size, limit, needed = (
@@ -122,7 +125,9 @@ class SegmentDecoder:
         return follows, [segments[start:stop] for start, stop in zip(cuts, cuts[1:])]
 
     def _show_run(self, run: range, level: int, follows: bool, show: Show, room: Room) -> core_file.CoreError | None:
-        """Return a fault rather than raise it, because the other runs need the file's bytes until they end."""
+        """Decode a range of segments at a level, one after the other, as `show_all` describes. `follows` says that a
+        segment stays in memory for the one joined to it. A fault is returned and not raised, because other threads
+        still need the file's bytes."""
         work, full = core_file.Work(self._core.work_size()), self._core.segment_size(level)
         size = max(full if room(segment) is None else self._core.segment_size_to(segment, level) for segment in run)
         ready, spare = core_file.Segment(size), None

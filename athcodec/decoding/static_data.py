@@ -61,7 +61,7 @@ class StaticData:
 
     @cached_property
     def place_hierarchy(self) -> Hierarchy:
-        """The branches in file order with a vertex for each place, which is what the file codes."""
+        """The branches in file order, with one vertex for each place: vertices that always coincide count as one."""
         number = np.empty(self.places.count, np.int32)
         number[self._core.vertex_places()[self.places.first]] = np.arange(self.places.count)
         return Hierarchy.from_parts(
@@ -74,7 +74,7 @@ class StaticData:
 
     @cached_property
     def hierarchy(self) -> Hierarchy:
-        """The branches in file order with all vertices, of which those at one place follow each other."""
+        """The branches in file order, with all vertices; those at the same place follow one another."""
         if not self.places.are_shared:
             return self.place_hierarchy
         starts, attach = self.place_starts, self._tables.branches["attach"]
@@ -147,7 +147,7 @@ class StaticData:
 
     @cached_property
     def attributes(self) -> dict[str, np.ndarray]:
-        """Named static arrays, unchanged. Those that a cut-off file lacks are left out."""
+        """The named static arrays, as in the source. Arrays that a cut-off file lacks are left out."""
         faces = self._polygons
         result: dict[str, np.ndarray] = {} if faces is None or faces.counts is None else faces.attributes
         for chunk in self._chunks.of_kind(ct.ATTRIBUTE):
@@ -190,8 +190,8 @@ class StaticData:
         return self._as_rest(self.level_rest(level)) if self._tables.rest_is_missing else self.rest_at(level)
 
     def rest_at(self, level: int) -> np.ndarray:
-        """Return the rest pose as decoded with a stored level. Raises Truncated if `rest_is_missing`,
-        LevelUnavailable."""
+        """Return the rest pose (N, 3) at the precision of a stored level. Raises Truncated if the file is cut off
+        before it, LevelUnavailable if there is no such level."""
         if self._tables.rest_is_missing:
             raise Truncated(
                 f"SOURCE_REST: not in the file; it is cut off at {self._bytes.available_length} of "
@@ -207,8 +207,9 @@ class StaticData:
 
     @property
     def rest_error(self) -> float:
-        """How far a vertex of `rest` may be from the source's rest pose where that is stored apart from the reference
-        pose, scene units; 0 if it is exact or is the reference pose, which is within the bound."""
+        """The largest distance of a vertex of `rest` from the source's rest pose, in scene units, if the file stores
+        that pose apart from the reference pose. Otherwise 0: the pose is exact, or is the reference pose, which is
+        within the error bound."""
         chunk = self._chunks.find(ct.SOURCE_REST)
         if chunk is None or self._tables.rest_is_missing:
             return 0.0
@@ -236,7 +237,8 @@ class StaticData:
 
     @contextmanager
     def _poses_read(self, level: int, kinds: Sequence[int] = ()) -> Iterator[None]:
-        """Give the core the reference poses up to a level's, and the chunks of these kinds, while the context lasts."""
+        """Give the C core the chunks of reference poses up to a level, and all chunks of `kinds`, until the block
+        ends."""
         with self._bytes.lock:
             chunks = [
                 chunk for chunk in self._chunks.of_kind(ct.REFINED_REST) if self._core.poses_read < chunk.level <= level
@@ -262,9 +264,10 @@ class StaticData:
         return not self._core.has_rest
 
     def set_host_mesh(self, mesh: HostMesh) -> None:
-        """Set the mesh of the host that is the rest pose; nothing happens if the file holds one or has got it.
+        """Set the rest pose from the mesh that the host application has. Nothing happens if the file holds its rest
+        pose or has been given it before.
 
-        Raises WrongHostMesh, ClipError.
+        Raises WrongHostMesh if it is another mesh, ClipError if it cannot be read.
         """
         if self.needs_host_mesh:
             positions, files = mesh_positions(mesh)

@@ -64,9 +64,9 @@ def keeping(inputs: Iterable[FileId]) -> Iterator[None]:
 
 
 def check_target(path: FilePath, suffix: str = "") -> str:
-    """Return the file that `path` names, behind any links. Raises OSError if nothing can be written there: the
-    directory is missing or read-only, or `path` is a directory, no plain file, read-only, an input, or not of the kind
-    that this suffix promises."""
+    """Return the path of the file to write for `path`, with links resolved. Raises OSError if nothing can be written
+    there: the folder is missing or read-only, or `path` is a folder, a device, read-only, an input of this call, or a
+    file of another kind than `suffix` stands for."""
     path = os.fspath(path)
     target = os.path.realpath(path)
     directory = os.path.dirname(target if os.path.islink(path) else path) or "."
@@ -89,7 +89,8 @@ def check_target(path: FilePath, suffix: str = "") -> str:
 
 
 def _check_replaceable(path: str, kind: str | None) -> None:
-    """Raise FileExistsError if the file is an input, or holds anything but this kind; None allows any kind."""
+    """Raise FileExistsError if the file `path` is an input, or holds something else than `kind`; with None, any content
+    may be replaced."""
     if not os.path.exists(path):
         return
     if file_id(path) in _inputs.get():
@@ -114,6 +115,8 @@ class PendingFile:
     """
 
     def __init__(self, path: FilePath):
+        """Create a temporary file beside `path`, with the permissions of the file that it will replace. Raises
+        OSError."""
         self.path = check_target(path)
         remove_leftovers(self.path)
         self.name, self.descriptor = _locked_new_file(self.path)
@@ -124,7 +127,8 @@ class PendingFile:
             raise
 
     def complete(self) -> None:
-        """Give the file its name, in place of an older one, as soon as its bytes are on the disk."""
+        """Write the bytes to the disk and rename the temporary file to its final name, replacing an older file. Raises
+        OSError."""
         _check_replaceable(self.path, kind_of(self.name))
         try:
             os.fsync(self.descriptor)
@@ -174,8 +178,8 @@ class _Naming(io.FileIO):
 
 @contextmanager
 def new_file(path: FilePath) -> Iterator[BinaryIO]:
-    """Give a file that replaces `path` when the block ends, and leaves nothing behind if the block raises. Raises
-    OSError."""
+    """Yield an open file that replaces `path` when the block ends. If the block raises, `path` stays as it was and
+    nothing else is left behind. Raises OSError."""
     pending = PendingFile(path)
     try:
         with io.BufferedRandom(_Naming(pending)) as out:
@@ -188,9 +192,9 @@ def new_file(path: FilePath) -> Iterator[BinaryIO]:
 
 @contextmanager
 def new_files(path: FilePath, named: bool = True) -> Iterator[str]:
-    """Give a folder for files that belong together. When the block ends, they move beside `path`, the one of that name
-    last, in place of older ones. If the block raises, nothing is left behind. One of them must have that name, unless
-    `named` is False. Raises OSError."""
+    """Yield a temporary folder for files that belong together. When the block ends, its files move beside `path` and
+    replace older ones, the file called like `path` last; there has to be one unless `named` is False. If the block
+    raises, nothing is left behind. Raises OSError."""
     path = check_target(path)
     directory, name = os.path.split(path)
     with scratch_folder(path) as folder:
@@ -207,8 +211,8 @@ def new_files(path: FilePath, named: bool = True) -> Iterator[str]:
 
 @contextmanager
 def new_folder(path: FilePath) -> Iterator[str]:
-    """Give a folder that becomes `path` when the block ends. Nothing that exists is replaced, and if the block raises,
-    nothing is left behind. Raises OSError."""
+    """Yield a temporary folder that is renamed to `path` when the block ends. Nothing that exists is replaced; if the
+    block raises, nothing is left behind. Raises OSError."""
     path = check_target(path)
     if os.path.lexists(path):
         raise FileExistsError(f"{path}: exists, expected the name of a new folder")
@@ -220,8 +224,8 @@ def new_folder(path: FilePath) -> Iterator[str]:
 
 @contextmanager
 def scratch_folder(path: str) -> Iterator[str]:
-    """Give a locked folder beside `path`, removed with all that is still in it when the block ends. An OSError that
-    names no file names `path`."""
+    """Yield a temporary folder beside `path`, which is removed with its content when the block ends. An OSError of the
+    block that names no file gets the name `path`."""
     remove_leftovers(path)
     directory, name = os.path.split(path)
     folder = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
@@ -240,7 +244,7 @@ def scratch_folder(path: str) -> Iterator[str]:
 
 
 def _sync_folder(folder: str) -> None:
-    """Write a folder to the disk, so that a new name in it survives a power failure."""
+    """Write the entries of a folder to the disk, so that a new file name in it survives a power failure."""
     if fcntl is None:
         return  # Windows opens no folders.
     with suppress(OSError):  # The folder cannot be read, or the file system syncs none; the file itself is complete.
@@ -282,8 +286,8 @@ def _prefix(name: str) -> str:
 
 
 def _locked_new_file(path: str) -> tuple[str, int]:
-    """Create a file beside `path` and lock it, so that no other writer takes it for a leftover. Return its name and
-    descriptor."""
+    """Return (name, descriptor) of a new, open and locked temporary file beside `path`. The lock shows other writers
+    that the file is in use."""
     directory, name = os.path.split(path)
     while True:
         pending = os.path.join(directory, f"{_prefix(name)}{secrets.token_hex(4)}.part")
@@ -301,7 +305,7 @@ def _locked_new_file(path: str) -> tuple[str, int]:
 
 
 def _remove_if_dead(name: str) -> None:
-    """Remove a temporary file or folder whose writer no longer runs."""
+    """Remove the temporary file or folder `name` if the process that wrote it no longer runs, which its lock shows."""
     with suppress(OSError):  # The file is locked by its writer, gone by now, or not ours.
         if fcntl is None:
             shutil.rmtree(name) if os.path.isdir(name) else os.unlink(name)
@@ -320,7 +324,8 @@ def _remove_if_dead(name: str) -> None:
 
 
 def _take_permissions(path: str, descriptor: int) -> None:
-    """Copy owner, if that is allowed, group and mode of an older file, so that a private file stays private."""
+    """Give the open file `descriptor` the mode, group and, if allowed, owner of the older file `path`, so that a
+    private file stays private."""
     if fcntl is None:
         return
     try:

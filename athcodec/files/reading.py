@@ -95,10 +95,10 @@ class FileWatch:
 
 
 def file_beside(folder: FilePath, name: str, allow_outside: bool = False) -> Path:
-    """Return the file that a source names, by a path from its folder.
+    """Return the path of the file that a source refers to as `name`, relative to its folder.
 
-    Raises ClipError if it is no plain file and, unless `allow_outside`, if it lies outside of that folder: a
-    source that is not trusted must not reach other files on the disk.
+    Raises ClipError if `name` is no plain file or, unless `allow_outside`, lies outside of the folder: a source that is
+    not trusted must not reach other files on the disk.
     """
     if not name or "\0" in name:
         raise ClipError(f"got the file name {name[:80]!r}, expected a path")
@@ -125,7 +125,8 @@ def _stamp(file: File) -> Stamp:
 
 @contextmanager
 def naming(path: FilePath, *errors: type[Exception]) -> Iterator[None]:
-    """Turn ClipErrors of the block, and errors of these further types, into ClipErrors that begin with `path`."""
+    """Turn ClipErrors of the block, and exceptions of the types `errors`, into ClipErrors whose messages begin with
+    `path`."""
     try:
         yield
     except ClipError as error:

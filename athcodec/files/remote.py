@@ -114,7 +114,8 @@ class Remote:
     # ---- as a file ----
 
     def read(self, size: int = -1) -> bytes:
-        """Return the next `size` bytes, or all that follow, and fetch those that are not there."""
+        """Return the next `size` bytes of the file, or all that follow. Bytes that are not in memory yet are
+        fetched."""
         stop = self.size if size < 0 else min(self._place + size, self.size)
         parts = []
         while self._place < stop:
@@ -146,7 +147,8 @@ class Remote:
 
 
 def _joined(ranges: list[Range]) -> list[Range]:
-    """Return ascending ranges without empty ones; those that are less than a GAP apart become one."""
+    """Return ascending ranges (offset, size) without empty ones. Ranges that are at most GAP bytes apart are merged
+    into one."""
     joined: list[Range] = []
     for offset, size in ranges:
         if joined and size and offset - sum(joined[-1]) <= GAP:
@@ -157,7 +159,8 @@ def _joined(ranges: list[Range]) -> list[Range]:
 
 
 def _source(remote: Remote, options: JsonObject) -> _Http | _AnySystem:
-    """Return the transport of a URL: HTTP with checks of its answers, or any other file system."""
+    """Return what fetches the bytes of a URL: HTTP with checks of the server's answers, or another file system of
+    fsspec. Raises RemoteError if a package is missing."""
     shown = without_secrets(remote.url)
     try:
         import fsspec
@@ -179,8 +182,8 @@ def _source(remote: Remote, options: JsonObject) -> _Http | _AnySystem:
 
 
 def guarded(url: str, options: JsonObject) -> JsonObject:
-    """Return options for fsspec's file system of HTTP, with which a server cannot redirect us to machines that it does
-    not reach itself: redirects from a public address to a private one raise RemoteError."""
+    """Return `options` for fsspec's HTTP file system, extended so that a redirect from a public address to a private
+    one raises RemoteError. A server could otherwise reach machines in the user's own network."""
     import aiohttp
 
     first = urlsplit(url).hostname or ""
@@ -227,7 +230,8 @@ class _AnySystem:
         return size
 
     def fetch(self, ranges: list[Range]) -> list[tuple[int, bytes]]:
-        """Fetch all ranges at once, if the file system can."""
+        """Return (offset, bytes) of each range (offset, size), fetched at once if the file system can. Raises
+        RemoteError."""
         if not ranges:
             return []
         starts, stops = [offset for offset, _ in ranges], [offset + size for offset, size in ranges]
@@ -270,7 +274,7 @@ class _Http:
         return "" if self._tags else ", or the file has been changed on the server, which says nothing of that"
 
     def size(self) -> int:
-        """Return the length of the file and its first bytes, in one request."""
+        """Return the length of the file in bytes, and keep its first bytes, which the same request fetches."""
         try:
             self._remote.keep(self.fetch([(0, READ_AHEAD)]))
         except BaseException:
@@ -285,6 +289,7 @@ class _Http:
         return sync(self._system.loop, self._fetch_all, ranges) if ranges else []
 
     async def _fetch_all(self, ranges: list[Range]) -> list[tuple[int, bytes]]:
+        """Return (offset, bytes) of all ranges (offset, size), with up to AT_ONCE requests at a time."""
         slots = asyncio.Semaphore(AT_ONCE)
 
         async def one(offset: int, size: int) -> tuple[int, bytes]:
@@ -299,7 +304,8 @@ class _Http:
                 task.cancel()
 
     async def _fetch(self, offset: int, size: int) -> tuple[int, bytes]:
-        """Return (offset, bytes) of a range, or (0, the whole file) from a server without ranges."""
+        """Return (offset, bytes) of one range, or (0, the whole file) if the server ignores ranges. Failures that may
+        pass are tried again. Raises RemoteError."""
         for attempt in range(self._remote.retries + 1):
             try:
                 return await self._ask(offset, size)
@@ -310,6 +316,8 @@ class _Http:
         raise self._refusal(f"{reason}; tried {self._remote.retries + 1} times")
 
     async def _ask(self, offset: int, size: int) -> tuple[int, bytes]:
+        """Send one request for a range and return (offset, bytes) as `_fetch` does. Raises _Again for a failure that
+        may pass, RemoteError for any other."""
         import aiohttp
 
         options = dict(self._system.kwargs)
@@ -336,6 +344,7 @@ class _Http:
             raise _Again(f"the connection failed ({type(error).__name__}: {_one_line(error)})") from error
 
     async def _answered(self, answer: aiohttp.ClientResponse, offset: int, size: int) -> tuple[int, bytes]:
+        """Return (offset, bytes) from the server's answer to the request for a range. Raises _Again, RemoteError."""
         if answer.status == 206:
             return offset, await self._part(answer, offset, size)
         if answer.status == 200:
@@ -347,6 +356,8 @@ class _Http:
         raise self._refusal(f"the server answers {answer.status} {answer.reason}")
 
     async def _part(self, answer: aiohttp.ClientResponse, offset: int, size: int) -> bytes:
+        """Return the bytes of an answer that holds just the range that was asked for. Raises RemoteError if it holds
+        another."""
         content_range = answer.headers.get("Content-Range", "nothing")
         match = _RANGE.fullmatch(content_range)
         if match is None or answer.headers.get("Content-Encoding", "identity") != "identity":
@@ -362,7 +373,8 @@ class _Http:
         return await self._body(answer, last + 1 - first)
 
     async def _whole(self, answer: aiohttp.ClientResponse) -> bytes:
-        """Return the server ignores ranges: what it sends is taken as a whole where it can be kept."""
+        """Return the whole file from the answer of a server that ignores ranges. Raises RemoteError if the file is too
+        large to be kept in memory."""
         length = None if "Content-Encoding" in answer.headers else answer.content_length
         if length is not None and length > KEPT_BYTES:
             raise self._refusal(
@@ -382,6 +394,7 @@ class _Http:
         return b""
 
     async def _body(self, answer: aiohttp.ClientResponse, expected: int | None) -> bytes:
+        """Return the bytes of an answer. Raises _Again if fewer than `expected` arrive, RemoteError if more do."""
         most = KEPT_BYTES if expected is None else expected
         data = bytearray()
         async for piece in answer.content.iter_chunked(1 << 16):
@@ -394,7 +407,8 @@ class _Http:
         return bytes(data)
 
     def _check_same(self, length: int, headers: Mapping[str, str]) -> None:
-        """Raise RemoteError if the file is not the one that was opened."""
+        """Raise RemoteError if length, ETag or Last-Modified of an answer show that the file has changed since it was
+        opened."""
         tags = {name: headers[name] for name in ("ETag", "Last-Modified") if name in headers}
         if self._length is None:
             self._length, self._tags = length, tags

@@ -58,6 +58,7 @@ class Table(NamedTuple):
     justify: Literal["right", "left"] = "right"
 
     def print(self, file: TextIO) -> None:
+        """Print the table to an open text file, with columns aligned."""
         from rich import box, console, table, text  # The package takes long to import.
 
         drawn = table.Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)

@@ -35,7 +35,7 @@ class ThreadPool:
         self._executor = ThreadPoolExecutor(jobs) if jobs > 1 or beside else None
 
     def map(self, function: Callable[..., Result], items: Sequence[tuple[object, ...]]) -> list[Result]:
-        """Return function(*item) of all items, in order."""
+        """Return the list of function(*item) for all items, in their order; threads share the calls."""
         if self._executor is None or len(items) < 2:
             return [function(*item) for item in items]
         started = [self._start(function, *item) for item in items]
@@ -46,7 +46,8 @@ class ThreadPool:
                 future.cancel()
 
     def ordered(self, function: Callable[[Item], Result], items: Iterable[Item], ahead: int) -> Iterator[Result]:
-        """Yield function(item) of all items, in order; up to `ahead` further items are read and started meanwhile."""
+        """Yield function(item) for all items, in their order. Up to `ahead` further items are read and started while
+        one is waited for."""
         if self._executor is None:
             yield from map(function, items)
             return
@@ -59,7 +60,8 @@ class ThreadPool:
             yield pending.popleft().result()
 
     def _start(self, function: Callable[..., Result], *words: object) -> Future[Result]:
-        """Start the call on another thread or, if there is no memory for one, run it on the caller's."""
+        """Start function(*words) on another thread and return its future. If no thread can be started, run it at once
+        on the caller's thread."""
         if self._executor is not None:
             try:
                 return self._executor.submit(function, *words)

@@ -76,6 +76,9 @@ class Pieces:
         parent: np.ndarray,
         generation: np.ndarray,
     ) -> None:
+        """Describe pieces of a plant in the rest pose (N, 3). Piece i has branches first_branch[i] to stop_branch[i] -
+        1; `parent` (C,) is the piece that it hangs on, -1 for none; `generation` (C,) groups pieces that do not
+        overlap."""
         bounds = np.append(hierarchy.first_vertex, hierarchy.vertex_count).astype(np.intp)
         self.first_branch, self.stop_branch, self.parent = first_branch, stop_branch, parent
         self.first, self.stop = bounds[first_branch], bounds[stop_branch]
@@ -108,7 +111,8 @@ class Pieces:
         return Fit(self, frames)
 
     def _describe_rest_pose(self, generations: list[np.ndarray]) -> None:
-        """Fill each piece's centroid, principal axes (columns, longest first), rank and pseudo-inverse."""
+        """Compute the centroid, the principal axes (as columns, longest first), the rank and the pseudo-inverse of each
+        piece's rest pose. `generations` are groups of pieces that do not overlap."""
         count = len(self.first)
         self.centroid = np.empty((count, 3))
         covariance = np.empty((count, 3, 3))
@@ -142,6 +146,9 @@ class Fit:
     def __init__(
         self, pieces: Pieces, frames: np.ndarray, measured: Differences | None = None, xi: float = np.inf
     ) -> None:
+        """Fit the affine map of every piece in `frames` (3, k, N), with the axes x, y, z first. If `measured` is
+        passed, it gets the distances that the fit leaves, and the number of vertices further off than `xi`, in scene
+        units."""
         self.pieces, self.frames = pieces, np.ascontiguousarray(frames, np.float64)
         (_, count, vertices), stems, n = frames.shape, len(pieces.stems) - 1, len(pieces.first)
         self.linear, self.inverse = np.empty((2, count, n, 3, 3))

@@ -14,7 +14,8 @@ from athcodec._native import address, lib
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a @ b, of stacks of matrices, in float64."""
+    """Return the matrix products a @ b of two stacks of matrices, float64. The sums are added up in one order, so that
+    the result has the same bits on every processor."""
     batch = np.broadcast_shapes(a.shape[:-2], b.shape[:-2])
     (rows, inner), columns = a.shape[-2:], b.shape[-1]
     if b.shape[-2] != inner:

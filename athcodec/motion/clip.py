@@ -276,12 +276,12 @@ class MotionClip:
     def check(self) -> None:
         """Check the structure again, after fields were set, and bring the small arrays to their documented dtypes.
 
-        Positions are read only to make a rest pose where there is none.
+        If the clip has no rest pose, it is made now, from the first frame or from all frames.
 
         Raises
         ------
         ClipError
-            If the structure is wrong.
+            If a field has a wrong shape, type or value, or fields contradict each other.
         """
         frame_count, vertex_count = self._check_positions()
         check_clip_ranges(self.clip_ranges, frame_count)
@@ -336,7 +336,7 @@ class MotionClip:
         Raises
         ------
         IndexError
-            For frames that do not exist.
+            If `start` and `stop` are not as above.
         ClipError
             If a position is NaN, infinite or beyond 1e18, or cannot be read.
         """
@@ -389,6 +389,8 @@ class MotionClip:
         return length - length % self.chunk_frames if self.chunk_frames <= length else length
 
     def _check_branches(self, vertex_count: int) -> None:
+        """Raise ClipError unless vertex_branch, branch_parent and stem_index fit each other, and bring them to
+        int32."""
         if self.vertex_branch is None and self.branch_parent is None:
             if self.stem_index is not None:
                 raise ClipError("stem_index: got places on branches that are not known, expected none")
@@ -399,7 +401,7 @@ class MotionClip:
         self.stem_index = check_stem_index(self.stem_index, self.vertex_branch)
 
     def _take_padding_off(self) -> None:
-        """Turn faces whose rows end with -1 into polygons of different sizes."""
+        """Turn faces whose rows are filled up with -1 into polygons of different sizes."""
         faces = np.asarray(self.faces)
         if self.faces is None or faces.ndim != 2 or faces.dtype.kind != "i" or not (faces == -1).any():
             return
@@ -415,6 +417,8 @@ class MotionClip:
         self.metadata["domains"] = (stated if isinstance(stated, dict) else {}) | domains
 
     def _check_positions(self) -> tuple[int, int]:
+        """Return the numbers of frames and vertices. Raises ClipError unless the positions are floats (frames,
+        vertices, 3)."""
         shape, dtype = tuple(self.positions.shape or ()), self.positions.dtype
         if len(shape) != 3 or shape[2] != 3:
             raise ClipError(f"positions: got shape {shape}, expected (frames, vertices, 3)")
@@ -427,6 +431,7 @@ class MotionClip:
         return shape[0], shape[1]
 
     def _check_rest(self) -> None:
+        """Check the rest pose (N, 3) or, without one, make it from the first frame or the mean of all frames."""
         if self.rest_pose not in ("first", "mean"):
             raise ClipError(f'rest_pose: got {self.rest_pose!r}, expected "first" or "mean"')
         if cast(np.ndarray | None, self.rest) is None:
@@ -459,8 +464,8 @@ def check_float_dtype(name: str, dtype: np.dtype) -> None:
 
 
 def check_finite(frames: np.ndarray, start: int = 0) -> None:
-    """Raise ClipError, naming frame and vertex, unless the (k, N, 3) frames from `start` on are finite numbers whose
-    squares are finite in float32 arithmetic too."""
+    """Raise ClipError, which names frame and vertex, if a coordinate in `frames` (k, N, 3) is not finite or so large
+    that its square overflows float32. `start` is the number of the first frame."""
     if -LARGEST_COORDINATE <= frames.min() and frames.max() <= LARGEST_COORDINATE:  # False if one is NaN.
         return
     usable = np.abs(frames) <= LARGEST_COORDINATE
@@ -479,7 +484,7 @@ def clip_range_frames(clip_ranges: Sequence[ClipRange]) -> list[tuple[int, int]]
 
 
 def check_clip_ranges(clip_ranges: Sequence[ClipRange], frame_count: int) -> None:
-    """Raise ClipError unless the ranges make up all frames and have different names that can be stored; a single one
+    """Raise ClipError unless the ranges cover all frames and have different names that a file can hold. A single range
     may have no name."""
     if not clip_ranges:
         return
@@ -505,8 +510,8 @@ def is_name(text: str) -> bool:
 
 
 def check_time(time: ArrayLike, frame_count: int, clip_ranges: Sequence[ClipRange] = ()) -> np.ndarray:
-    """Return (T,) float64 seconds. Raises ClipError unless they are finite, increase within each clip range, one per
-    frame."""
+    """Return the times (T,) of the frames as float64 seconds. Raises ClipError unless there is one for each frame, all
+    are finite, and they increase within each clip range."""
     times: np.ndarray = np.asarray(time)
     if times.shape != (frame_count,):
         raise ClipError(f"time: got shape {times.shape}, expected ({frame_count},), one time per frame")
@@ -544,10 +549,11 @@ def frame_rate(metadata: JsonMapping) -> float:
 
 
 def median_rate(*runs: np.ndarray) -> float:
-    """Return the frame rate of the median step in runs of times, (T,) seconds each; 0 if none has two frames.
+    """Return the frame rate, in frames per second, of the median step in one or more arrays of times (T,) in seconds; 0
+    if no array has two frames.
 
-    A rate is the usual one (30, 23.976, 24000 / 1001) that the times were computed from, where it is as close as the
-    rounding of the times allows to tell.
+    If the rate equals a usual one (30, 23.976, 24000 / 1001) up to the rounding of the times, the usual one is
+    returned.
     """
     steps = np.concatenate([np.diff(run) for run in runs])
     if not len(steps):
@@ -563,7 +569,8 @@ def median_rate(*runs: np.ndarray) -> float:
 
 
 def check_indices(name: str, indices: ArrayLike, stop: int, width: int | None = None) -> np.ndarray | None:
-    """Return `indices` as an array of its integer dtype. Raises ClipError unless every entry is in 0 .. stop - 1."""
+    """Return the array of vertex numbers called `name`, in its own integer type, or None for None. Raises ClipError
+    unless it has two axes, the second one of length `width` if that is given, and every number is in 0 .. stop - 1."""
     if indices is None:
         return None
     array: np.ndarray = np.asarray(indices)
@@ -600,8 +607,8 @@ def check_polygons(faces: tuple[np.ndarray, np.ndarray] | None, vertex_count: in
 def check_branches(
     vertex_branch: ArrayLike, branch_parent: ArrayLike, vertex_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (N,) and (B,) int32 labels and parents. Raises ClipError unless they are a forest of branches with
-    vertices."""
+    """Return (vertex_branch (N,), branch_parent (B,)) as int32: the branch of each vertex, and the parent of each
+    branch, -1 for a root. Raises ClipError unless every branch has vertices and no branch is its own ancestor."""
     branch_parent = _integers("branch_parent", branch_parent)
     branch_count = len(branch_parent)
     vertex_branch = _integers("vertex_branch", vertex_branch)
@@ -619,9 +626,10 @@ def check_branches(
 
 
 def check_stem_index(stem_index: ArrayLike, vertex_branch: np.ndarray) -> np.ndarray | None:
-    """Return (N,) int32, or None if it only repeats the order of the vertex numbers.
+    """Return the place of each vertex along its branch (N,), int32, or None if these places only repeat the order of
+    the vertices. `vertex_branch` (N,) is the branch of each vertex.
 
-    Raises ClipError unless every branch with n vertices has the places 0 .. n - 1 once each.
+    Raises ClipError unless a branch with n vertices has each of the places 0 .. n - 1 once.
     """
     if stem_index is None:
         return None
@@ -658,9 +666,10 @@ def stem_index_of(vertex_branch: np.ndarray, along: np.ndarray) -> np.ndarray:
 
 
 def check_attributes(attributes: JsonMapping | None) -> tuple[dict[str, np.ndarray], dict[str, list[str]]]:
-    """Return named arrays, little-endian and without records, and the names of those that no file holds (`NOT_KEPT`).
+    """Return (attributes, left_out): the named arrays in little-endian order, with each field of a record as an array
+    of its own, and the names of arrays of types that no file holds, by kind.
 
-    Raises ClipError unless the names are free, and the values numbers, booleans or bytes.
+    Raises ClipError if a name is taken, or values are not numbers, booleans or bytes.
     """
     checked: dict[str, np.ndarray] = {}
     left_out: dict[str, list[str]] = {}
@@ -688,7 +697,8 @@ def _columns(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _plain(value: JsonValue) -> JsonValue:
-    """Return a value of metadata with Python's numbers in place of NumPy's and those of other libraries."""
+    """Return a value of metadata with its numbers and lists as plain Python ones, in place of types of NumPy and other
+    libraries."""
     if type(value) in PLAIN_TYPES:
         return value
     if isinstance(value, dict):
@@ -708,6 +718,8 @@ def _plain(value: JsonValue) -> JsonValue:
 
 
 def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
+    """Return branch_parent (B,) as int32. Raises ClipError unless each is the number of another branch, or -1, and
+    there is no cycle."""
     branch_count = len(branch_parent)
     bad = np.flatnonzero((branch_parent < -1) | (branch_parent >= branch_count))
     if bad.size:
@@ -725,7 +737,8 @@ def _check_parents(branch_parent: np.ndarray) -> np.ndarray:
 
 
 def _branch_on_cycle(branch_parent: np.ndarray) -> int | None:
-    """Return the number of a branch that is its own ancestor; None if there is none."""
+    """Return the number of a branch that is its own ancestor, or None if there is none. `branch_parent` (B,) has -1 for
+    roots."""
     count = len(branch_parent)
     ancestor = np.append(np.where(branch_parent < 0, count, branch_parent), count)
     for _ in range(count.bit_length()):

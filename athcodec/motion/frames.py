@@ -62,6 +62,8 @@ class Frames:
         return self.shape[0]
 
     def __getitem__(self, frames: slice) -> np.ndarray:
+        """Return the positions (k, N, 3) of a slice of frames, reading those that are not in memory. The step of the
+        slice has to be 1."""
         start, stop, step = frames.indices(self.shape[0])
         if step != 1:
             raise ValueError(f"frames: got a step of {step}, expected 1")

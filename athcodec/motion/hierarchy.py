@@ -83,11 +83,12 @@ class Hierarchy:
         Parameters
         ----------
         branch_parent, stem_count, attach : (B,) integer arrays
-            In file order.
+            In file order: the parent of each branch, -1 for a root; the number of vertices on its stem; and the vertex
+            of the parent's stem that it is attached to, -1 for a root.
         vertex_source : (N,) integer array, optional
-            A permutation; the identity by default.
+            The source's number of each vertex, a permutation; by default the numbers are the same.
         branch_source : (B,) integer array, optional
-            A permutation; the identity by default.
+            The source's number of each branch, a permutation; by default the numbers are the same.
 
         Returns
         -------
@@ -136,7 +137,8 @@ class Hierarchy:
         return int(self.first_vertex[branch]), int(self.first_vertex[last] + self.stem_count[last])
 
     def source_branches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return vertex_branch (N,), branch_parent (B,) and stem_index (N,) in source numbering, int32."""
+        """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, with vertices and branches numbered
+        as in the source."""
         branch = self.vertex_branch()
         vertex_branch = np.empty_like(branch)
         vertex_branch[self.vertex_source] = self.branch_source[branch]
@@ -160,15 +162,15 @@ def build_hierarchy(
     edges: np.ndarray | None = None,
     stem_index: np.ndarray | None = None,
 ) -> Hierarchy:
-    """Return the hierarchy of labelled branches.
+    """Return the hierarchy of branches whose vertices are labelled.
 
-    vertex_branch (N,), branch_parent (B,), rest (N, 3), edges (E, 2) or None and stem_index (N,) or None are
-    as in MotionClip, in source numbering. A branch attaches to the parent's stem along the edge nearest to
-    its own base; where the edges join none of its vertices to that stem, at the stem's vertex nearest to its
-    base in the rest pose.
+    vertex_branch (N,) is the branch of each vertex, branch_parent (B,) the parent of each branch, -1 for a root, rest
+    (N, 3) the rest pose, edges (E, 2) pairs of vertices, and stem_index (N,) the place of each vertex along its branch,
+    all in the source's numbering as in MotionClip. A branch is attached to its parent's stem by the edge nearest to the
+    branch's base. If no edge joins it to that stem, it is attached to the stem's vertex nearest to its base in the rest
+    pose.
 
-    Raises ClipError if labels and parents are no forest of branches that have vertices (see
-    check_branches).
+    Raises ClipError unless every branch has vertices and no branch is its own ancestor (see check_branches).
     """
     rest = np.asarray(rest, np.float64)
     vertex_branch, branch_parent = check_branches(vertex_branch, branch_parent, len(rest))
@@ -188,7 +190,8 @@ def build_hierarchy(
 def branches_from_edges(
     edges: np.ndarray, vertex_count: int, rest: np.ndarray, root: int | Sequence[int] | None = None, up_axis: str = "y"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the branches of a forest of centre lines: int32 vertex_branch (N,), branch_parent (B,), stem_index (N,).
+    """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of the branches that centre lines form:
+    the branch of each vertex, the parent of each branch, -1 for a root, and the vertex's place along its branch.
 
     edges (E, 2) joins vertices 0 .. vertex_count - 1 in either direction; an edge given twice counts once.
     Each connected part is rooted at the vertex of `root` that lies in it, else at its lowest vertex along
@@ -196,7 +199,7 @@ def branches_from_edges(
     into the subtree with most vertices (the lowest vertex number, if equal), and the others start branches. Branches
     are numbered in depth-first preorder, siblings from base to tip.
 
-    Raises ClipError if the edges close a cycle (it names one edge of it) or root is not usable.
+    Raises ClipError if the edges close a cycle, of which it names one edge, or if `root` is not usable.
     """
     edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)
@@ -238,9 +241,10 @@ def derived_edges(hierarchy: Hierarchy) -> np.ndarray:
 
 
 def branch_orders(branch_parent: np.ndarray) -> np.ndarray:
-    """Return the order of each branch, (B,) int32: 0 for a root, 1 for a branch of a root and so on.
+    """Return the order of each branch, (B,) int32: 0 for a root, 1 for a branch on a root, 2 for a branch on that, and
+    so on.
 
-    branch_parent (B,) may be in any order but must have no cycle.
+    branch_parent (B,) has the parent of each branch, -1 for a root, in any order but without a cycle.
     """
     count = len(branch_parent)
     ancestor = np.append(np.where(np.asarray(branch_parent) < 0, count, branch_parent), count)
@@ -255,6 +259,7 @@ class _EulerTour:
     """Return every edge of a forest once in each direction, in the order of a walk around each connected part."""
 
     def __init__(self, edges: np.ndarray, vertex_count: int) -> None:
+        """Prepare walks around the parts of the graph that `edges` (E, 2) form. Raises ClipError if it has a cycle."""
         once = np.unique(np.sort(edges, axis=1), axis=0)
         loops = np.flatnonzero(once[:, 0] == once[:, 1])
         if loops.size:
@@ -275,6 +280,8 @@ class _EulerTour:
         return np.where(is_last, self.first[self.tail], following)
 
     def _parts(self, once: np.ndarray, vertex_count: int) -> np.ndarray:
+        """Return a number for each vertex (vertex_count,) that all vertices of its connected part share. `once` (E, 2)
+        has each edge once. Raises ClipError if a part has a cycle."""
         label, jump = np.arange(len(self.tail)), self.successor
         for _ in range(self.doublings):
             label, jump = np.minimum(label, label[jump]), jump[jump]
@@ -290,8 +297,8 @@ class _EulerTour:
         return part
 
     def rooted_at(self, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return parent (-1 for a root) and number of vertices in the subtree of every vertex, for one root per
-        part."""
+        """Return (parent, subtree_size) of every vertex: its parent, -1 for a root, and the number of vertices in its
+        subtree, itself included. `roots` has one vertex of each connected part."""
         remaining, jump = self._steps_to_end(roots)
         for _ in range(self.doublings):
             remaining, jump = remaining + remaining[jump], jump[jump]
@@ -304,6 +311,8 @@ class _EulerTour:
         return parent, subtree_size
 
     def _steps_to_end(self, roots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return for every directed edge whether a step follows it (1) or it is the last of the walk from its part's
+        root (0), and the number of the edge that follows it."""
         starts = self.first[roots][self.first[roots] < self.first[roots + 1]]
         jump = self.successor.copy()
         ends = _inverse(self.successor)[starts]
@@ -314,6 +323,9 @@ class _EulerTour:
 
 
 def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
+    """Return the root vertex of each connected part: the vertex of `root` that lies in it, or else its lowest one along
+    `up_axis` in the rest pose (N, 3). `part` (N,) is the part of each vertex. Raises ClipError if `root` is not
+    usable."""
     axis, sign = _parse_axis(up_axis)
     vertices = np.array([] if root is None else root, object).ravel()  # NumPy has no common type for all integers.
     wanted = np.array([whole("root", vertex) for vertex in vertices], np.int64)
@@ -361,7 +373,8 @@ def _cosines(parent: np.ndarray, children: np.ndarray, rest: np.ndarray) -> np.n
 
 
 def _closing_edge(edges: np.ndarray, vertex_count: int) -> int:
-    """Return the first edge that joins two vertices which the edges before it already join."""
+    """Return the row of the first edge in `edges` (E, 2) whose vertices earlier edges already connect, so that it
+    closes a cycle."""
     leader = list(range(vertex_count))
 
     def find(vertex: int) -> int:
@@ -385,7 +398,8 @@ def _raise_cycle(edge: np.ndarray) -> None:
 
 
 def _preorder(branch_parent: np.ndarray, sibling_order: np.ndarray) -> np.ndarray:
-    """Return branches in depth-first preorder; siblings stand as in `sibling_order`, which lists all branches."""
+    """Return the branch numbers in depth-first preorder. `sibling_order` lists all branches so that children of one
+    branch are in the order in which they are to be visited."""
     children: list[list[int]] = [[] for _ in range(len(branch_parent) + 1)]
     for branch in sibling_order[::-1].tolist():
         children[branch_parent[branch]].append(branch)
@@ -398,6 +412,8 @@ def _preorder(branch_parent: np.ndarray, sibling_order: np.ndarray) -> np.ndarra
 
 
 def _subtree_sizes(parent: np.ndarray) -> np.ndarray:
+    """Return the number of branches in the subtree of each branch, itself included. `parent` (B,) is in file order.
+    Raises ClipError unless this is depth-first preorder."""
     counted = [1] * len(parent)
     parents = parent.tolist()
     for branch in range(len(counted) - 1, -1, -1):
@@ -420,6 +436,8 @@ def _check_parents_before(parent: np.ndarray) -> None:
 
 
 def _check_stems(parent: np.ndarray, stem_count: np.ndarray, attach: np.ndarray) -> None:
+    """Raise ClipError unless every stem has vertices, parents come before their children, and each branch is attached
+    to a vertex of its parent's stem. The arrays (B,) are in file order."""
     if not len(parent) == len(stem_count) == len(attach) > 0:
         lengths = f"{len(parent)}, {len(stem_count)} and {len(attach)}"
         raise ClipError(f"hierarchy: got {lengths} parents, stems and attach points, expected equally many, at least 1")
@@ -441,7 +459,9 @@ def _check_stems(parent: np.ndarray, stem_count: np.ndarray, attach: np.ndarray)
 def _attach_points(
     parent: np.ndarray, stem_count: np.ndarray, rest: np.ndarray, edges: np.ndarray | None
 ) -> np.ndarray:
-    """Return the attach point of every branch; all in file order."""
+    """Return the vertex of the parent's stem that each branch is attached to (B,), -1 for a root. If no edge joins a
+    branch to that stem, this is the stem's vertex nearest to the branch's base in the rest pose, `rest` (N, 3). All
+    arrays are in file order."""
     attach = np.full(len(parent), -1, np.int64)
     first = np.cumsum(stem_count) - stem_count
     if edges is not None:
@@ -457,8 +477,8 @@ def _attach_points(
 def _joining_edges(
     parent: np.ndarray, vertex_branch: np.ndarray, rest: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the branches that an edge joins to their parent's stem, and where: the edge nearest to the base, then the
-    shortest."""
+    """Return (branches, vertices): the branches that an edge joins to their parent's stem, and the vertex of the stem
+    at that edge. Of several edges, the one nearest to the branch's base is taken, then the shortest."""
     child_vertex, other = np.concatenate([edges, edges[:, ::-1]]).T
     joins = parent[vertex_branch[child_vertex]] == vertex_branch[other]
     child_vertex, other = child_vertex[joins], other[joins]

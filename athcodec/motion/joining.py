@@ -34,9 +34,9 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
     Parameters
     ----------
     clips : dict of str to MotionClip
-        By name, in the order in which they come one after the other. They have the same vertices, branches, faces,
-        edges and attributes, and the same rest pose; one whose rest pose is only its first frame, as in sources without
-        one, takes that of the others. Metadata in which they differ are kept for each.
+        The clips by name, in the order that they get in the file. They need the same vertices, branches, faces, edges,
+        attributes and rest pose. A clip whose rest pose is only its first frame, because its source has none, takes
+        the rest pose of the others. Metadata in which clips differ are kept for each clip.
 
     Returns
     -------
@@ -86,16 +86,17 @@ def join(clips: Mapping[str, MotionClip]) -> MotionClip:
 
 
 def split(clip: MotionClip) -> dict[str, MotionClip]:
-    """Return the clips that `join` made one of.
+    """Return the single clips that `join` has put into one clip.
 
     Parameters
     ----------
     clip : MotionClip
+        A clip with one or several clip ranges.
 
     Returns
     -------
     dict of str to MotionClip
-        By name; a single clip without a name is "". Closing any of them closes all.
+        The clips by their names; a single clip without a name is under "". Closing any of them closes all.
 
     Examples
     --------
@@ -173,8 +174,9 @@ def looped(clip: MotionClip, blend: int = 0) -> MotionClip:
     ----------
     clip : MotionClip
     blend : int, optional
-        For a motion that does not end where it began: so many frames are taken off its end and blended into those at
-        its beginning, so that frame 0 is what followed the new last frame in the source. At most a third of the frames.
+        Number of frames, at most a third of all, for a motion that does not end where it began. They are taken off
+        its end and blended into the frames at its beginning, so that the new frame 0 is what followed the new last
+        frame in the source.
 
     Returns
     -------
@@ -235,7 +237,8 @@ def _only_clip_range(name: str, clip: MotionClip) -> ClipRange:
 
 
 def _check_alike(name: str, clip: MotionClip, first_name: str, first: MotionClip) -> None:
-    """Raise ClipError unless both are of the same plant."""
+    """Raise ClipError unless the clip `name` has the same vertices, branches, edges, faces and attributes as the clip
+    `first_name`."""
     if clip.vertex_count != first.vertex_count:
         raise ClipError(f"{name}: got {clip.vertex_count} vertices, expected {first.vertex_count} as {first_name} has")
     for name_of_array in ("vertex_branch", "branch_parent", "stem_index", "edges", "faces"):
@@ -255,6 +258,8 @@ def _equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
 
 
 def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
+    """Return the rest pose (N, 3) that the clips share. A clip whose rest pose is only its own first frame is not
+    asked. Raises ClipError if two rest poses differ."""
     rests = {name: clip for name, clip in clips.items() if not np.array_equal(clip.rest, clip.block(0, 1)[0])}
     name, chosen = next(iter((rests or clips).items()))
     for other, clip in rests.items():
@@ -269,7 +274,8 @@ def _common_rest(clips: Mapping[str, MotionClip]) -> np.ndarray:
 
 
 def _common_metadata(clips: Mapping[str, MotionClip]) -> JsonObject:
-    """Return the metadata that all have in common, with the others of each clip under OWN."""
+    """Return the metadata that all clips have in common, and under the key OWN, by clip name, those in which they
+    differ."""
     every = [clip.metadata for clip in clips.values()]
     common = {
         key: value
@@ -295,7 +301,7 @@ class _AllUnchanged:
 
 
 def _joined(parts: Sequence[Any]) -> Frames:
-    """Return positions of several clips, one after the other."""
+    """Return the positions of several clips as one array, one after the other, read when frames are sliced."""
     ranges = clip_range_frames([ClipRange("", part.shape[0]) for part in parts])
     dtype = np.result_type(*(part.dtype for part in parts))
 
@@ -318,11 +324,12 @@ def _run(positions: ArrayLike, first: int, last: int) -> Frames:
 
 
 def _blended(positions: ArrayLike, blend: int) -> Frames:
-    """Return all but the last `blend` frames; the first ones are blended from the frames that follow the new last
-    one."""
+    """Return all frames but the last `blend`. The first `blend` frames turn gradually from the frames that followed the
+    new last one into the source's own, so that the end leads smoothly to the beginning."""
     frame_count, dtype = positions.shape[0] - blend, positions.dtype
 
     def read(start: int, stop: int) -> np.ndarray:
+        """Return the positions (stop - start, N, 3) of frames start to stop - 1 of the loop."""
         shown, last = np.asarray(positions[start:stop]), min(stop, blend)
         if start >= last:
             return shown

@@ -15,10 +15,11 @@ TIMES_APART = 4.0  # Distance of two points, over that as neighbours, from which
 
 
 def lost_neighbours(clip: MotionClip) -> float:
-    """Return the share of sampled points and frames that are far from their neighbour; 0 for meshes and curves.
+    """Return the share, 0 to 1, of sampled points and frames in which a point is far from the point that was its
+    nearest neighbour. A large share means that point numbers change between frames. For meshes and curves it is 0.
 
-    Neighbours are those of the first, middle or last frame, whichever is the largest: before plants grow, and where
-    leaves begin to fall, points may lie together that are no neighbours.
+    Neighbours are looked for in the first, middle or last frame, whichever has the largest extent: before plants grow,
+    and where leaves fall, points that are no neighbours may lie together.
     """
     if clip.polygons is not None or clip.edges is not None or clip.vertex_count < SAMPLED:
         return 0.0

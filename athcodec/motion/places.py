@@ -34,7 +34,9 @@ class Places:
 
     @classmethod
     def of_labels(cls, *labels: np.ndarray, error: float = 0.0) -> Places:
-        """Return places of the vertices that have the same labels, arrays with a row for each vertex."""
+        """Return the places of vertices: vertices with equal rows in all of the arrays `labels`, which have a row for
+        each vertex, share a place. `error` is the largest distance, over all frames, of a vertex from the first one of
+        its place."""
         columns = [column for label in labels for column in np.reshape(label, (len(label), -1)).T]
         order = np.lexsort(columns[::-1])
         begins = np.zeros(len(order), bool)

@@ -56,7 +56,8 @@ class Polygons:
 
     @classmethod
     def of_attributes(cls, attributes: Mapping[str, np.ndarray]) -> Polygons | None:
-        """Return the polygons of the arrays that stand for faces of different sizes, if they are there and plain."""
+        """Return the polygons in the attributes "face_vertex_counts" and "face_vertex_indices", or None if these do not
+        exist or are not flat arrays of integers."""
         counts, indices = (attributes.get(name) for name in POLYGON_ARRAYS)
         if counts is None or indices is None or counts.ndim != 1 or indices.ndim != 1:
             return None
@@ -77,6 +78,7 @@ class Polygons:
 
     @property
     def shape(self) -> CorePolygons:
+        """The sizes and types of the polygons' arrays, as the C core takes them."""
         return CorePolygons(
             self.face_count,
             len(self.corners),

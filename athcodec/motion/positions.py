@@ -40,12 +40,15 @@ _COUNTED |= {"faces": INDICES, "edges": INDICES}
 
 
 def parse_order(axes: str | Sequence[str]) -> Order:
-    """Return the order that is written as names with commas between them, or as a sequence of names.
+    """Return the order of an array's axes from the names of the axes, as text with commas or as a sequence.
+
+    The names are "frames", "vertices" and "xyz"; "vertices+xyz" is an axis that vertices and xyz share.
 
     Raises
     ------
     ValueError
-        Unless vertices and xyz are there once, frames at most once, and vertices do not share an axis with frames.
+        Unless "vertices" and "xyz" occur once each, "frames" at most once, and frames and vertices do not share an
+        axis.
     """
     words = axes.split(",") if isinstance(axes, str) else [str(word) for word in axes]
     order = tuple(_axis(word.strip().lower()) for word in words)
@@ -79,8 +82,8 @@ def advice(orders: Sequence[Order]) -> str:
 
 
 def facts_of(arrays: JsonMapping) -> dict[str, tuple[str, int]]:
-    """Return by an array's name which axis of the positions it tells the length of, and that length. arrays: those of a
-    clip, None for one that is missing."""
+    """Return what arrays of a clip tell about its size: by array name, an axis of the positions and its length. Arrays
+    of vertex numbers tell the largest number instead. `arrays` has None for a missing one."""
     facts = {}
     for name, axis in _COUNTED.items():
         values = np.asarray(arrays[name]) if arrays.get(name) is not None else np.zeros(0)
@@ -92,21 +95,21 @@ def facts_of(arrays: JsonMapping) -> dict[str, tuple[str, int]]:
 
 
 def order_of(shape: Sequence[int], facts: Facts, order: Order | None = None) -> Order:
-    """Return the order of the axes of an array of positions, by default frames, vertices, xyz.
+    """Return the order of the axes of an array of positions, which usually is frames, vertices, xyz.
 
     Parameters
     ----------
     shape : sequence of int
-        Of the array.
+        The array's shape.
     facts : Facts
-        What is known of its frames and vertices.
+        What other arrays tell about the numbers of frames and vertices (see `facts_of`).
     order : Order, optional
-        The order that is stated, which is then only compared with the shape.
+        The order that the caller states. It is returned if the shape can have it.
 
     Raises
     ------
     ClipError
-        Where the shape has another order, or the facts fit another one; the message says what to pass.
+        If the shape cannot have the order, or the facts contradict it; the message says which order to pass.
     """
     if order is not None:
         _lengths(shape, order)
@@ -142,12 +145,12 @@ def ordered(array: ArrayLike, order: Order) -> ArrayLike:
     array : array-like
         Anything with a shape and a dtype that is sliced along each of its axes.
     order : Order
-        Of its axes.
+        What each axis of the array holds.
 
     Raises
     ------
     ClipError
-        Where the shape does not have this order.
+        If the array's shape cannot have this order.
     """
     lengths = _lengths(array.shape, order)
     if order == USUAL:
@@ -158,6 +161,7 @@ def ordered(array: ArrayLike, order: Order) -> ArrayLike:
     frame_count, dtype = lengths.get(FRAMES, 1), np.dtype(array.dtype)
 
     def read(start: int, stop: int) -> np.ndarray:
+        """Return the positions (stop - start, vertices, 3) of frames start to stop - 1."""
         if axis is None:
             block = np.asarray(array[(slice(None),) * len(order)])
         else:
@@ -171,8 +175,8 @@ def ordered(array: ArrayLike, order: Order) -> ArrayLike:
 
 
 def in_floats(positions: ArrayLike) -> tuple[ArrayLike, str]:
-    """Return positions (frames, vertices, 3) in float32 or float64, whichever holds them, and a sentence if that is
-    another type."""
+    """Return (positions, sentence): positions (frames, vertices, 3) as float32, or as float64 if float32 cannot hold
+    their values, and a sentence that says how the type changed, "" if it did not."""
     before = np.dtype(positions.dtype)
     if before.kind not in "iuf" or len(positions.shape) != 3 or (before.kind == "f" and before.itemsize in (4, 8)):
         return positions, ""
@@ -191,11 +195,11 @@ def seconds_of_dates(dates: np.ndarray) -> np.ndarray:
 
 
 def looks_turned(positions: ArrayLike, facts: Facts) -> bool:
-    """Return whether frames look like paths of vertices, so that the array probably has vertices first.
+    """Return whether the first two axes, frames and vertices, are probably the wrong way round.
 
-    A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If each frame is much
-    smaller than the paths, and its points follow each other more closely than those of a path, frames and vertices have
-    changed places. False where the facts say otherwise. A few frames are read.
+    A vertex mostly stays near its place, and a plant is larger than the paths of its vertices. If single frames are
+    much smaller than the paths over time, and neighbours in a frame are closer than successive points of a path, the
+    axes are probably exchanged. If `facts` confirm the order, the result is False. Only a few frames are read.
     """
     frame_count, vertex_count = positions.shape[:2]
     if min(frame_count, vertex_count) < 2 or positions.dtype.kind != "f" or _confirm(positions.shape, facts):
@@ -231,7 +235,8 @@ def _text(order: Order) -> list[str]:
 
 
 def _lengths(shape: Sequence[int], order: Order) -> dict[str, int]:
-    """Return the number of frames and vertices, and 3 for xyz. Raises ClipError."""
+    """Return the lengths of "frames", "vertices" and "xyz" by these names, for an array of `shape` with axes in
+    `order`. Raises ClipError if the shape cannot have this order."""
     lengths = {XYZ: 3}
     fits = len(shape) == len(order)
     for length, axis in zip(shape, order):
@@ -245,7 +250,7 @@ def _lengths(shape: Sequence[int], order: Order) -> dict[str, int]:
 
 
 def _possible(shape: tuple[int, ...]) -> Iterator[Order]:
-    """Yield the orders that a shape can have, the usual one first."""
+    """Yield the orders of axes that an array of positions with this shape can have, the usual one first."""
     extra = max(len(shape) - 3, 0)
     ones = [axis for axis, length in enumerate(shape) if length == 1][:extra]
     if len(ones) < extra:
@@ -256,7 +261,7 @@ def _possible(shape: tuple[int, ...]) -> Iterator[Order]:
 
 
 def _possible_of_few(shape: tuple[int, ...]) -> Iterator[Order]:
-    """Yield the orders that a shape of two or three axes can have."""
+    """Yield the orders of axes that an array of positions with two or three axes of these lengths can have."""
     if len(shape) == 3:
         yield from (order for order in permutations(USUAL) if shape[order.index((XYZ,))] == 3)
     elif len(shape) == 2:
@@ -267,7 +272,8 @@ def _possible_of_few(shape: tuple[int, ...]) -> Iterator[Order]:
 
 
 def conflicts(shape: Sequence[int], facts: Facts, order: Order = USUAL) -> list[str]:
-    """Return what contradicts that an array of this shape has an order, in words. Raises ClipError where it cannot."""
+    """Return sentences that say which `facts` (see `facts_of`) contradict that an array of this shape has its axes in
+    `order`; none if all agree. Raises ClipError if the shape itself cannot have this order."""
     lengths = {FRAMES: 1} | _lengths(shape, order)
     lines = []
     for name, (axis, number) in facts.items():

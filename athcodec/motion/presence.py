@@ -36,7 +36,8 @@ def _are_runs(runs: JsonValue) -> bool:
 
 
 def presence_within(metadata: JsonMapping, frames: range) -> JsonObject:
-    """Return the metadata of these frames of a clip: its presence is cut to them and counted from the first of them."""
+    """Return the metadata for a run of a clip's frames: the frames in which objects are shown are limited to the run
+    and counted from its beginning."""
     if PRESENCE not in metadata:
         return dict(metadata)
     cut = {}
@@ -51,8 +52,8 @@ def presence_within(metadata: JsonMapping, frames: range) -> JsonObject:
 def presence_of_parts(
     metadata: JsonMapping, names: Sequence[str], copies: Sequence[int], frame_count: int
 ) -> dict[int, np.ndarray]:
-    """Return, by the number of each object that is not shown throughout: the frames that show it, (T, 1) bool, or those
-    that show each of its copies, (T, copies)."""
+    """Return which frames show each object that is hidden in some frame, by the object's number in `names`: bool (T,
+    1), or (T, copies) if its copies differ. `copies` has the number of copies of each object."""
     presence: dict[int, np.ndarray] = {}
     stated = stated_presence(metadata)
     places = {name: number for number, name in enumerate(names)} if stated else {}
@@ -72,8 +73,8 @@ def presence_of_parts(
 
 
 def parts_hidden_far_away(clip: Any) -> list[str]:
-    """Return the names of objects whose hidden positions alone make the diagonal of what is shown more than FAR times
-    as long. Reads every frame of a MotionClip that has presence."""
+    """Return the names of objects that, while hidden, lie so far away that the clip's diagonal is more than FAR times
+    as long as that of what is shown. This reads every frame of a clip with hidden objects."""
     counts, names = clip.attributes.get("part_vertex_counts"), clip.metadata.get("part_names")
     if not stated_presence(clip.metadata) or counts is None or np.shape(counts) != np.shape(names):
         return []

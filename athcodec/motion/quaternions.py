@@ -12,7 +12,8 @@ def normalized(quaternions: np.ndarray) -> np.ndarray:
 
 
 def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """Return (..., 3, 3) of unit quaternions (..., 4), x y z w."""
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4) in the order x, y, z, w. They need not have
+    length 1."""
     x, y, z, w = np.moveaxis(normalized(quaternions), -1, 0)
     rows = [
         1 - 2 * (y * y + z * z),
@@ -29,7 +30,8 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 
 def quaternions(rotations: np.ndarray) -> np.ndarray:
-    """Return (..., 4) x y z w of rotations (..., 3, 3); by the largest of the four, which keeps all digits."""
+    """Return the unit quaternions (..., 4), in the order x, y, z, w, of rotation matrices (..., 3, 3). They are
+    computed from their largest component, which loses no digits."""
     m = np.moveaxis(rotations, (-2, -1), (0, 1))
     squares = np.stack(
         [

@@ -20,7 +20,8 @@ def in_scene(clip: MotionClip, unit: str | None, up_axis: str | None) -> MotionC
 
 
 def axis_turn(before: str, after: str) -> np.ndarray:
-    """Return the right angle (3, 3) that takes one of the axes x, y and z to another."""
+    """Return the matrix (3, 3) of the right-angled turn that takes the axis `before` ("x", "y" or "z") to the axis
+    `after`."""
     first, last = "xyz".index(before), "xyz".index(after)
     turn = np.eye(3)
     if first != last:
@@ -50,6 +51,8 @@ def _in_axes(clip: MotionClip, up_axis: str | None) -> MotionClip:
 
 
 def _mapped(clip: MotionClip, matrix: np.ndarray, **metadata: str) -> MotionClip:
+    """Return the clip with positions, rest pose and normals multiplied by `matrix` (3, 3), and with further
+    metadata."""
     clip.metadata |= metadata
     if np.array_equal(matrix, np.eye(3)):
         return clip

@@ -71,12 +71,12 @@ class Length:
         Parameters
         ----------
         scene_unit : str, float or None
-            `scene_unit` of the clip's metadata: the name of its unit, or the unit in metres.
+            The clip's unit: its name, or its length in metres (`scene_unit` of the clip's metadata).
 
         Returns
         -------
         float
-            A length without a unit is taken to be in the clip's.
+            The length in the clip's unit. A length without a unit is taken to be in that unit already.
 
         Raises
         ------
@@ -293,7 +293,7 @@ def stated_scene(metadata: JsonMapping) -> dict[str, str]:
     Parameters
     ----------
     metadata : mapping
-        Metadata of a clip. A minus sign before the axis, which points down then, stays.
+        Metadata of a clip. An axis that points down is written with a minus sign ("-z"), which stays.
 
     Returns
     -------
@@ -303,7 +303,7 @@ def stated_scene(metadata: JsonMapping) -> dict[str, str]:
     Raises
     ------
     ClipError
-        If one of them is none that athcodec knows.
+        If the stated unit or axis is none that athcodec knows.
     """
     stated = {name: metadata[name] for name in ("unit", "up_axis") if metadata.get(name) not in (None, "")}
     if "unit" in stated:

@@ -154,6 +154,8 @@ class ReadOptions:
     max_memory: int = MAX_MEMORY
 
     def __post_init__(self) -> None:
+        """Check the options and bring `max_memory` to bytes. Raises ValueError for a value that an option cannot
+        have."""
         if self.rest not in ("auto", "first", "mean"):
             raise ValueError(f'rest: got {self.rest!r}, expected "auto", "first" or "mean"')
         set_numbers(self, reals=("fps",))
@@ -251,7 +253,8 @@ class Format:
             raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "{package}"')
 
     def function(self, name: str, home: str) -> Callable[..., Any]:
-        """Return a function of the format's module, which is in the package `home` if it is one of athcodec's own.
+        """Return the function `name` of the module that implements this format. If the format is one of athcodec's own,
+        its module is in the package `home` ("athcodec.sources", for example).
 
         Raises ClipError if the module of another package cannot be imported or has no such function.
         """
@@ -320,15 +323,15 @@ def read(
     Parameters
     ----------
     path : str or path
-        The file; of numbered files any one of them, or a name with # or %04d in place of the number.
+        The file. For numbered files, pass any one of them, or a name with # or %04d in place of the number.
     format : str, optional
         Name of one of `athcodec.sources.formats()`. By default the format is found by what the file begins with, then
         by its suffix.
     unit : str, optional
-        A unit of length ("m", "cm", "mm", "km", "in", "ft"): a clip that has another is converted, one that has none
-        is taken to be in it, and so is, with a GuessWarning, one that states a unit which is none of these.
+        A unit of length ("m", "cm", "mm", "km", "in", "ft"). A clip in another unit is converted. A clip that states
+        no unit is taken to be in this one, as is, with a GuessWarning, a clip that states an unknown unit.
     up_axis : {"x", "y", "z"}, optional
-        Likewise: a clip with another up axis is turned.
+        The axis that points up: a clip with another up axis is turned, one that states none is taken to have this one.
     **options
         Parameters of `athcodec.sources.ReadOptions`: rest, fps, mesh, field, dataset, axes, only, takes, skip, root,
         allow_outside, alone, max_memory.
@@ -336,22 +339,22 @@ def read(
     Returns
     -------
     MotionClip
-        Close it, or use it in a ``with`` statement; frames are read from the file when they are asked for. What else
-        the file holds is in its `not_read`; SourceWarning names what is missing from the picture for that.
+        Close it, or use it in a ``with`` statement; frames are read from the file when they are asked for. Its
+        `not_read` names what else the file holds; a SourceWarning names what of that would be visible.
 
     Raises
     ------
     ClipError
-        Where the file holds no usable clip, or states a unit or an up axis that is unknown; for a `unit` or `up_axis`
-        that is none of those above.
+        If the file holds no usable clip, or states an unknown unit or up axis that the caller does not override, or
+        if `unit` or `up_axis` is none of the values above.
     MissingExtra
-        Where a package is missing that the format needs.
+        If a package is missing that the format needs.
     OSError
-        Where the file cannot be opened.
+        If the file cannot be opened.
     ValueError
-        For a format or values of options that do not exist.
+        If the format does not exist, or an option has a value that it cannot have.
     TypeError
-        For options that do not exist.
+        If an option does not exist.
     """
     wanted = ReadOptions(**options)
     unit = None if unit is None else checked_unit(unit)
@@ -414,8 +417,8 @@ def format_named(name: str, formats: Iterable[Format]) -> Format:
 
 
 def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], content: str = UNKNOWN) -> Format:
-    """Return the first of `formats` that has the suffix of a path. content: the kind of the file that is there. Raises
-    ClipError."""
+    """Return the first of `formats` that has the suffix of `path`. `content` says what the file looks like by its first
+    bytes, for the message of the error. Raises ClipError if no format has the suffix."""
     name, candidates = Path(path).name.lower(), iter(formats)
     known: list[str] = []
     for candidate in candidates:
@@ -429,7 +432,8 @@ def format_by_suffix(path: str | PathLike[str], formats: Iterable[Format], conte
 
 
 def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[Format]) -> None:
-    """Warn if the format chosen for a suffix comes from another package, and others have that suffix, too."""
+    """Give a GuessWarning if the chosen format comes from another package and formats among `others` have the suffix of
+    `path`, too."""
     name = Path(path).name.lower()
     if chosen.package and (same := [other for other in others if other.ends(name)]):
         names = " and ".join(f"{other.name} of {other.package}" for other in same)
@@ -442,7 +446,8 @@ def _warn_of_others(path: str | PathLike[str], chosen: Format, others: Iterable[
 
 
 def find_format(path: str | PathLike[str]) -> Format:
-    """Return the format of a file, by its first bytes or else its suffix. Raises ClipError, OSError."""
+    """Return the format of the file at `path`, which its first bytes tell, or else its suffix. Raises ClipError if no
+    format fits or the file is empty, OSError if it cannot be opened."""
     if is_pattern(path):
         head = b"#"
     else:
@@ -483,9 +488,10 @@ def _by_first_bytes(head: bytes, formats: Iterable[Format]) -> Format | None:
 
 
 def _stated(metadata: JsonMapping, path: str | PathLike[str], **wanted: str | None) -> JsonObject:
-    """Return the unit and the up axis that a file states, None in place of one that is unknown and stated otherwise.
+    """Return the unit and the up axis that the metadata of the file `path` state.
 
-    Raises ClipError for one that is unknown and not in `wanted`.
+    `wanted` has the caller's options "unit" and "up_axis", None for one that was not passed. A stated value that
+    athcodec does not know becomes None if the caller passed that option; otherwise it raises ClipError.
     """
     scene: JsonObject = {}
     for name, option in wanted.items():
@@ -530,24 +536,24 @@ def read_hdf5(path: str | PathLike[str], rest: str = "auto", **options: Any) -> 
 
 
 def sample_path(name: str = "tree") -> Path:
-    """Return a clip that is installed with athcodec.
+    """Return the path of a sample clip that is installed with athcodec.
 
     Parameters
     ----------
     name : {"tree", "growth", "leafed", "fern", "grass"}, optional
-        A small finite-element tree in wind, a young tree that grows and gets leaves, or a leafed tree, a fern or a
-        tuft of grass in a calm wind and in a gale.
+        "tree" is a small finite-element tree in wind, "growth" a young tree that grows and gets leaves; "leafed" (a
+        tree with leaves), "fern" and "grass" (a tuft) each move in a calm wind and in a gale.
 
     Returns
     -------
     pathlib.Path
-        An HDF5 file of athcodec's schema, with 120 frames of 1,001 and of 1,476 vertices; of the last three an .ath of
-        two loops of 150 frames, with 54,920, 2,844 and 1,400 vertices.
+        "tree" and "growth" are HDF5 files of athcodec's schema, with 120 frames of 1,001 and 1,476 vertices. The other
+        three are .ath files of two loops of 150 frames, with 54,920, 2,844 and 1,400 vertices.
 
     Raises
     ------
     ValueError
-        For another name.
+        If there is no sample of that name.
     """
     files = {name_of_sample: f"{name_of_sample}_1k_120f.h5" for name_of_sample in SAMPLES} | {
         "leafed": "leafed_tree.ath",

@@ -75,7 +75,7 @@ BROKEN = (RuntimeError, ValueError, TypeError, IndexError, OverflowError, Unicod
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """Return the clip in an archive. Raises ClipError."""
+    """Return the clip in the Alembic file `path`. Raises ClipError if the file is damaged or holds no usable clip."""
     unchanged = FileWatch(path)
     try:
         clip = _clip(Abc.IArchive(path), options)
@@ -91,6 +91,8 @@ class _Track:
     """Samples of a property over time: what it is at a time, or between which two samples."""
 
     def __init__(self, sampling: AlembicObject, count: int):
+        """Store the times in seconds of the `count` samples of a property, whose Alembic time sampling is `sampling`.
+        Raises ClipError if there are too many samples or a time is not finite."""
         if count > MAX_SAMPLES:
             raise ClipError(f"archive: got {count} samples, expected at most {MAX_SAMPLES}")
         kind = sampling.getTimeSamplingType()
@@ -107,7 +109,8 @@ class _Track:
         return Abc.ISampleSelector(float(self.times[number]), Abc.ISampleSelector.TimeIndexType.kNearIndex)
 
     def at(self, time: float) -> list[tuple[int, float]]:
-        """Return numbers of samples and their weights."""
+        """Return the samples to mix for the value at `time` in seconds: one or two pairs (number of the sample,
+        weight), whose weights add up to 1."""
         after = int(np.searchsorted(self.times, time))
         low = max(0, after - 1)
         high = min(after, len(self.times) - 1)
@@ -130,7 +133,8 @@ class _Xform:
     still: np.ndarray | None = None
 
     def at(self, time: float) -> np.ndarray:
-        """Return the matrix (4, 4) at a time in seconds, between the samples beside it."""
+        """Return the matrix (4, 4) of the transform at a time in seconds, mixed linearly from the samples before and
+        after it."""
         if self.still is not None:
             return self.still
         matrix = np.zeros((4, 4))
@@ -207,7 +211,8 @@ class _Object(SceneObject):
 
 
 def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
-    """Return the clip of the objects in an archive. Raises ClipError."""
+    """Return the clip of the objects in an opened Alembic archive. Raises ClipError if the archive holds no usable
+    clip."""
     if not archive.valid():
         raise ClipError("archive: cannot be opened")
     metadata, kept = _kept(archive)
@@ -234,6 +239,8 @@ def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
         raise ClipError(f"{objects[0].path}: got no points, expected at least one")
 
     def sample(obj: _Object, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, 3) of an object in a frame and the matrix that takes them to the world: (4, 4), or
+        (copies, 4, 4)."""
         try:
             return _points(obj, times[frame]), _matrix(obj, times[frame])
         except ClipError:
@@ -258,8 +265,8 @@ def _clip(archive: AlembicObject, options: ReadOptions) -> MotionClip:
 
 
 def _find(archive: AlembicObject, only: Sequence[str], not_read: dict[str, list[str]]) -> list[_Object]:
-    """Return all objects that are read, those of instances too; adds the others to not_read, by the names of their
-    kinds."""
+    """Return the objects of the archive to read, instances included. If `only` is not empty, an object needs one of
+    these names or paths. The paths of other objects are added to `not_read`, under the name of their kind."""
     objects, visited, refused = list[_Object](), 0, list[str]()
     waiting = [(archive.getTop(), _Place(), "")]
     while waiting:
@@ -302,7 +309,8 @@ def _is_named(child: AlembicObject, patterns: Sequence[str]) -> bool:
 
 
 def _together(objects: list[_Object]) -> list[_Object]:
-    """Return instances of one object, whose shape stays as it is, as copies at the place of the first."""
+    """Return the objects, with instances of one object merged into the first of them as further copies. Objects whose
+    shape changes over time stay apart."""
     by_source: dict[str, _Object] = {}
     remaining = []
     for obj in objects:
@@ -320,7 +328,9 @@ def _together(objects: list[_Object]) -> list[_Object]:
 def _add(
     child: AlembicObject, source: str, place: _Place, objects: list[_Object], not_read: dict[str, list[str]]
 ) -> _Place:
-    """Add an object that has points and is shown; returns where its children hang."""
+    """Append the object `child` to `objects` if it has points and is shown; otherwise add it to `not_read`. `source` is
+    the path of the shape that the object shows and `place` is where it hangs. Return the place at which its children
+    hang, which has one transform more if `child` is a transform."""
     name = _schema(child)
     if unread := _unread_properties(child):
         not_read.setdefault("attribute", []).extend(f"{child.getFullName()}.{each}" for each in unread)
@@ -348,7 +358,8 @@ def _add(
 
 
 def _unread_properties(child: AlembicObject) -> list[str]:
-    """Return the names of properties beside the schema of an object, and, of a transform, of what users add to it."""
+    """Return the names of the properties of an Alembic object that are not read: those outside of its schema and, for a
+    transform, also those that users added inside of it."""
     if child.isInstanceRoot() or child.isInstanceDescendant():
         return []  # They are named where the instance's source stands.
     schema = (child.getHeader().getMetaData().get("schemaObjTitle") or "").rpartition(":")[2]
@@ -365,7 +376,8 @@ def _names_of(properties: AlembicObject) -> list[str]:
 
 
 def _above(child: AlembicObject, xforms: list[_Xform]) -> list[_Xform]:
-    """Return the transforms above what hangs on the transform `child`: its own, and those above if it inherits them."""
+    """Return the transforms that apply to the children of the transform `child`, the innermost first: its own, and
+    `xforms`, those above it, if it inherits them."""
     schema = AbcGeom.IXform(child, EXISTING).getSchema()
     above = xforms if schema.getInheritsXforms() else []
     count = schema.getNumSamples()
@@ -399,7 +411,8 @@ def _follow_ids(obj: _Object) -> None:
 
 
 def _topology(obj: _Object) -> None:
-    """Fill in faces or curves."""
+    """Read the faces of a mesh or the vertex counts of curves from the archive and store them in `obj`. Raises
+    ClipError if they do not fit the points or change over time."""
     if obj.kind == "curves":
         sample = obj.schema.getValue()
         obj.curve_counts = _fixed(obj, obj.schema.getNumVerticesProperty())
@@ -421,7 +434,7 @@ def _topology(obj: _Object) -> None:
 
 
 def _name_unread(obj: _Object) -> None:
-    """Name the properties of an object that hold something and are not read."""
+    """Add the names of properties that hold data and are not read to `obj.left_out`."""
     for name in UNREAD:
         prop = getattr(obj.schema, f"get{name[0].upper()}{name[1:]}Property", Abc.IInt32Property)()
         if prop.valid() and prop.getNumSamples():
@@ -442,7 +455,7 @@ def _bind_materials(obj: _Object) -> None:
 
 
 def _fixed(obj: _Object, values: Any) -> np.ndarray:
-    """Return integers that are the same in every frame; ClipError where they change."""
+    """Return the integers of an Alembic array property (`values`), int32. Raises ClipError if they change over time."""
     first = np.array(values.getValue(), np.int32)
     if values.isConstant():
         return first
@@ -460,7 +473,8 @@ def _fixed(obj: _Object, values: Any) -> np.ndarray:
 
 
 def _times(archive: AlembicObject, objects: list[_Object], fps: float | None) -> tuple[np.ndarray, float | None]:
-    """Return seconds of the frames in the archive, and frames per second, None where nothing says it."""
+    """Return (times, rate): the seconds (T,) of the clip's frames, and its frames per second, None if nothing states a
+    rate. With `fps`, frames are taken at this rate between the first and last sample."""
     tracks = [track for obj in objects for track in obj.tracks()]
     if not tracks:
         return np.zeros(1), fps
@@ -477,8 +491,9 @@ def _times(archive: AlembicObject, objects: list[_Object], fps: float | None) ->
 
 
 def _rate(archive: AlembicObject, step: float, times: np.ndarray) -> float:
-    """Return the rate of the samples; where their steps differ, the one that the archive states for the tool that made
-    it."""
+    """Return the frames per second of samples at `times` (T,) in seconds: 1 / `step` if `step`, the shortest regular
+    distance of samples in seconds, is above 0; else the rate that the archive states; else the rate of the median
+    distance."""
     stated = Abc.GetArchiveInfo(archive).get("dccFPS", 0.0)
     rate = 1 / step if step > 0 else float(stated) or 1 / float(np.median(np.diff(times)))
     nice = round(rate * 1001) // 1000 * 1000 / 1001
@@ -491,7 +506,8 @@ def _rate(archive: AlembicObject, step: float, times: np.ndarray) -> float:
 
 
 def _metadata(archive: AlembicObject, times: np.ndarray, rate: float | None) -> JsonObject:
-    """Return the metadata that the archive states: frame rate, first frame and up axis."""
+    """Return the metadata of the clip: "fps" and "start_frame" if `rate` is known, and "up_axis" if Blender wrote the
+    archive. `times` (T,) are the seconds of the frames."""
     metadata: JsonObject = {}
     if rate is not None:
         start = float(times[0]) * rate
@@ -506,7 +522,8 @@ def _metadata(archive: AlembicObject, times: np.ndarray, rate: float | None) -> 
 
 
 def _statics(obj: _Object, time: float) -> None:
-    """Store the arrays of an object that are the same at all times."""
+    """Read the arrays of an object that stay the same in all frames and store them in it. Normals and widths are
+    brought to world space by the object's transform at `time`, in seconds."""
     for name, getter in NAMED_PARAMS:
         if hasattr(obj.schema, getter):  # A subdivision surface has no normals.
             _keep(obj, name, getattr(obj.schema, getter)())
@@ -524,8 +541,8 @@ def _statics(obj: _Object, time: float) -> None:
 
 
 def _keep(obj: _Object, name: str, param: AlembicObject) -> None:
-    """Store one parameter of an object as an array, or note that it is left out if it changes or is no array of
-    numbers."""
+    """Store the Alembic parameter `param` in the object as the static array `name`. If the parameter changes over time
+    or holds no numbers, its name is added to `obj.left_out` instead."""
     if not param.valid() or not param.getNumSamples():
         return
     if not param.isConstant():
@@ -563,7 +580,8 @@ def _is_own(schema: AlembicObject) -> bool:
 
 
 def _kept(archive: AlembicObject) -> tuple[str | None, list[tuple[ArrayDescriptor, bytes]]]:
-    """Return the metadata as JSON, and further arrays, that athcodec's writer has kept."""
+    """Return what athcodec's own Alembic writer stored beside the objects: the clip's metadata as JSON text, None if
+    the file has none, and a list of arrays, each as a pair of its descriptor and its bytes."""
     top = archive.getTop()
     if top.getNumChildren() != 1:
         return None, []
@@ -596,7 +614,8 @@ def _descriptor(text: str) -> ArrayDescriptor:
 
 
 def _points(obj: _Object, time: float) -> np.ndarray:
-    """Return the points (n, 3) float32 of an object at a time, between the samples beside it."""
+    """Return the points (n, 3) float32 of an object at a time in seconds, mixed linearly from the samples before and
+    after it."""
     samples = [(_sample(obj, i), weight) for i, weight in obj.track.at(time)]
     counts = {len(points) for points, _ in samples}
     if len(counts) != 1:

@@ -115,9 +115,12 @@ class Topology:
     faces_are_cells: bool = True
 
     def add_cell_data(self, name: str, values: np.ndarray) -> bool:
-        """Keep data per cell, under its name, where the cells are edges, faces or volumes only; else one by one.
+        """Add an array with a row of `values` for each cell of the file as attributes of the edges, faces and volumes
+        that these cells became. If only one of the three exists, the attribute is called `name`; otherwise the name
+        gets "edge_", "face_" or "cell_" in front.
 
-        Returns whether all of it is kept: cells that are none of these have no place, nor has a name that is taken.
+        Returns whether every row was kept. Rows of cells that became none of the three are lost, and so is an attribute
+        whose name is taken.
         """
         kinds = [("edge", self.edge_rows), ("face", self.face_rows), ("cell", self.cell_rows)]
         kinds = [(domain, rows) for domain, rows in kinds if len(rows)]
@@ -141,8 +144,9 @@ def base_kind(kind: str) -> str:
 def blocks_of(
     types: np.ndarray, starts: np.ndarray, stops: np.ndarray, nodes: np.ndarray, names: dict[int, str]
 ) -> list[Block]:
-    """Return cells whose nodes lie between starts and stops, each of a type of `names`. Raises ClipError for another
-    one."""
+    """Return cells grouped by type, one Block for each type. Cell i has the VTK-like number types[i] and the nodes from
+    starts[i] to stops[i] - 1 of `nodes`; `names` gives the name of each number that is allowed. Raises ClipError for
+    another number, or for a cell with a wrong number of nodes."""
     blocks = []
     for number in np.unique(types):
         name = names.get(int(number))
@@ -162,7 +166,8 @@ def blocks_of(
 
 
 def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
-    """Raise ClipError where a cell has a vertex that does not exist."""
+    """Return the edges, faces and volumes that cells make up over `vertex_count` vertices. Raises ClipError if a cell
+    has a vertex that does not exist."""
     for block in blocks:
         if block.nodes.size and not 0 <= block.nodes.min() <= block.nodes.max() < vertex_count:
             raise ClipError(
@@ -176,7 +181,8 @@ def topology_of(blocks: Sequence[Block], vertex_count: int) -> Topology:
 
 
 def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
-    """Add the lines among the cells to the topology as edges (E, 2), with the row of each cell in the file."""
+    """Store the segments of all line and polyline cells in `topology` as edges (E, 2), and for each edge the row of its
+    cell in the file. Edges are in the order of these rows."""
     pairs: list[np.ndarray] = []
     rows: list[np.ndarray] = []
     for block in blocks:
@@ -198,7 +204,7 @@ def _add_edges(topology: Topology, blocks: Sequence[Block]) -> None:
 
 
 def _add_faces(topology: Topology, blocks: Sequence[Block]) -> None:
-    """Add the polygons, and the outer sides of the solids, among the cells to the topology as faces."""
+    """Store the polygon cells of `blocks` in `topology` as faces, followed by the outer sides of solid cells."""
     sizes_of_blocks: list[np.ndarray] = []
     corners_of_blocks: list[np.ndarray] = []
     rows: list[np.ndarray] = []
@@ -263,7 +269,9 @@ def _keep_volumes(topology: Topology, volumes: Sequence[Block]) -> None:
 
 
 def _outside(volumes: Sequence[Block], counts: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (counts, corners) of the sides that only one cell has and no face is yet, triangles first."""
+    """Return the sides of solid cells that are on the outside: sides that belong to one cell only and are not yet a
+    face. `counts` and `corners` are the faces so far: the size of each face, and their corners one after the other. The
+    result has the same form, triangles before quads."""
     found_counts, found_corners = [], []
     for size in (3, 4):
         sides_of_blocks = [

@@ -18,7 +18,8 @@ COMPRESSED = (0, 4, 0)  # the version since which the sections are compressed
 
 
 def check_crates(path: str) -> None:
-    """Raise ClipError if `path` is a crate, or a zip of crates, whose counts do not fit its size."""
+    """Raise ClipError if `path` is a USD crate, or a .usdz that holds crates, and a crate states more entries than its
+    bytes can hold."""
     with open_plain(path) as file:
         head = file.read(8)
         if head == MAGIC:
@@ -31,7 +32,8 @@ def check_crates(path: str) -> None:
 
 
 def _members(file: BinaryIO) -> list[tuple[int, int]]:
-    """Return (start, size) of what a .usdz holds, which is stored without compression."""
+    """Return (start, size), in bytes, of each member of a .usdz, whose members are stored without compression. Raises
+    ClipError if the file is no zip."""
     try:
         with zipfile.ZipFile(file) as archive:
             entries = [(member.header_offset, member.file_size) for member in archive.infolist()]
@@ -48,6 +50,8 @@ def _members(file: BinaryIO) -> list[tuple[int, int]]:
 
 
 def _check(file: BinaryIO, start: int, size: int) -> None:
+    """Raise ClipError if a section of the crate at byte `start` of the file, `size` bytes long, states more entries
+    than fit into its bytes."""
     version, contents = struct.unpack("<8x8sq", _read(file, start, size, 0, 24))
     for name, place, length in _sections(file, start, size, contents):
         numbers = _numbers(file, start, size, place, length)
@@ -79,6 +83,9 @@ def _numbers(file: BinaryIO, start: int, size: int, place: int, length: int) -> 
 
 
 def _sections(file: BinaryIO, start: int, size: int, contents: int) -> list[tuple[str, int, int]]:
+    """Return (name, start, length) of each section of a crate that holds counts; start and length are in bytes,
+    relative to the crate. The crate begins at byte `start` of the file, has `size` bytes, and its table of sections is
+    at byte `contents` of it. Raises ClipError if a section lies outside of the crate."""
     (count,) = struct.unpack("<Q", _read(file, start, size, contents, 8))
     if count > MAX_SECTIONS:
         raise ClipError(f"stage: got {count} sections, expected at most {MAX_SECTIONS}")

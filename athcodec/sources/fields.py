@@ -72,7 +72,7 @@ def clip_of_steps(
     not_read: Mapping[str, list[str]] | None = None,
     is_own: bool = False,
 ) -> MotionClip:
-    """Return the clip of a result at (T,) times.
+    """Return the clip of a simulation result whose steps are at `time` (T,), in seconds.
 
     `static` holds the data per point that do not change, and `parts` the objects that the points form one after the
     other, "" for one without a name. is_own: athcodec's exporter wrote the file, so points that do not move stand
@@ -122,11 +122,15 @@ def clip_of_steps(
 
 
 def _frames(steps: Steps, first: np.ndarray, fixed: bool, moved_by: str | None, frame_count: int) -> Frames:
-    """Return the positions at each step: the points, or with `moved_by` the points and this displacement of them."""
+    """Return the positions at every step. If `moved_by` names a displacement field, positions are points plus
+    displacement; otherwise they are the points. `first` has the points (N, 3) of step 0, which all steps share if
+    `fixed`."""
     count = len(first)
     dtype = _dtype(first, _padded(steps.field(0, moved_by)) if moved_by else first)
 
     def frame(step: int) -> np.ndarray:
+        """Return the positions (N, 3) at a step. Raises ClipError if the number of points differs from that of step
+        0."""
         steps.check(step)
         points = first if fixed else _padded(steps.points(step))
         if len(points) != count:
@@ -157,7 +161,8 @@ def _names_of_static(static: Mapping[str, np.ndarray], steps: Steps) -> dict[str
 
 
 def _kinds(parts: Sequence[Part], faces: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None) -> list[str]:
-    """Return the kind of each part."""
+    """Return the kind of each object ("mesh", "curves" or "points"): an object with corners of faces is a mesh, one
+    with edges alone is curves. `faces` is a pair of the faces' sizes and their corners."""
     if len(parts) == 1:
         return [kind_of(faces, edges)]
     stops = np.cumsum([part.point_count for part in parts])
@@ -181,7 +186,9 @@ def _dtype(*arrays: np.ndarray) -> type:
 
 
 def _displacement(steps: Steps, fixed: bool, step_count: int, options: ReadOptions) -> str | None:
-    """Return the name of the field to add to the points; None: they move themselves."""
+    """Return the name of the field to add to the points as their displacement, or None if the points move themselves.
+    `fixed` says whether the points are the same at all steps. Raises ClipError if no field, or more than one, can be
+    the displacement."""
     names = list(steps.fields())
     others = _listed([f"{key} ({place})" for key, place in steps.elsewhere.items()])
     listed = _listed(names) + (f"; not per point: {others}" if steps.elsewhere else "")

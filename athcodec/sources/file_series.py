@@ -101,7 +101,8 @@ class Series:
         return {"file that is not there": [path.name for path in self.missing]} if self.missing else {}
 
     def in_time(self, stated: Sequence[StatedTime | None]) -> Series:
-        """Return the frames in the order of the times that files state, where nothing else states times."""
+        """Return the series with its frames in ascending order of the times that their files state. The order stays as
+        it is if an index has times already, or if the files' times are missing or not distinct."""
         seconds = _usable(stated)
         if self.times is not None or seconds is None or (np.diff(seconds) > 0).all():
             return self
@@ -119,9 +120,11 @@ class Series:
     def clock(
         self, stated: Sequence[StatedTime | None], options: ReadOptions, fps: float | None = None
     ) -> tuple[np.ndarray, JsonObject]:
-        """Return (T,) seconds from 0, and the metadata of their rate.
+        """Return the time of each frame (T,), in seconds from 0, and the metadata "fps" and "start_frame" as far as
+        they are known.
 
-        stated: what each file says of its own time. fps: the rate that the files say.
+        `stated` has the time that each file states of itself, None for a file without one. `fps` is the frame rate that
+        the files state; a rate in `options` overrides it.
         """
         rate = options.fps or fps
         if self.times is not None:
@@ -145,8 +148,8 @@ class Series:
         return numbered_times(self.numbers, rate)
 
     def _in_seconds(self, seconds: np.ndarray, rate: float | None) -> tuple[np.ndarray, JsonObject]:
-        """Return the times; the number of the first frame is that in its name, where those of all frames fit the
-        times."""
+        """Return the frames' times (T,) in seconds from 0, and the metadata of their rate. The metadata get
+        "start_frame", the number in the first file's name, if the numbers in all names fit the times."""
         time, metadata = times_in_seconds(seconds, rate)
         digits = [re.search(r"(\d+)$", frame[0].stem) for frame in self.frames]
         if "fps" in metadata and not self.has_decimals and all(digits):
@@ -156,7 +159,8 @@ class Series:
         return time, metadata
 
     def _compare(self, times: np.ndarray, stated: Sequence[StatedTime | None], subject: str, then: str) -> None:
-        """Warn where files state another time than `times`."""
+        """Give a GuessWarning for the first file that states another time than `times` (T,) has for its frame. The
+        warning says that `subject` has the value of `times`, and `then`, which of the two is used."""
         for time, statement, frame in zip(times.tolist(), stated, self.frames):
             if statement is None or statement.kind is not Kind.TIME:
                 continue
@@ -168,6 +172,8 @@ class Series:
                 return
 
     def _warn_of_numbers(self, rate: float | None, stated: Sequence[StatedTime | None]) -> None:
+        """Give a GuessWarning if it is uncertain how the numbers in the files' names become times: as seconds, or as
+        frames at `rate` frames per second."""
         assert self.numbers is not None
         if any(stated):
             values = [None if time is None else time.seconds for time in stated]
@@ -200,7 +206,8 @@ class Series:
 
 
 def series_of(path: FilePath, options: ReadOptions) -> Series:
-    """Return the frames that an index, a pattern or any one of the files names. Raises ClipError, OSError."""
+    """Return the frames of the series that `path` stands for: an index file (.pvd or .series), a pattern, or any one of
+    its numbered files. Raises ClipError, and OSError if a file is not there."""
     path = Path(path)
     index: Index | None
     if is_index(path):
@@ -222,7 +229,8 @@ def series_of(path: FilePath, options: ReadOptions) -> Series:
 
 
 def _warn_of_list(files: NumberedFiles) -> None:
-    """Warn where the files are the pieces of one frame."""
+    """Give a GuessWarning if another file lists the numbered files as the pieces of one frame, although they are read
+    as frames."""
     whole = list_of(files.paths[0])
     if whole is not None:
         warnings.warn(
@@ -234,7 +242,8 @@ def _warn_of_list(files: NumberedFiles) -> None:
 
 
 def _usable(stated: Sequence[StatedTime | None]) -> np.ndarray | None:
-    """Return (T,) seconds where all files state times by which they can be told apart."""
+    """Return the times (T,) in seconds that the files state, or None unless all files state one of the same kind and
+    the times tell the files apart."""
     times = [time for time in stated if time is not None]
     if len(times) < len(stated) or len({time.kind for time in times}) > 1:
         return None

@@ -49,10 +49,10 @@ REST_ROUNDING = 1e-6  # Distance by which joints may miss the unmoved mesh, over
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the glTF file `path`; close it, or use it in a `with` statement.
 
-    The rest pose, where options.rest is "auto", is the scene without animation. metadata has "animations", the names of
-    those that are played, and "other_animations", those that are not; with options.takes the names are those of the
-    clip's ranges. Raises ClipError where the file is no glTF that can be read here, MissingExtra where its compression
-    needs a package, OSError where a file cannot be opened.
+    The rest pose is the scene without animation if options.rest is "auto". The metadata "animations" names the
+    animations that are played, and "other_animations" those that are not; with options.takes, the clip has a clip range
+    for each take, called like its animation. Raises ClipError if the file is no glTF that can be read here,
+    MissingExtra if its compression needs a package, OSError if a file cannot be opened.
     """
     with naming(path):
         file = GltfFile(path, options.max_memory)
@@ -74,10 +74,11 @@ def _read(file: GltfFile, options: ReadOptions) -> MotionClip:
 
 
 def read_moving(file: GltfFile, options: ReadOptions) -> tuple[MotionClip, list[GltfNode], Placement]:
-    """Return the clip of what moves alone, its nodes, and how they lie in the space of the clip.
+    """Return (clip, nodes, placement): the clip of those meshes of a glTF file that move, the nodes that show them, and
+    where the clip's space lies in the world.
 
-    Where nodes or skins leave meshes together as they are stored but for one matrix, the space is that of the meshes:
-    the rest pose has their very numbers. Closes nothing. Raises ClipError.
+    If a single matrix takes the stored meshes to their places, the clip's space is that of the stored meshes, so that
+    the rest pose has exactly their numbers. `file` stays open. Raises ClipError if nothing moves.
     """
     if not options.takes and _other_animations(Scene(file)):
         options = replace(options, takes="all")
@@ -108,6 +109,8 @@ class Placement:
     `starts` are the seconds at which its takes begin."""
 
     def __init__(self, scenes: list[Scene], nodes: list[GltfNode]):
+        """Choose the space for the motion of `nodes`: the space in which the rest pose has the stored numbers of as
+        many meshes as possible. `scenes` are the takes, each as a scene of its own."""
         self._scenes = scenes
         self.starts = [float(scene.keys[0]) for scene in scenes]
         self.space = NodeMotion(scenes[0], nodes).placed(max(nodes, key=self._preference))
@@ -161,6 +164,9 @@ def _patterns(options: ReadOptions) -> list[str]:
 def _clip(
     file: GltfFile, scenes: dict[str, Scene], nodes: list[GltfNode], options: ReadOptions, from_world: np.ndarray | None
 ) -> MotionClip:
+    """Return the clip of the given nodes. `scenes` has the scene of each take by the take's name, "" for a single take
+    without a name. `from_world` (4, 4) takes world space to the space of the clip; None leaves positions in world
+    space."""
     scene = next(iter(scenes.values()))
     motions = {name: NodeMotion(take, nodes, from_world) for name, take in scenes.items()}
     motion = next(iter(motions.values()))
@@ -216,8 +222,8 @@ def _clip(
 
 
 def _rest_pose(motion: NodeMotion, nodes: Sequence[GltfNode]) -> np.ndarray:
-    """Return (N, 3) the scene without animation. Where joints leave a mesh as it is stored, these are its very numbers,
-    which others who read the file have too: products of matrices round."""
+    """Return the rest pose (N, 3), which is the scene without animation. A mesh that transforms and joints leave in
+    place up to rounding gets its stored numbers, which other programs read from the file, too."""
     rest = motion.read(None)[0]
     for node in nodes:
         if node.copies is not None:
@@ -238,7 +244,9 @@ def _positions(motion: NodeMotion, times: np.ndarray) -> Frames:
 
 
 def _scenes(file: GltfFile, options: ReadOptions) -> dict[str, Scene]:
-    """Return the scene as it moves in each take, by its name; by "" as what `only` asks for, or as players begin."""
+    """Return the scene of each take by the take's name. Without `options.takes` there is one scene under "", which
+    plays the animations that `options.only` names or, by default, those with which players begin. Raises ClipError for
+    a name that no animation has."""
     patterns = [name[len(ANIMATION) :] for name in options.only if name.startswith(ANIMATION)]
     if not _chooses(options):
         return {"": Scene(file)}
@@ -258,7 +266,8 @@ def _chooses(options: ReadOptions) -> bool:
 
 
 def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
-    """Return the nodes that show a mesh, if they or it have such a name, in the order of the scene."""
+    """Return the visible nodes that show a mesh, in the order of the scene. If there are `patterns`, the name of the
+    node or of the mesh has to match one of them. Raises ClipError if there is no such node."""
     file = scene.file
     nodes, seen = [], []
     for index in scene.order:
@@ -281,8 +290,8 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
 
 
 def _number(nodes: Sequence[GltfNode]) -> int:
-    """Set the number of each node's first vertex in the clip, and return the number of all vertices. Raises
-    ClipError."""
+    """Store in each node the number of its first vertex in the clip, and return the number of vertices of all nodes.
+    Raises ClipError if these are too many."""
     first = 0
     for node in nodes:
         node.first = first
@@ -293,7 +302,8 @@ def _number(nodes: Sequence[GltfNode]) -> int:
 
 
 def _animations(scene: Scene, patterns: Sequence[str], subject: str) -> dict[str, int]:
-    """Return the animations that any of the patterns names and that move something, in the file's order."""
+    """Return the animations that move something and whose name matches one of `patterns`: their numbers by their names,
+    in the file's order. `subject` begins the message of the ClipError for a pattern that matches none."""
     every, wanted = _animation_numbers(scene.file), set()
     numbers = {name: index for name, index in every.items() if scene.targets(index)}
     for pattern in patterns:
@@ -306,7 +316,8 @@ def _animations(scene: Scene, patterns: Sequence[str], subject: str) -> dict[str
 
 
 def _animation_numbers(file: GltfFile) -> dict[str, int]:
-    """Return all by name; where two have the same, the later one's number is added to it."""
+    """Return the numbers of all animations of the file by their names. An animation whose name is taken gets a name
+    that ends in its number, and one without a name is "animation N"."""
     numbers: dict[str, int] = {}
     for index, animation in enumerate(file.items("animations")):
         name = animation.get("name")
@@ -324,8 +335,8 @@ def _animation_numbers(file: GltfFile) -> dict[str, int]:
 
 
 def _parts(scene: Scene, nodes: list[GltfNode]) -> list[tuple[str, list[GltfNode]]]:
-    """Return the objects, by name: a node each, but for those side by side that show one shape below a node that says
-    so."""
+    """Return the objects of the clip as pairs (name, nodes). A node is an object of its own, except that neighbouring
+    nodes with the same shape are one object of several copies if the node above them is marked as a node of copies."""
     parts: list[tuple[int, str, list[GltfNode]]] = []
     for node in nodes:
         above = int(scene.parent[node.index])
@@ -344,7 +355,8 @@ def _is_alike(node: GltfNode, other: GltfNode) -> bool:
 
 
 def _names(scene: Scene, nodes: list[GltfNode]) -> JsonObject:
-    """Return the metadata of the clip's objects: names, kinds, and whether their faces are seen from both sides."""
+    """Return metadata of the clip's objects: "part_names", "part_kinds" and, if faces of any object are visible from
+    both sides, "part_usd"."""
     parts = _parts(scene, nodes)
     details = [
         {"doubleSided": "true"} if all(_is_double_sided(scene.file, node) for node in members) else {}
@@ -387,8 +399,9 @@ def _other_animations(scene: Scene) -> dict[str, list[str]]:
 def _connections(
     file: GltfFile, nodes: list[GltfNode]
 ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
-    """Return faces (F, 3) and edges (E, 2), int32; and the material of each face (F,), -1 for none, where any has
-    one."""
+    """Return (faces, edges, materials) of the nodes' meshes: triangles (F, 3) and edges (E, 2), int32, as vertex
+    numbers of the clip, and the number of each triangle's material (F,), -1 for none. Each of the three is None if the
+    file has nothing of that kind."""
     indices: dict[int, list[np.ndarray]] = {2: [], 3: []}
     materials, numbers = [], _material_numbers(file)
     for node in nodes:
@@ -434,8 +447,9 @@ def _material_names(file: GltfFile) -> list[str]:
 def _attributes(
     scene: Scene, nodes: list[GltfNode], skip: Collection[str], motion: NodeMotion, keeps_normals: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return static arrays over all vertices; nodes that lack one have 0, no number, or white. And branches, where the
-    file was written with them."""
+    """Return (attributes, branches): the static arrays of the clip by name, and the arrays that describe branches,
+    empty unless athcodec wrote the file. Vertices of nodes that lack an array get 0, NaN or, as a colour, white. Arrays
+    named in `skip` are left out; normals are read only if `keeps_normals`."""
     file = scene.file
     keys = dict.fromkeys(
         key
@@ -466,8 +480,8 @@ def _rigid_copies(part: list[GltfNode]) -> int:
 
 
 def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motion: NodeMotion) -> np.ndarray:
-    """Return the values of the accessors `key` of all nodes as the array `name` of the clip; vertices without any get
-    0. Normals are turned into world space."""
+    """Return the array `name` of the clip, with a row for each vertex, from the glTF attribute `key` of all nodes.
+    Vertices of nodes without this attribute get a filler, mostly 0. Normals are turned to world space."""
     pieces = {}
     for number, node in enumerate(nodes):
         if key in node.of_copies:
@@ -492,7 +506,8 @@ def _attribute(file: GltfFile, nodes: list[GltfNode], key: str, name: str, motio
 
 
 def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return vertex_branch, branch_parent and stem_index of a file that athcodec wrote."""
+    """Move the arrays that describe branches out of `attributes` and return them: vertex_branch, branch_parent and, if
+    stored, stem_index. Return nothing if athcodec did not write the file."""
     extras = file.json["asset"].get("extras")
     entry_of_athcodec = extras.get("athcodec") if isinstance(extras, dict) else None
     parent = (
@@ -508,7 +523,8 @@ def _branches(file: GltfFile, attributes: dict[str, np.ndarray]) -> dict[str, np
 
 
 def _skin(scene: Scene, nodes: list[GltfNode]) -> Skin | None:
-    """Return the joints, or nodes, that vertices hang on; None where one node moves them all."""
+    """Return the joints that move vertices, or the nodes where a mesh has no joints, as a hierarchy with the strongest
+    joint of each vertex. Return None if a single node moves all vertices."""
     movers = moving_nodes(nodes)
     order = [joint for joint in scene.order if joint in movers]
     copied = [(node, len(node.copies)) for node in nodes if node.copies is not None]

@@ -26,6 +26,8 @@ class NodeMotion:
     """Positions of all nodes at any times."""
 
     def __init__(self, scene: Scene, nodes: list[GltfNode], from_world: np.ndarray | None = None):
+        """Prepare the motion of the given nodes of a scene. `from_world` (4, 4) takes world space to the space of the
+        positions; by default positions are in world space."""
         self.scene, self._nodes, self._from_world = scene, nodes, from_world
         self.count = nodes[-1].first + nodes[-1].count
         self.ancestors = scene.ancestors(moving_nodes(nodes))
@@ -35,8 +37,9 @@ class NodeMotion:
         self.dtype = np.dtype(np.float64 if loses else np.float32)
 
     def read(self, times: np.ndarray | None) -> np.ndarray:
-        """Return (k, N, 3) in `dtype`: float32, or float64 if nodes place them far from the origin. None: the pose
-        without animation, k = 1."""
+        """Return the positions (k, N, 3) of all nodes' vertices at `times` (k,) in seconds; with None, the scene
+        without animation, k = 1. The type is `self.dtype`: float32, or float64 if the positions are too far from the
+        origin for it."""
         out = np.empty((1 if times is None else len(times), self.count, 3), self.dtype)
         largest = max(node.count for node in self._nodes)
         step = max(1, WORK_BYTES // (48 * largest + 512 * len(self.ancestors)))
@@ -52,8 +55,8 @@ class NodeMotion:
         return out
 
     def _positions(self, node: GltfNode, matrices: dict[int, np.ndarray], times: np.ndarray | None) -> np.ndarray:
-        """Return the vertices (k, n, 3) of a node in the scene at the times, morphed and skinned. matrices: (k, 4, 4)
-        of each node to the world."""
+        """Return the positions (k, n, 3) of the n vertices of a node at `times` (k,), after morphing and skinning.
+        `matrices` has the matrices (k, 4, 4) from each node to the space of the positions, by the node's number."""
         local = self._morphed(node, times)
         if node.skin is None:
             matrix = matrices[node.index]
@@ -68,7 +71,8 @@ class NodeMotion:
         return self._skinned(node, matrices, local)
 
     def _morphed(self, node: GltfNode, times: np.ndarray | None) -> np.ndarray:
-        """Return (k or 1, n, 3): only targets that count in a frame are read."""
+        """Return the vertices of a node after its morph targets and before its transforms, (k, n, 3), or (1, n, 3) if
+        it has no targets. Targets with weight 0 in all of `times` (k,) are not read."""
         if not node.targets:
             return node.base[None].astype(np.float64)
         weights = self.scene.weights(node.index, times, node.weights)
@@ -81,8 +85,8 @@ class NodeMotion:
         return local
 
     def _skinned(self, node: GltfNode, matrices: dict[int, np.ndarray], local: np.ndarray) -> np.ndarray:
-        """Return the vertices (k, n, 3) of a node moved by its joints, from those before skinning, `local` (1 or k, n,
-        3)."""
+        """Return the vertices (k, n, 3) of a node as its joints move them. `local` has the vertices before skinning,
+        (k, n, 3) or (1, n, 3); `matrices` has the matrices (k, 4, 4) of each joint by its number."""
         frames = max(len(local), *(len(matrices[joint]) for joint in node.joints))
         out = np.zeros((frames, 3, node.count))
         for joint, vertices, weights in node.influences:
@@ -113,8 +117,9 @@ class NodeMotion:
         return matrices[node.joints[strongest]] @ node.bind[strongest]
 
     def turned(self, node: GltfNode, directions: np.ndarray, is_normal: bool) -> np.ndarray:
-        """Return (n, 3) directions at a node's vertices, as its joints or it turn them without animation; of length
-        1."""
+        """Return unit directions (n, 3) at a node's vertices in the space of the positions, in the pose without
+        animation. `directions` (n, 3) are in the node's own space; `is_normal` says that they transform as normals and
+        not as tangents."""
         matrices = self.scene.matrices(self.ancestors, None)
         linear = np.eye(3) if self._from_world is None else self._from_world[:3, :3]
 
@@ -156,8 +161,8 @@ class Sampling:
 
 
 def sampling_of(motion: NodeMotion, wanted: float | None) -> Sampling:
-    """Return the frame rate and the times at which animations are sampled. wanted: the rate of the caller; None: that
-    of the file, else of its keys."""
+    """Return the frame rate and the times at which the animations are sampled. `wanted` is the caller's rate in frames
+    per second; with None, the rate is the file's stated one, or else the rate that the animation keys lie on."""
     scene, keys = motion.scene, motion.scene.keys
     if not len(keys):
         return Sampling(DEFAULT_FPS, np.zeros(1), {})

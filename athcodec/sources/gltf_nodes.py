@@ -58,7 +58,8 @@ class GltfNode:
 
 
 def nodes_of_mesh(scene: Scene, index: int, mesh: JsonObject, name: str) -> list[GltfNode]:
-    """Return one per set of vertices: primitives that use the same accessors share theirs."""
+    """Return the node number `index` of the scene, which shows `mesh`, as one GltfNode for each set of vertices:
+    primitives of the mesh that use the same accessors share one. `name` is the node's name for objects and messages."""
     copies, of_copies = _copies(scene, index)
     nodes: dict[Any, GltfNode] = {}
     for primitive in entries(mesh, "primitives"):
@@ -97,8 +98,9 @@ def nodes_of_mesh(scene: Scene, index: int, mesh: JsonObject, name: str) -> list
 
 
 def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.ndarray]]:
-    """Return (k, 4, 4) from each instance of EXT_mesh_gpu_instancing to its node, None without; and what each copy of a
-    shape has, (k, width) by attribute."""
+    """Return (matrices, attributes) of the instances that EXT_mesh_gpu_instancing gives node `index`: matrices (k, 4,
+    4) from each instance to the node, and arrays with a row for each instance, by attribute name. Without the
+    extension, matrices is None and the attributes are the node's own extras."""
     instancing = extension(scene.nodes[index], INSTANCING)
     if instancing is None:
         return None, _own_extras(scene, index)
@@ -136,7 +138,8 @@ def _copies(scene: Scene, index: int) -> tuple[np.ndarray | None, dict[str, np.n
 
 
 def _own_extras(scene: Scene, index: int) -> dict[str, np.ndarray]:
-    """Return numbers in the extras of a node below one that has COPIES, (1, width) by attribute."""
+    """Return the numbers in the extras of node `index`, as rows (1, width) by attribute name. Only nodes below a node
+    that is marked as one of copies have such attributes; for others the result is empty."""
     extras = scene.nodes[index].get("extras")
     if scene.says_copies(int(scene.parent[index])) is None or not isinstance(extras, dict):
         return {}
@@ -155,7 +158,8 @@ def _refuse_draco(file: GltfFile, primitive: JsonObject, positions: int) -> None
 
 
 def load_node(node: GltfNode, scene: Scene) -> None:
-    """Read the points, morph targets and joints of a node. Raises ClipError."""
+    """Read the points and joints of a node into it, and check the size of its morph targets. Raises ClipError if they
+    do not fit each other."""
     file = scene.file
     slots = sum(key.startswith("JOINTS_") for key in node.attributes) if node.skin is not None else 0
     file.budget.take(INFLUENCE_BYTES * 4 * slots * node.count, f"mesh {node.name!r}")
@@ -183,7 +187,8 @@ def triples(file: GltfFile, index: int, count: int, subject: str) -> np.ndarray:
 
 
 def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.ndarray:
-    """Return the matrices (joints, 4, 4) from a skin's mesh to its joints in the bind pose."""
+    """Return the inverse bind matrices (joint_count, 4, 4) of a skin, which take vertices from the mesh to each joint's
+    space in the bind pose; the identity if the file has none."""
     if skin.get("inverseBindMatrices") is None:
         return np.broadcast_to(np.eye(4), (joint_count, 4, 4))
     file.budget.take(256 * file.count(skin["inverseBindMatrices"]), "skins")
@@ -194,8 +199,8 @@ def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.nda
 
 
 def _load_influences(node: GltfNode, file: GltfFile) -> None:
-    """Load for each joint its vertices and their weights, which add up to 1; where a file has none, the first joint
-    counts."""
+    """Store in the node, for each joint, the vertices that it moves and their weights, which add up to 1 for each
+    vertex. A vertex whose weights are all 0 hangs on its first joint. Also store the strongest joint of each vertex."""
     influences: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # of a slot: vertices, joints, weights
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"

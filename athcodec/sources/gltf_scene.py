@@ -61,8 +61,8 @@ class Channel(NamedTuple):
 
 
 def target_of(channel: JsonObject) -> Target | str:
-    """Return what a channel animates; where that is nothing that is played, its pointer or a name for it. Raises
-    ClipError."""
+    """Return the property that an animation channel moves. If athcodec does not play this property, return its JSON
+    pointer or a readable name as text. Raises ClipError."""
     target = entry(channel, "target")
     pointed = extension(target, POINTER)
     if pointed is None:
@@ -88,7 +88,8 @@ class Track:
     is_rotation: bool
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return the animated value at each of the times (k,), (k, ...) float64, by the track's interpolation."""
+        """Return the animated value at each of the times (k,) in seconds, (k, ...) float64, interpolated between keys
+        as the file states. Before the first key and behind the last, the value stays the same."""
         after = np.searchsorted(self.times, times, "right")
         last = len(self.times) - 1
         left, right = np.clip(after - 1, 0, last), np.clip(after, 0, last)
@@ -113,7 +114,8 @@ class Track:
 
 
 def slerp(a: np.ndarray, b: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    """Return quaternions on the shorter way from a to b (..., 4), at a `fraction` of it."""
+    """Return the unit quaternions on the shorter arc from a to b, (..., 4) each, at `fraction` of the way: 0 gives a, 1
+    gives b."""
     cosine = (a * b).sum(axis=-1, keepdims=True)
     b, cosine = np.where(cosine < 0, -b, b), np.minimum(np.abs(cosine), 1.0)
     angle = np.arccos(cosine)
@@ -129,6 +131,8 @@ class Scene:
     """The nodes of the default scene, and of the animations those that `play` names (None: see _together)."""
 
     def __init__(self, file: GltfFile, play: list[int] | None = None):
+        """Read the nodes of the file's default scene and the animations with the numbers `play`. By default, play the
+        animations with which players begin (`_together`)."""
         self.file = file
         self.nodes = file.items("nodes")
         self.parent = self._parents()
@@ -156,7 +160,7 @@ class Scene:
     # ---- structure ----
 
     def _parents(self) -> np.ndarray:
-        """Return the parent of each node, -1 for none. Raises ClipError where a node has two."""
+        """Return the number of each node's parent, -1 for a root. Raises ClipError if a node has two parents."""
         parent = np.full(len(self.nodes), -1)
         for index, node in enumerate(self.nodes):
             for child in indices(node, "children"):
@@ -166,8 +170,8 @@ class Scene:
         return parent
 
     def _reached(self) -> list[int]:
-        """Return the nodes of the default scene, or of all trees if there is no scene; parents come before their
-        children."""
+        """Return the numbers of the nodes in the default scene, each parent before its children. If the file has no
+        scene, return all its nodes. Raises ClipError if a node occurs twice."""
         scenes = self.file.items("scenes")
         if scenes:
             roots = indices(self.file.item("scenes", self.file.json.get("scene", 0)), "nodes")
@@ -184,7 +188,8 @@ class Scene:
         return order
 
     def ancestors(self, nodes: set[int]) -> list[int]:
-        """Return the nodes and all above them, parents first. Raises ClipError for one that the scene does not hold."""
+        """Return the given nodes and all nodes above them, each parent before its children. Raises ClipError if one is
+        not in the scene."""
         place = {node: i for i, node in enumerate(self.order)}
         wanted: set[int] = set()
         for node in nodes:
@@ -198,8 +203,9 @@ class Scene:
     # ---- animations ----
 
     def _together(self) -> list[int]:
-        """Return the first animation, and every further one that moves no node that those before it move: tools that
-        write an animation per object mean them to run at once, one with several takes starts with the default one."""
+        """Return the numbers of the animations that play at once by default: the first one, and each further one that
+        moves none of the nodes moved so far. A tool that writes an animation per object means them together; of several
+        takes only the first plays."""
         played: list[int] = []
         moved: set[int] = set()
         for index in range(len(self.file.items("animations"))):
@@ -218,7 +224,8 @@ class Scene:
         return self._channels(index)[1]
 
     def _channels(self, index: int) -> tuple[list[Channel], list[str]]:
-        """Return the channels of an animation that move nodes of the scene, and what the others address."""
+        """Return (channels, others) of animation `index`: the channels that move nodes of the scene, and as text the
+        targets of the channels that do not. Raises ClipError."""
         if index in self._channels_of:
             return self._channels_of[index]
         played, others, inside = [], [], set(self.order)
@@ -251,7 +258,8 @@ class Scene:
         return showing
 
     def _add_animation(self, index: int) -> None:
-        """Read the tracks of animation `index` that move nodes of the scene. Raises ClipError."""
+        """Read the tracks of animation number `index` that move nodes of the scene. Raises ClipError if one is
+        broken."""
         samplers = entries(self.file.item("animations", index), "samplers")
         for node, target, sampler in self._channels(index)[0]:
             if sampler >= len(samplers):
@@ -270,7 +278,8 @@ class Scene:
             tracks.sort(key=lambda each: (each[0].holder == "nodes", each[0].weight >= 0))
 
     def _track(self, sampler: JsonObject, target: Target, where: str) -> Track:
-        """Return the keys, values and interpolation of a sampler. where: what messages call it. Raises ClipError."""
+        """Return the keys, values and interpolation of an animation sampler whose channel moves `target`. `where` names
+        the sampler in messages. Raises ClipError if values and keys do not fit each other."""
         interpolation = sampler.get("interpolation", "LINEAR")
         if interpolation not in INTERPOLATIONS:
             raise ClipError(
@@ -297,8 +306,9 @@ class Scene:
         return Track(times, values.reshape(shape), interpolation, path == "rotation")
 
     def _grouped(self) -> list[tuple[str, list[int], Track]]:
-        """Return (path, nodes, track of all of them) of transforms with the same keys: many are evaluated at once.
-        Visibilities remain in _tracks."""
+        """Take the transform tracks that share keys and interpolation out of `_tracks`, and return them in groups that
+        are evaluated at once: (property, numbers of nodes, one track of all these nodes). Tracks of visibility stay in
+        `_tracks`."""
         alike: dict[tuple[str, str, int], list[int]] = {}
         for (node, path), track in self._tracks.items():
             if path in TRS:
@@ -352,7 +362,8 @@ class Scene:
     # ---- evaluation ----
 
     def weights(self, node: int, times: np.ndarray | None, default: np.ndarray) -> np.ndarray:
-        """Return (k, targets) of a node's mesh; times None: without animation, k = 1."""
+        """Return the morph weights (k, targets) of a node at `times` (k,) in seconds, or those without animation (k =
+        1) if times is None. `default` (targets,) has the weights that are not animated."""
         tracks = self._weights.get(node, ())
         if times is None or not tracks:
             return default[None].copy()
@@ -366,8 +377,8 @@ class Scene:
         return weights
 
     def matrices(self, nodes: list[int], times: np.ndarray | None) -> dict[int, np.ndarray]:
-        """Return (k, 4, 4) from each node to the world; `nodes` are `ancestors`. times None: without animation, k =
-        1."""
+        """Return the matrices (k, 4, 4) from each node to the world at `times` (k,) in seconds, by the node's number;
+        with None those without animation, k = 1. `nodes` has to come from `ancestors`, which puts parents first."""
         place = {node: i for i, node in enumerate(nodes)}
         matrices = self._locals(place, times)
         above = np.array([place.get(int(self.parent[node]), -1) for node in nodes])
@@ -380,7 +391,8 @@ class Scene:
         return {node: matrices[:, i] for node, i in place.items()}
 
     def _locals(self, place: dict[int, int], times: np.ndarray | None) -> np.ndarray:
-        """Return (k, nodes, 4, 4): from each node to its parent."""
+        """Return the matrices (k, nodes, 4, 4) from each node to its parent at `times` (k,) in seconds; with None those
+        without animation, k = 1. `place` gives the column of each node number in the result."""
         frames = 1 if times is None else len(times)
         parts = {
             path: np.repeat([[vector(self.nodes[node], path, default) for node in place]], frames, axis=0)
@@ -401,7 +413,8 @@ class Scene:
 
 
 def key_rate(keys: np.ndarray) -> float | None:
-    """Return frames per second of motion that was sampled: the rate that all keys lie on; None where there is none."""
+    """Return the rate, in frames per second, of a regular grid that holds all key times `keys` (K,), in seconds; None
+    if there is no such rate."""
     if len(keys) < 2:
         return None
     step = float(np.median(np.diff(keys)))
@@ -420,7 +433,9 @@ def off_grid(keys: np.ndarray, rate: float) -> np.ndarray:
 
 
 def _exact(rate: float, keys: np.ndarray) -> float:
-    """Return the rate that a tool would have stated: whole, or of a drop-frame time code."""
+    """Return the usual rate close to `rate`, in frames per second, that a tool would have stated: a whole number, a
+    whole number times 1000 / 1001, or one of two decimals. If none fits the times `keys` (K,), return the rate measured
+    from them."""
     span = float(keys[-1] - keys[0])
     measured = max(round(span * rate), 1) / span
     whole = round(measured)

@@ -73,7 +73,8 @@ def guessed(item: JsonValue) -> list[JsonValue]:
 
 
 def _unused(scene: Scene) -> dict[str, list[str]]:
-    """Return materials, cameras, other scenes, and meshes and skins that no node of the scene refers to."""
+    """Return what no reader of vertices needs: names of materials, cameras, other scenes, and of meshes and skins that
+    no node of the scene refers to, by kind."""
     file, unread = scene.file, dict[str, list[str]]()
     used = {kind: {scene.nodes[index].get(kind) for index in scene.order} for kind in ("mesh", "skin")}
     for kind, items in (("Material", "materials"), ("Camera", "cameras"), ("scene", "scenes")):
@@ -88,7 +89,8 @@ def _unused(scene: Scene) -> dict[str, list[str]]:
 
 
 def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[str]:
-    """Return the attributes of a node's mesh, of its morph targets and of its instances that are not read."""
+    """Return the names of glTF attributes of a node's mesh, morph targets and instances that are not read.
+    `keeps_normals` says whether normals are read."""
     slots = 0
     while node.skin is not None and {f"JOINTS_{slots}", f"WEIGHTS_{slots}"} <= node.attributes.keys():
         slots += 1
@@ -106,8 +108,8 @@ def _left_attributes(scene: Scene, node: GltfNode, keeps_normals: bool) -> list[
 
 
 def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
-    """Yield (kind, name) of what animations address that is not played; whole animations that others were chosen before
-    are not looked into."""
+    """Yield (kind, name) for each property that animations address and that is not played. Animations that were left
+    out because others were chosen are not looked into."""
     first = scenes[0]
     played = {index for scene in scenes for index in scene.played}
     for index, animation in enumerate(first.file.items("animations")):
@@ -121,7 +123,8 @@ def _unplayed(scenes: Sequence[Scene]) -> Iterator[tuple[str, str]]:
 
 
 def _parts(file: GltfFile) -> Iterator[tuple[str, int, JsonObject]]:
-    """Yield (kind, number, object) of all parts of the file that may have extensions and extras, without materials."""
+    """Yield (kind, number, JSON object) of every part of the file that may have extensions or extras, except
+    materials."""
     yield "file", 0, file.json
     yield "asset", 0, entry(file.json, "asset")
     for kind in ("scene", "node", "skin", "animation", "camera", "accessor", "bufferView", "buffer"):
@@ -144,7 +147,7 @@ def _extensions(file: GltfFile) -> list[str]:
 
 
 def _extras(scene: Scene) -> list[str]:
-    """Return the parts of the file that have extras which are not read."""
+    """Return the names of the file's parts whose `extras` are not read."""
     names = []
     for kind, number, part in _parts(scene.file):
         extras = part.get("extras")

@@ -71,10 +71,10 @@ _OWN = "expected numbers in the file itself; --allow-outside (allow_outside=True
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the HDF5 file `path`; close it, or use it in a `with` statement.
 
-    The file's rest pose is used where options.rest is "auto"; branches derived from edges begin at options.root, or at
-    the lowest vertex along the file's attribute up_axis ("y" where it has none).
+    The file's rest pose is used if options.rest is "auto". Branches that follow from edges begin at the vertex
+    options.root or, by default, at the lowest vertex along the file's attribute up_axis ("y" if it has none).
 
-    Raises ClipError where the file is not HDF5 or its contents are no usable clip, OSError where it cannot be opened.
+    Raises ClipError if the file is not HDF5 or holds no usable clip, OSError if it cannot be opened.
     """
     file = _open(path)
     with naming(path, *BROKEN), closing_on_failure(_Reading(file)):
@@ -108,6 +108,8 @@ def open_clip(path: str, options: ReadOptions) -> MotionClip:
 
 
 def _open(path: FilePath) -> h5py.File:
+    """Return the opened HDF5 file. Raises ClipError if the file is not HDF5 or cannot be read as such, OSError if it
+    cannot be opened."""
     open_plain(path).close()
     if not h5py.is_hdf5(path):
         raise ClipError(f"{fspath(path)}: got something else, expected an HDF5 file")
@@ -118,6 +120,8 @@ def _open(path: FilePath) -> h5py.File:
 
 
 def _read(file: h5py.File, path: FilePath, options: ReadOptions) -> MotionClip:
+    """Return the clip of an opened HDF5 file, which is VTKHDF or arrays of athcodec's schema. `path` names it in
+    messages. Raises ClipError."""
     unchanged = FileWatch(file.id.get_vfd_handle())  # HDF5 itself reads zeros where a file has become shorter
     watched = {"resource": _Reading(file), "unchanged": unchanged}
     if VTKHDF in file and options.dataset is None:
@@ -146,6 +150,8 @@ class _Datasets:
     """See schema.Arrays."""
 
     def __init__(self, file: h5py.File, budget: Budget):
+        """List the datasets of the file that can be read as arrays. `budget` limits the memory that reading them
+        takes."""
         self._file, self._budget = file, budget
         self.stored: dict[str, Stored] = {}
         self.not_read: dict[str, list[str]] = {}
@@ -159,7 +165,8 @@ class _Datasets:
             self._add(name, seen)
 
     def _add(self, name: str, seen: set[H5Object]) -> None:
-        """Take the dataset of a name into `stored`, or name what it is in place of one."""
+        """List the dataset called `name` in `stored`, or add its name to `not_read` if it is no array that can be read.
+        `seen` has the addresses of the datasets listed so far, so that none is listed twice."""
         link, item = self._file.get(name, getlink=True), self._file.get(name)
         if item is None:
             self._leave_out("link", name)
@@ -199,6 +206,8 @@ class _Datasets:
         self.not_read.setdefault(kind, []).append(name)
 
     def read(self, name: str) -> np.ndarray:
+        """Return the dataset `name` as an array in memory, with the axes and texts of MATLAB's files brought to the
+        order and type of NumPy."""
         dataset = self._file[name]
         values = _load(name, dataset, self._budget)
         if not _is_matlab(dataset):
@@ -210,6 +219,8 @@ class _Datasets:
         return values.T.astype(bool) if kind == "logical" else values.T
 
     def positions(self, name: str, order: Order) -> ArrayLike:
+        """Return the positions in dataset `name` as (frames, vertices, 3), read from the file when they are sliced.
+        `order` says what each axis of the dataset holds. Raises ClipError if a frame does not fit into memory."""
         dataset = _unpacked_once(self._file, name, self._budget)
         order = order[::-1] if _is_matlab(dataset) else order
         positions = ordered(dataset, order)
@@ -229,8 +240,8 @@ class _Datasets:
 
 
 def _notes(item: H5Object, of_file: bool = True) -> JsonObject:
-    """Return the attributes of a file, group or dataset; of the latter two without those by which libraries find their
-    way."""
+    """Return the HDF5 attributes of a file, group or dataset as Python values. Unless `of_file`, attributes by which
+    libraries keep their own records are left out, and a value of an unknown type becomes None."""
     if of_file:
         return {name: _to_python(item.attrs[name]) for name in item.attrs}
     notes: JsonObject = {}
@@ -267,7 +278,7 @@ def _is_only_a_dimension(dataset: h5py.Dataset) -> bool:
 
 
 def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
-    """Raise ClipError where a dataset, or a link on the way to it, is in another file."""
+    """Raise ClipError if the dataset `name`, or a link on the way to it, is in another file, unless `allow_outside`."""
     if allow_outside:
         return
     parts = [part for part in name.split("/") if part]
@@ -283,7 +294,7 @@ def check_own(file: h5py.File, name: str, allow_outside: bool) -> None:
 
 
 def _names(file: h5py.File) -> list[str]:
-    """Return the names in the file, among them links to other files, which are not followed."""
+    """Return the paths of all links in the file, including links to other files, which are not followed."""
     names, groups, seen = [], [("", file["/"])], set()
     while groups:
         within, group = groups.pop()
@@ -300,7 +311,8 @@ def _names(file: h5py.File) -> list[str]:
 
 
 def _unpacked_once(file: h5py.File, name: str, budget: Budget) -> h5py.Dataset:
-    """Return a dataset that is read several times: with room for all its chunks if it is small."""
+    """Return dataset `name`, opened with a cache for all its unpacked chunks if these are few enough: the dataset is
+    read several times and each chunk should be unpacked only once."""
     dataset, size = file[name], 0
     if dataset.chunks:
         size = dataset.id.get_num_chunks() * chunk_bytes(dataset)
@@ -318,8 +330,8 @@ def chunk_bytes(dataset: h5py.Dataset) -> int:
 
 
 def may_explode(file: h5py.File, limit: int) -> bool:
-    """Return whether datasets or attributes of a file, or of a part of it, may take the HDF5 library more than `limit`
-    bytes whatever shape they have."""
+    """Return whether the HDF5 library may need more than `limit` bytes to read some dataset or attribute, however small
+    its shape says that it is."""
     size = os.fstat(file.id.get_vfd_handle()).st_size
     verdicts: list[bool] = [_texts_are_more(file, size, limit)]
 
@@ -342,8 +354,8 @@ def _texts_are_more(item: H5Object, size: int, limit: int) -> bool:
 
 
 def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
-    """Return whether a packed chunk, or one of its texts, may unpack to more than `limit` bytes, whatever it should
-    be."""
+    """Return whether one compressed chunk or text of a dataset may unpack to more than `limit` bytes, whatever size it
+    states."""
     if dataset.dtype.hasobject:
         size = os.fstat(dataset.file.id.get_vfd_handle()).st_size
         if max(int(np.prod(dataset.shape or (), dtype=object)), 1) * size > max(limit, size):
@@ -365,6 +377,8 @@ def unpacks_to_more(dataset: h5py.Dataset, limit: int) -> bool:
 
 
 def _load(name: str, dataset: h5py.Dataset, budget: Budget) -> np.ndarray:
+    """Return the whole dataset as an array, with texts as bytes of one length. `name` is for messages and `budget`
+    limits memory. Raises ClipError."""
     budget.take(dataset.nbytes, name)
     budget.need(chunk_bytes(dataset), name)
     try:
@@ -386,7 +400,7 @@ def _parsed(name: str, text: str) -> JsonValue:
 
 
 def _to_python(value: JsonValue) -> JsonValue:
-    """Return an HDF5 attribute as str, int, float, bool, None or nested lists of them."""
+    """Return the value of an HDF5 attribute as str, int, float, bool, None, or nested lists of these."""
     if isinstance(value, h5py.Empty):
         return None
     if isinstance(value, np.ndarray):

@@ -93,6 +93,8 @@ def read_index(path: Path, folder: Path, allow_outside: bool, budget: Budget) ->
 
 
 def _pvd(path: Path, data: bytes, budget: Budget) -> list[_Entry]:
+    """Return the entries of a .pvd file, an XML index by ParaView, from its content `data`. Raises ClipError if it
+    lists no file, or a time is missing."""
     entries = []
     elements = list(parse_xml(data, "VTKFile", budget).iter("DataSet"))
     for element in elements:
@@ -108,6 +110,8 @@ def _pvd(path: Path, data: bytes, budget: Budget) -> list[_Entry]:
 
 
 def _series(path: Path, data: bytes, budget: Budget) -> list[_Entry]:
+    """Return the entries of a .series file, a JSON index by ParaView, from its content `data`. Raises ClipError if it
+    is not such a list."""
     budget.need_for(data, _JSON_MARKS, JSON_BYTES, "JSON")
     try:
         content: Any = json.loads(data.decode("utf-8-sig"))
@@ -125,6 +129,7 @@ def _series(path: Path, data: bytes, budget: Budget) -> list[_Entry]:
 
 
 def _seconds(stated: Any, file: str) -> float:
+    """Return the stated time of `file` as finite seconds. Raises ClipError if it is not a number."""
     try:
         time = float(stated)
     except (TypeError, ValueError):
@@ -143,6 +148,8 @@ def _beside(path: Path, name: str) -> Path:
 
 
 def _index(path: Path, entries: Sequence[_Entry]) -> Index:
+    """Return the index of all entries, with one frame for each time at which every listed file exists. Raises ClipError
+    if the frames do not all have the same parts, or no file exists."""
     times = sorted({entry.time for entry in entries})
     of_time: dict[float, dict[tuple[str, str], _Entry]] = {time: {} for time in times}
     for entry in entries:
@@ -178,9 +185,12 @@ def _index(path: Path, entries: Sequence[_Entry]) -> Index:
 
 
 def index_of(path: Path, frames: Sequence[Path], allow_outside: bool, max_memory: int) -> Index | None:
-    """Return the index, in the folder of a file or the folder above, that lists it; of a pattern, which is no file
-    itself, one that lists all frames. A GuessWarning says which one is taken where they disagree, and what an index
-    lacks."""
+    """Return the index that lists the file `path`, from its folder or the folder above, or None. If `path` is a
+    pattern, the index has to list all files of `frames`, the files that match.
+
+    A GuessWarning says which index is used if several disagree, and which files it does not list. Files outside of the
+    folder are refused unless `allow_outside`; `max_memory` is in bytes.
+    """
     named = [path] if path.is_file() else list(frames)
     candidates = []
     for file in _above(path, lambda name: name.lower().endswith((PVD, SERIES))):
@@ -220,8 +230,8 @@ def list_of(path: Path) -> Path | None:
 
 
 def _candidate(file: Path, path: Path, allow_outside: bool, max_memory: int) -> Index | None:
-    """Return the index of a file, or None if it is not usable; a GuessWarning says why an index that names this path
-    is not."""
+    """Return the index in `file`, or None if it cannot be used. A GuessWarning says why, if the text of the index names
+    the file `path`."""
     try:
         return read_index(file, path.parent, allow_outside, Budget(max_memory))
     except (ClipError, OSError) as error:

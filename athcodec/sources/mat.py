@@ -34,7 +34,8 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def open_clip(path: str, options: ReadOptions) -> MotionClip:
-    """Return the clip in a file, for the process of reader_main.py. Raises ClipError, OSError."""
+    """Return the clip in the MATLAB file `path`. A separate process calls this function, because SciPy may fail badly
+    on a damaged file (reader_main.py). Raises ClipError, OSError."""
     from scipy.io import loadmat  # It takes long to import.
 
     watch = FileWatch(path)
@@ -52,6 +53,7 @@ class _Variables:
     counts_from_1 = True
 
     def __init__(self, variables: JsonMapping):
+        """Take the variables of a MATLAB file by their names, as SciPy's `loadmat` returns them."""
         self._arrays: dict[str, np.ndarray] = {}
         self.metadata: JsonObject = {}
         self.not_read: dict[str, list[str]] = {}
@@ -61,8 +63,8 @@ class _Variables:
         self.stored = {name: Stored(name, values.shape, values.dtype) for name, values in self._arrays.items()}
 
     def _add(self, name: str, values: Any, depth: int) -> None:
-        """Store an array under its path; fields of a struct become paths of their own, and what is no array of numbers
-        is named as not read."""
+        """Store the variable `name` if it is an array of numbers or text. The fields of a struct are stored as
+        "name/field"; anything else is added to `not_read`. `depth` counts the structs around the variable."""
         is_array = type(values) is np.ndarray
         if is_array and values.dtype.names and values.size == 1 and depth < MOST_NESTED:
             for field in values.dtype.names:

@@ -32,6 +32,8 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _read_header(file: BinaryIO, options: ReadOptions) -> JsonObject:
+    """Return the fields of a MotionClip that an MDD point cache holds: "positions", "time" and "metadata". Raises
+    ClipError if its header contradicts its size or its times do not increase."""
     frame_count, vertex_count = HEADER.unpack(read_exactly(file, HEADER.size, "header"))
     if not 0 < 4 * frame_count <= os.fstat(file.fileno()).st_size:
         raise ClipError(f"header: got {frame_count} frames, expected at least one and no more than the file can hold")

@@ -36,7 +36,8 @@ class Mesh:
         return polygons(self.faces, self.attributes)
 
     def same_topology(self, other: Mesh) -> str:
-        """Return "" if both have as many vertices and the same faces and edges, else what is different."""
+        """Return "" if the other mesh has as many vertices and the same faces and edges as this one; otherwise return
+        text that says what differs."""
         if len(self.points) != len(other.points):
             return f"got {len(other.points)} vertices, expected {len(self.points)}"
         for elements, first, second in (("faces", self.polygons, other.polygons), ("edges", self.edges, other.edges)):

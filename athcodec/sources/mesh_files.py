@@ -25,7 +25,8 @@ def read_mesh(path: FilePath, budget: Budget) -> Mesh:
 
 
 def parse_mesh(data: bytes, path: FilePath, budget: Budget) -> Mesh:
-    """Return the mesh in the bytes of a file, whose name is for messages. Raises ClipError."""
+    """Return the mesh in `data`, the content of a PLY or OBJ file. `path` gives the suffix and begins messages. Raises
+    ClipError if the content is broken."""
     try:
         budget.need_for(data, WORD_ENDS, WORD_BYTES, "words")
         if data.startswith((b"ply\n", b"ply\r")):

@@ -69,7 +69,8 @@ class Mtg:
 
 
 def read_mtg(path: FilePath) -> Mtg:
-    """Return the plants in an MTG file. Raises ClipError that names the line, OSError where it cannot be opened."""
+    """Return the plants in an MTG (multiscale tree graph) file. Raises ClipError that names the line at fault, OSError
+    if the file cannot be opened."""
     if os.path.getsize(path) > MAX_FILE_BYTES:
         raise ClipError(f"{fspath(path)}: got {os.path.getsize(path)} bytes, expected at most {MAX_FILE_BYTES}")
     with open_plain(path) as file:
@@ -81,11 +82,13 @@ def read_mtg(path: FilePath) -> Mtg:
 
 
 def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of a clip on the branches of an MTG.
+    """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of a clip's vertices on the branches of
+    the plant in the MTG file `path`: the branch of each vertex, the parent of each branch, -1 for a root, and the
+    vertex's place along its branch.
 
-    Every vertex goes to the nearest piece of the plant at rest where at least half of the parts have coordinates; else
-    the vertices are the parts in their order, and there must be as many. Branches without vertices are left out. Raises
-    ClipError where neither is so, or where the plant of the MTG lies elsewhere.
+    If at least half of the MTG's parts have coordinates, each vertex belongs to the nearest part of the plant at rest.
+    Otherwise vertices are the parts in their order, and there have to be as many. Branches without vertices are left
+    out. Raises ClipError if neither is possible, or if the plant of the MTG lies elsewhere than the clip.
     """
     mtg = read_mtg(path)
     _name_others(path, mtg)
@@ -109,7 +112,8 @@ def mtg_branches(path: FilePath, clip: MotionClip) -> tuple[np.ndarray, np.ndarr
 
 
 def _name_others(path: FilePath, mtg: Mtg) -> None:
-    """Warn of what an MTG file has that a clip of branches has no place for: features, and rows of later dates."""
+    """Give a SourceWarning that names what the MTG file holds and branches have no place for: features, and rows of
+    later dates."""
     features = [name for name in mtg.features if name not in (*_coordinates(list(mtg.features)), ALIAS)]
     others = [f"features {', '.join(features)}"] if features else []
     others += [f"{mtg.later_rows} row{'s' * (mtg.later_rows != 1)} of later dates (*)"] if mtg.later_rows else []
@@ -137,6 +141,7 @@ class _Plants:
     """All entities of a file at all scales."""
 
     def __init__(self, text: str):
+        """Read the entities in the text of an MTG file. Raises ClipError if the text is none."""
         self.entities: list[_Entity] = []
         self.names: list[str] = []
         self._scales: dict[str, int] = {}
@@ -159,7 +164,8 @@ class _Plants:
         return ClipError(f"line {self._line}: {problem}")
 
     def _header(self, lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-        """Return the rows of the code, once the sections before it are read."""
+        """Read the sections before "MTG:" and return the rows behind it, each as the number of its line and its cells.
+        `lines` are the lines of the file without comments."""
         section, form = "", ""
         for number, line in enumerate(lines):
             self._line = number + 1
@@ -185,7 +191,8 @@ class _Plants:
             self._scales[words[0]] = int(words[1])
 
     def _columns(self, lines: Sequence[str], start: int) -> Iterator[tuple[int, list[str]]]:
-        """Find the row with the names of the columns, and return the number and cells of each row behind it."""
+        """Read the row with the names of the columns, which is the first with text from line `start` on. Return the
+        rows behind it, each as the number of its line and its cells."""
         rows = ((number + 1, line.split("\t")) for number, line in enumerate(lines[start:], start))
         for self._line, cells in rows:
             names = [cell.strip() for cell in cells]
@@ -201,7 +208,8 @@ class _Plants:
         return rows
 
     def _row(self, cells: Sequence[str]) -> None:
-        """Read one row of the code: the entities that it makes, and their features."""
+        """Read a row: make the entities that its code describes and store the row's features in them. Rows of later
+        dates ("*") are only counted."""
         cells = [cell.strip() for cell in cells]
         column = next((place for place, cell in enumerate(cells[: self._topology_columns]) if cell), None)
         if column is None or cells[column] == "*":
@@ -223,7 +231,8 @@ class _Plants:
             self._aliases[features[ALIAS]] = self._latest[column]
 
     def _code(self, code: str, column: int) -> list[int]:
-        """Make the entities of a row's code, and return those that the row's features belong to."""
+        """Make the entities that the code of a row describes, such as "/P1/A1<U2", and return the numbers of those that
+        the row's features belong to. `column` is the column in which the code stands."""
         start, code, is_absolute = self._start(code, column)
         at, now, about = 0, start, []
         for step in _STEP.finditer(code):
@@ -245,8 +254,9 @@ class _Plants:
         return about
 
     def _start(self, code: str, column: int) -> tuple[int, str, bool]:
-        """Return the entity that a code goes on from, -1 for none; the code without what says so; whether names are
-        whole."""
+        """Return (entity, code, is_absolute): the number of the entity on which the code in `column` goes on, -1 at the
+        beginning; the code without the prefix that named this entity; and whether labels in it may refer to entities
+        that exist already."""
         if code.startswith("^"):
             if column >= len(self._latest) or self._latest[column] < 0:
                 raise self._fail("got ^ in a column without a code above")
@@ -267,7 +277,9 @@ class _Plants:
         return left, code, left < 0
 
     def _unfolded(self, now: int, relation: str, symbol: str, index: str) -> Iterator[tuple[str, str]]:
-        """Yield each step that one stands for: E1<<E4 is E1<E2<E3<E4."""
+        """Yield (relation, label) for each step that one step of a code stands for: behind E1, "<<E4" stands for <E2,
+        <E3 and <E4. `now` is the number of the entity before it; `symbol` and `index` are the letters and digits of the
+        label."""
         if len(relation) == 1:
             yield relation, symbol + index
             return
@@ -280,7 +292,8 @@ class _Plants:
             yield relation[0], f"{symbol}{number}"
 
     def _step(self, now: int, relation: str, label: str, is_absolute: bool) -> int:
-        """Return the entity behind a relation: a new one unless its number has been used there before."""
+        """Return the number of the entity that `relation` ("/", "<" or "+") and `label` lead to from the entity `now`.
+        It is made if it does not exist yet. `is_absolute` says that a known label always means the known entity."""
         known = self._known.get((now, relation, label)) if label[-1].isdigit() else None
         if known is not None and (is_absolute or relation != "+"):
             return known
@@ -306,8 +319,9 @@ class _Plants:
         return entity
 
     def _bearer(self, entity: int, scale: int) -> int:
-        """Return what < or + goes on from behind an entity: behind S3+B2, <S4 goes on from S3, and so does +B3 once B2
-        has parts in columns of its own."""
+        """Return the number of the entity that a following "<" or "+" connects to, if the code so far ended at `entity`
+        and the new one has scale `scale`. Behind S3+B2, "<S4" connects to S3, and so does "+B3" once B2 has parts in
+        columns of its own."""
         at = entity
         while at >= 0:
             now = self.entities[at]
@@ -333,7 +347,8 @@ def _only_breaks(match: re.Match[str]) -> str:
 
 
 def _parts(plants: _Plants) -> Mtg:
-    """Return the smallest entities of the plants as parts: parents, branches and features."""
+    """Return the entities without parts, the finest of the plants, with their parents, branches, positions and
+    features."""
     entities = plants.entities
     leaves = [number for number, entity in enumerate(entities) if not entity.parts]
     place = {number: row for row, number in enumerate(leaves)}
@@ -364,8 +379,9 @@ def _parts(plants: _Plants) -> Mtg:
 
 
 def _below(entities: Sequence[_Entity], leaf: int) -> tuple[int, str]:
-    """Return the entity that a finest part is connected to, and how. A first part is connected as its whole is, any
-    other that is only a part follows the one before it."""
+    """Return (entity, relation): the entity that the finest part `leaf` is connected to, -1 for none, and whether it
+    follows ("<") or branches off ("+"). The first part of a whole is connected as the whole is; each further part
+    without a relation follows the part before it."""
     entity = leaf
     while entities[entity].relation == "/":
         whole = entities[entity].whole
@@ -393,7 +409,8 @@ def _last_leaf(entities: Sequence[_Entity], entity: int) -> int:
 
 
 def _roots_first(parent: np.ndarray) -> list[int]:
-    """Return all parts, each behind the one below it. Raises ClipError where they form a cycle."""
+    """Return the numbers of all parts, each after its parent (`parent` (V,), -1 for a root). Raises ClipError if the
+    parts form a cycle."""
     children: list[list[int]] = [[] for _ in parent]
     for row, below in enumerate(parent.tolist()):
         if below >= 0:
@@ -407,8 +424,9 @@ def _roots_first(parent: np.ndarray) -> list[int]:
 
 
 def _chains(parent: np.ndarray, follows: np.ndarray, order: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return (V,) and (B,): branches numbered by their first part in the file. Only one part goes on the branch of
-    another."""
+    """Return the branch of each part (V,) and the parent of each branch (B,), -1 for none. A part continues its
+    parent's branch if `follows` is set for it and no part before it in the file did; else it begins a branch. `order`
+    lists parents before children."""
     begins, continued = np.ones(len(parent), bool), set()
     for row in range(len(parent)):
         if follows[row] and int(parent[row]) not in continued:
@@ -442,7 +460,8 @@ def _position(entity: _Entity, coordinates: Sequence[str]) -> list[float]:
 
 
 def _stated_base(entities: Sequence[_Entity], leaf: int, coordinates: Sequence[str]) -> list[float] | None:
-    """Return the position that the file gives to an entity whose first part this is."""
+    """Return the position that the file states for an entity whose first finest part is `leaf`, which is where this
+    part begins; None if it states none. `coordinates` are the names of the columns of x, y and z."""
     entity = leaf
     while entities[entity].whole >= 0 and entities[entities[entity].whole].parts[0] == entity:
         entity = entities[entity].whole
@@ -465,7 +484,9 @@ def _depths(parent: np.ndarray) -> np.ndarray:
 
 
 def _nearest(path: FilePath, mtg: Mtg, located: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the branch of the nearest piece, from a part's base to its position, and how far up the branch that is."""
+    """Return for each vertex of `rest` (N, 3) the branch of the nearest part (N,), and how far along the branch the
+    nearest point is (N,), in parts. `located` (V,) marks the parts whose position is known. Raises ClipError if the
+    plant lies elsewhere than the vertices."""
     rows = np.flatnonzero(located)
     tip = mtg.positions[rows]
     base = np.where(np.isfinite(mtg.base[rows]).all(axis=1, keepdims=True), mtg.base[rows], tip)
@@ -480,7 +501,9 @@ def _nearest(path: FilePath, mtg: Mtg, located: np.ndarray, rest: np.ndarray) ->
 
 
 def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (N,) the piece nearest to each point, where on it from 0 to 1, and the distance."""
+    """Return for each of `points` (N, 3) the number of the nearest straight piece, where on the piece its nearest point
+    is, from 0 at the base to 1 at the tip, and the distance; (N,) each. `base` and `tip` (P, 3) are the ends of the
+    pieces."""
     along = tip - base
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     piece, share = np.zeros(len(points), np.int64), np.zeros(len(points))
@@ -499,7 +522,8 @@ def _nearest_pieces(points: np.ndarray, base: np.ndarray, tip: np.ndarray) -> tu
 
 
 def _without_empty(branch: np.ndarray, branch_parent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Remove branches that have no vertices; what hangs on one hangs on the next below that has some."""
+    """Return (branch, branch_parent) without the branches that have no vertices. Children of a removed branch get its
+    nearest ancestor that has vertices as parent, -1 if there is none. `branch` (N,) is the branch of each vertex."""
     used = np.bincount(branch, minlength=len(branch_parent)) > 0
     parent = branch_parent.astype(np.int64)
     while True:

@@ -55,7 +55,8 @@ class Header:
 
 
 def read_header(name: str, file: Any) -> Header:
-    """Return the header at the beginning of a file that knows its place. Raises ClipError."""
+    """Return the header of the .npy array that begins at the current position of `file`; reading goes on behind it.
+    `name` begins the message of a ClipError, which is raised for an unknown version or shape."""
     version = np.lib.format.read_magic(file)
     if version not in ((1, 0), (2, 0)):
         raise ClipError(f"{name}: got version {version} of NumPy's format, expected (1, 0) or (2, 0)")
@@ -78,8 +79,9 @@ def rows_shape(header: Header) -> tuple[int, ...]:
 
 
 def positions_of_rows(name: str, rows: Any, header: Header, order: Order, budget: Budget) -> Any:
-    """Return (T, N, 3) positions of an array whose rows, in `rows_shape`, are read when they are sliced, forward most
-    of all. Raises ClipError where it has to be read whole, and there is no room for it."""
+    """Return the positions (T, N, 3) of a stored array, read from `rows` when they are sliced. `order` says what each
+    axis of the array holds. If frames are not the array's slowest axis, it is read whole now, for which ClipError is
+    raised if `budget` has no room."""
     order = order[::-1] if header.is_fortran else order
     if order[0][:1] != (FRAMES,):
         budget.take(header.bytes, f"{name}, whose axes are in another order, whole")

@@ -51,7 +51,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 @contextmanager
 def _naming_array(name: str) -> Iterator[None]:
-    """Let errors of the block name the array that they are about."""
+    """Turn errors of the block into ClipErrors whose messages begin with the name of the array."""
     try:
         yield
     except ClipError:
@@ -67,6 +67,8 @@ class _Members:
     counts_from_1 = False
 
     def __init__(self, file: BinaryIO, budget: Budget):
+        """List the arrays in the .npz archive `file`, and read its metadata. `budget` limits the memory that reading
+        takes."""
         self._file, self._archive, self._budget = file, zipfile.ZipFile(file), budget
         self._members: dict[str, zipfile.ZipInfo] = {}
         self._headers: dict[str, Header] = {}
@@ -80,6 +82,8 @@ class _Members:
             del self.stored[METADATA]
 
     def _add(self, name: str, info: zipfile.ZipInfo) -> None:
+        """List the archive's member `info` as the array `name`, or add it to `not_read` if it is no array of numbers.
+        Raises ClipError if the member is encrypted or packed in an unusual way."""
         if not info.filename.endswith(SUFFIX):
             if info.filename and not info.is_dir():
                 self.not_read.setdefault("member", []).append(info.filename)
@@ -98,6 +102,8 @@ class _Members:
         self._members[name], self._headers[name] = info, header
 
     def read(self, name: str) -> np.ndarray:
+        """Return the array `name` as a whole, with text as UTF-8 bytes. Raises ClipError if it is damaged or there is
+        no memory for it."""
         info = self._members[name]
         self._budget.take(2 * info.file_size, name)  # Once as it is, and once as the clip has it.
         with _naming_array(name), self._archive.open(info) as member:
@@ -111,6 +117,8 @@ class _Members:
         return np.char.encode(values, "utf-8") if values.dtype.kind == "U" and values.ndim else values
 
     def positions(self, name: str, order: Order) -> ArrayLike:
+        """Return the positions in array `name` as (frames, vertices, 3), read from the file when they are sliced.
+        `order` says what each axis of the array holds."""
         info, header = self._members[name], self._headers[name]
         check_size(name, header, info.file_size - header.size)
         if info.compress_type == zipfile.ZIP_STORED:
@@ -126,7 +134,8 @@ class _Members:
         return ()
 
     def _offset(self, name: str) -> int:
-        """Return where an array begins in the file: each member has a header of its own length before it."""
+        """Return the offset, in bytes from the beginning of the file, of the array `name` in the archive. It follows
+        the member's own header, whose length varies. Raises ClipError if the file ends before the array does."""
         info = self._members[name]
         self._file.seek(info.header_offset)
         magic, name_bytes, extra_bytes = _LOCAL_HEADER.unpack(read_exactly(self._file, _LOCAL_HEADER.size, name))
@@ -140,7 +149,8 @@ class _Members:
 
 
 def _parsed(values: np.ndarray) -> JsonObject:
-    """Return the metadata in an array of JSON text."""
+    """Return the clip's metadata from `values`, an array with one item of JSON text. Raises ClipError if the text is no
+    JSON object."""
     try:
         text = values.reshape(()).item()
         content = json.loads(text.decode("utf-8", "replace") if isinstance(text, bytes) else text)
@@ -165,6 +175,8 @@ class _UnpackedRows:
         return self.shape[0]
 
     def __getitem__(self, index: slice | tuple[slice, ...]) -> np.ndarray:
+        """Return the sliced rows of the compressed array. Rows behind those read last are unpacked from there on;
+        earlier rows need unpacking from the array's beginning."""
         rows, *others = index if isinstance(index, tuple) else (index,)
         start, stop, step = rows.indices(self.shape[0])
         if step != 1:

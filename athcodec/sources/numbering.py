@@ -58,7 +58,7 @@ class Numbering:
         return self.folder / f"{self.prefix}{number:0{self.width}d}{self.suffix}"
 
     def files(self) -> dict[int, Path]:
-        """Return the files that are there, by their numbers, in that order."""
+        """Return the existing files of the sequence by their numbers, in ascending order."""
         files = {}
         for name, sign, digits in _numbered(self.folder, self.prefix, self.suffix):
             longer = len(digits) - self.width
@@ -87,8 +87,8 @@ class NumberedFiles:
 
 
 def numbering_of(path: FilePath) -> Numbering | None:
-    """Return the numbering that a pattern, or a file's name with digits before its suffix, belongs to; None: it has
-    none."""
+    """Return the numbering of the sequence that a pattern, or a file with digits at the end of its stem, belongs to.
+    Return None if the file's name has no such digits."""
     path = Path(path)
     if is_pattern(path):
         return Numbering.of_pattern(path)
@@ -114,8 +114,9 @@ def _numbered(folder: Path, prefix: str, suffix: str) -> list[tuple[str, str, st
 
 
 def numbered_files(path: FilePath) -> NumberedFiles:
-    """Return the files of the sequence that a file or a pattern names. Raises ClipError where a pattern matches none or
-    two files have one number, OSError where the folder or the named file is not there."""
+    """Return the files of the sequence that `path`, a pattern or any one of the files, belongs to, in the order of
+    their numbers. Raises ClipError if a pattern matches no file or two files have the same number, OSError if the
+    folder or the file does not exist."""
     path = Path(path)
     if is_pattern(path):
         numbering = Numbering.of_pattern(path)
@@ -131,7 +132,7 @@ def numbered_files(path: FilePath) -> NumberedFiles:
 
 
 def _at_end(path: Path) -> NumberedFiles:
-    """Return the files that differ in the number at the end of their names."""
+    """Return the files whose names differ from that of `path` only in the number at the end, or `path` alone."""
     match = _AT_END.fullmatch(path.stem)
     if match is None:
         return NumberedFiles((path,), name=path.stem)
@@ -145,8 +146,8 @@ def _at_end(path: Path) -> NumberedFiles:
 
 
 def _behind_t(path: Path) -> NumberedFiles | None:
-    """Return the files that differ in a number behind "t" or "time"; None where there is no such number, or one file
-    alone."""
+    """Return the files whose names differ from that of `path` only in a number after "t" or "time", wherever it stands.
+    Return None if there is no such number or no second file."""
     for match in _BEHIND_T.finditer(path.stem):
         place = match.start(1)
         decimals = _Decimals.of(path.parent, path.stem[:place], path.stem[match.end() :] + path.suffix)
@@ -191,7 +192,8 @@ class _Decimals:
 
     @classmethod
     def of(cls, folder: Path, prefix: str, suffix: str, hyphen: str = "") -> _Decimals:
-        """Return the decimals of a name. A `hyphen` before the number is a sign only if not all files have it."""
+        """Return the files of a folder whose names are `prefix`, a number that may have decimals, and `suffix`. A
+        `hyphen` before the number belongs to the prefix if all files have it; otherwise it is a minus sign."""
         form = re.compile(re.escape(prefix) + _DECIMAL + re.escape(suffix))
         matches = [(match, name) for name in os.listdir(folder) if (match := form.fullmatch(name))]
         if hyphen and all(match[1] for match, _ in matches):
@@ -211,8 +213,8 @@ class _Decimals:
         return self._kind(named) == "doubtful"
 
     def _kind(self, named: str) -> str:
-        """Return how the numbers in names are meant: "frames", "decimals" of seconds, or what is in doubt between
-        them."""
+        """Return what the numbers in the names are, in view of the file called `named`: "frames" for frame numbers,
+        "decimals" for numbers with a decimal point, such as seconds, or "doubtful"."""
         broken = [number for number in self.numbers if number.behind or number.exponent]
         if not broken or len(self.numbers) < 2 or re.search(r"\d[.,]$", self.prefix):  # 31.03.2024, version 1.2.3
             return "frames"
@@ -247,7 +249,7 @@ class _Decimals:
         return bool(steps.max() <= 1.001 * steps.min())
 
     def files(self) -> NumberedFiles:
-        """Raise ClipError where two of them have one number."""
+        """Return the files in ascending order of their numbers. Raises ClipError if two files have the same number."""
         for before, now in zip(self.numbers, self.numbers[1:]):
             if before.value == now.value:
                 raise ClipError(
@@ -267,7 +269,8 @@ def _word_before(prefix: str) -> str:
 
 
 def files_to_read(path: FilePath) -> NumberedFiles:
-    """Return `numbered_files`; a GuessWarning names files that are left out though they may belong to the motion."""
+    """Return `numbered_files(path)`, and give a GuessWarning that names files that are left out although they may
+    belong to the same motion."""
     files, path = numbered_files(path), Path(path)
     if is_pattern(path):
         return files
@@ -305,7 +308,8 @@ def _of_form(path: Path, places: re.Pattern[str], names_read: Iterable[str]) -> 
 
 
 def _pattern_of(path: Path) -> tuple[str, list[str]]:
-    """Return a pattern for files that differ from `path` in one number, wherever it stands, and their names."""
+    """Return (pattern, names): a pattern with "#" for the one number in which other files' names differ from that of
+    `path`, and the names of these files. Return ("", []) if there are none."""
     similar = [name for name in _of_form(path, _TOKENS, [path.name]) if "#" not in name and "%" not in name]
     parts = _TOKENS.findall(path.stem)
     for place, match in enumerate(_TOKENS.finditer(path.stem)):
@@ -330,9 +334,9 @@ def some(names: Sequence[str]) -> str:
 
 
 def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
-    """Return paths, and what the clip in each is called by its file. Of the files of a sequence, as a shell makes them
-    of a pattern, only the first stays, called by their prefix. Raises ClipError where only some of a sequence are
-    named."""
+    """Return (path, name) for each clip that `paths` stand for, where name is what the clip is called by its file.
+    Several files of one numbered sequence become one clip: the first path, called by the files' common prefix. Raises
+    ClipError if more than one but not all files of a sequence are given."""
     sequence_of: dict[Path, NumberedFiles] = {}
     named: dict[NumberedFiles | str, list[str]] = {}
     for path in paths:
@@ -344,7 +348,8 @@ def each_once(paths: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def _called(named: dict[NumberedFiles | str, list[str]]) -> Iterator[tuple[str, str]]:
-    """Yield the path and the name of the clip for each sequence, and for each single file."""
+    """Yield (path, name of the clip) for each sequence or single file. `named` has the paths that were given for each
+    of them."""
     for files, names in named.items():
         if len(names) == 1 or isinstance(files, str) or files.numbers is None:
             yield from ((path, Path(path).stem) for path in names)

@@ -44,6 +44,7 @@ class _Obj:
     """The lines of an OBJ file, taken one after the other."""
 
     def __init__(self) -> None:
+        """Begin an OBJ file without any statement."""
         self.points: list[Sequence[bytes]] = []
         self.uvs: list[Sequence[bytes]] = []
         self.counts: list[int] = []
@@ -57,7 +58,7 @@ class _Obj:
         self.not_read: dict[bytes, None] = {}
 
     def line(self, line: bytes) -> None:
-        """Take the next line. Raises ClipError."""
+        """Take the next line of the file and store what its statement says. Raises ClipError if it is broken."""
         words = line.split()
         if not words:
             return
@@ -74,6 +75,8 @@ class _Obj:
         self.uvs.append(words)
 
     def _f(self, words: Sequence[bytes]) -> None:
+        """Store a face, from the words behind `f`: one for each corner, with the number of a vertex and, behind a
+        slash, of its texture coordinates."""
         for word in words:
             numbers = word.split(b"/")
             self.corners.append(self._index(numbers[0], len(self.points)))
@@ -125,7 +128,7 @@ def obj_lines(data: bytes) -> list[bytes]:
 
 
 def parse_obj(data: bytes) -> Mesh:
-    """Return the mesh in the bytes of an OBJ file. Raises ClipError."""
+    """Return the mesh in an OBJ file whose content is `data`. Raises ClipError if it is broken or has no vertices."""
     file = _Obj()
     for line in obj_lines(data):
         file.line(line)
@@ -155,8 +158,9 @@ def parse_obj(data: bytes) -> Mesh:
 def obj_points(
     rows: Sequence[Sequence[bytes]], dtype: npt.DTypeLike | None = None
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return (N, 3) and the colours behind them, of the words on the lines of v. dtype None: float32, or float64 where
-    the coordinates have more digits than float32 holds."""
+    """Return (points, colours) from the words on the `v` lines of an OBJ file: points (N, 3), and colours (N, 3) or (N,
+    4), None if not every line has them. Points have the type `dtype`, by default float32, or float64 if they have more
+    digits than float32 holds."""
     flat = [word for row in rows for word in row[:3]]
     if len(flat) != 3 * len(rows) or any(len(row) < 3 for row in rows):
         raise ClipError("vertices: got fewer than three coordinates")
@@ -184,6 +188,8 @@ def _digits(word: bytes) -> int:
 
 
 def _add_obj_uv(mesh: Mesh, file: _Obj) -> None:
+    """Store the texture coordinates of the file's corners in the mesh as the attribute "uv", with a row for each
+    corner; corners without any get 0."""
     uv_rows = np.array(file.corner_uvs, np.int64)
     if not file.uvs or not (uv_rows >= 0).any():
         file.not_read |= {b"vt": None} if file.uvs else {}
@@ -199,6 +205,8 @@ def _add_obj_uv(mesh: Mesh, file: _Obj) -> None:
 
 
 def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
+    """Store the names of objects, groups and materials in the mesh. The parts of the mesh are the file's objects, or
+    its groups if it has no objects; names that cannot be kept are noted as not read."""
     labels = np.array(file.face_labels, np.int32).reshape(-1, 3)
     column, names = (0, file.objects) if file.objects.names else (1, file.groups)
     if names.names:
@@ -215,7 +223,9 @@ def _add_obj_names(mesh: Mesh, file: _Obj) -> None:
 
 
 def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int) -> np.ndarray:
-    """Return (N,) the name that the first element with the vertex is under; without one that of the vertex before."""
+    """Return for each vertex (N,) the number of the object (`column` 0) or group (1) of the first face, line or point
+    that uses it. A vertex that nothing uses gets the number of the vertex before it. `face_labels` (F,) has the numbers
+    of the faces."""
     labels = np.full(len(mesh.points), -1, np.int64)
     if mesh.polygons is not None:
         counts, corners = mesh.polygons
@@ -232,7 +242,8 @@ def _vertex_labels(mesh: Mesh, file: _Obj, face_labels: np.ndarray, column: int)
 
 
 def _add_parts(mesh: Mesh, labels: np.ndarray, names: Sequence[str]) -> None:
-    """Add the objects if the vertices of each lie together in the file; else the whole file is one object."""
+    """Store the objects as the parts of the mesh if the vertices of each object follow one another; otherwise leave the
+    whole mesh one part. `labels` (N,) is the number of each vertex's object in `names`."""
     starts = np.flatnonzero(np.diff(labels, prepend=-1))
     if len(set(labels[starts])) != len(starts):
         return

@@ -62,6 +62,8 @@ class JoinedSteps:
     """See fields.Steps: the steps of all parts."""
 
     def __init__(self, parts: Sequence[Part], budget: Budget, warn_as: str):
+        """Join the steps of several meshes. `warn_as` is the file's name in warnings; `budget` limits the memory that
+        reading takes."""
         self._parts, self._budget, self._warn_as = parts, budget, warn_as
         self._counts = [len(part.points(0)) for part in parts]
         self.topology = topology_of(_joined_blocks(parts, self._counts), sum(self._counts))
@@ -96,8 +98,8 @@ class JoinedSteps:
         return list(dict.fromkeys(name for part in self._parts for name in part.names(NODE)))
 
     def field(self, step: int, name: str) -> np.ndarray:
-        """Return the field of all parts at a step, (N, ...); 0 for parts without it. Raises ClipError if no part has
-        it."""
+        """Return the field `name` at a step, with a row for each point of all parts. Points of a part without the field
+        get 0. Raises ClipError if no part has it."""
         having = [part for part in self._parts if name in part.names(NODE)]
         if not having:
             raise ClipError(f"frame {step}: got no field {name!r} per point, expected one as in the first")
@@ -116,7 +118,8 @@ class JoinedSteps:
         return self._static_data(NODE, self._counts)
 
     def _static_data(self, center: str, counts: Sequence[int]) -> dict[str, np.ndarray]:
-        """Return the arrays per point or per cell that all parts have and that are the same in all steps, joined."""
+        """Return by name the joined arrays that every part has and that stay the same in all steps. `center` says
+        whether they are per point or per cell, and `counts` how many rows each part has."""
         kept = {}
         for name in dict.fromkeys(name for part in self._parts for name in part.names(center)):
             if name and all(name in part.names(center) and part.is_static(name, center) for part in self._parts):
@@ -146,7 +149,8 @@ class JoinedSteps:
 
 
 def _joined_blocks(parts: Sequence[Part], counts: Sequence[int]) -> list[Block]:
-    """Return the cells of all parts, numbered as their points and cells follow each other."""
+    """Return the cells of all parts as if their points and cells formed one mesh, one part after the other. `counts`
+    has the number of points of each part."""
     blocks, first, row = [], 0, 0
     for part, count in zip(parts, counts):
         if len(parts) > 1:

@@ -42,6 +42,8 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _read_header(file: BinaryIO, options: ReadOptions) -> JsonObject:
+    """Return the fields of a MotionClip that a PC2 point cache holds: "positions", "time" and "metadata". Raises
+    ClipError if its header is broken."""
     fields = HEADER.unpack(read_exactly(file, HEADER.size, "header"))
     magic, version, vertex_count, first, step, frame_count = fields
     if magic != MAGIC:
@@ -69,8 +71,8 @@ def check_size(file: BinaryIO, frame_count: int, vertex_count: int, header_bytes
 
 
 def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> MotionClip:
-    """Return the clip in a point cache with the mesh that belongs to it. read_header(file, options) gives the clip's
-    positions, time and metadata."""
+    """Return the clip in the point cache `path`, with faces and attributes of the mesh file that belongs to it.
+    `read_header(file, options)` has to return the clip's "positions", "time" and "metadata" in a dictionary."""
     file = open_plain(path)
     with naming(path), closing_on_failure(file):
         fields = read_header(file, options)
@@ -93,10 +95,12 @@ def open_cache(path: FilePath, options: ReadOptions, read_header: Any) -> Motion
 
 
 def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions, vertex_count: int) -> Mesh:
-    """Return the mesh whose vertices the cache `path` moves, in the file `found`, or where that is None points alone.
+    """Return the mesh in `mesh_path` whose vertices the point cache `path` moves, or a mesh of points alone if
+    `mesh_path` is None.
 
-    OBJ and PLY are read here, any other format as `read` does; the mesh's own positions are not used: they may be in
-    other units or axes."""
+    The mesh's own positions are not used, because they may have other units or axes. Raises ClipError if the mesh does
+    not have `vertex_count` vertices.
+    """
     if mesh_path is None:
         metadata = {
             "part_names": [Path(path).stem],
@@ -123,7 +127,8 @@ def cached_mesh(mesh_path: FilePath | None, path: FilePath, options: ReadOptions
 
 
 def _say_other_meshes(path: Path) -> None:
-    """Give a GuessWarning if files of the cache's name beside it may be its mesh, and are not looked at."""
+    """Give a GuessWarning that names files beside the point cache `path` that have its name and may hold its mesh, but
+    are not read."""
     known = {suffix for kind in FORMATS for suffix in kind.suffixes} - set(CACHE_SUFFIXES)
     beside = sorted(
         file.name

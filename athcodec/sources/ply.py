@@ -59,7 +59,8 @@ class PlyElement:
         return [name for name, _, counted_by in self.properties if counted_by]
 
     def row(self, order: str, lengths: dict[str, int]) -> np.dtype:
-        """Return a row whose lists have these lengths."""
+        """Return the structured dtype of one row of the element. `order` is the byte order ("<", ">" or "="), and
+        `lengths` has the length of each list in the row by the list's name."""
         fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
         for name, dtype, counted_by in self.properties:
             if counted_by:
@@ -80,7 +81,7 @@ class PlyHeader:
 
 
 def ply_header(data: bytes) -> PlyHeader:
-    """Return the header in the bytes of a PLY file. Raises ClipError."""
+    """Return the header of a PLY file whose content is `data`. Raises ClipError if it is broken."""
     end = data.find(b"end_header", 0, HEADER_BYTES)
     line_end = data.find(b"\n", end)
     if end < 0 or line_end < 0:
@@ -120,8 +121,8 @@ class _Text:
         self._words, self._at = data.split(), 0
 
     def rows(self, element: PlyElement, count: int, lengths: dict[str, int]) -> np.ndarray:
-        """Return `count` rows of an element from the next words, as PlyElement.row describes them. Raises ClipError
-        where the file ends."""
+        """Return the next `count` rows of an element, of the dtype `element.row("=", lengths)`, without moving on
+        behind them. Raises ClipError if the file ends before."""
         width = sum(1 + lengths[name] if counted_by else 1 for name, _, counted_by in element.properties)
         if self._at + count * width > len(self._words):
             raise ClipError(f"{element.name}: got the end of the file, expected {element.count} of them")
@@ -164,7 +165,8 @@ class _Binary:
 
 
 def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, Column]:
-    """Return the values of each property of all rows, by its name."""
+    """Return the values of each property of an element by its name, and move on behind the element. A list property
+    gives a pair: the length of the list in each row, and the items of all lists, one after the other."""
     none = dict.fromkeys(element.lists, 0)
     if not element.properties or not element.count:
         return {}
@@ -188,7 +190,8 @@ def _element_values(source: _Text | _Binary, element: PlyElement) -> dict[str, C
 
 
 def _first_lengths(source: _Text | _Binary, element: PlyElement) -> dict[str, int]:
-    """Return how long the lists of the next row are: each says it behind those before it."""
+    """Return the length of each list in the next row, by the list's name. The lists have to be read in order, because
+    the length of each stands behind the list before it."""
     lengths: dict[str, int] = {}
     for position, (name, _, counted_by) in enumerate(element.properties):
         if counted_by:
@@ -209,7 +212,8 @@ def _uniform(source: _Text | _Binary, element: PlyElement, lengths: dict[str, in
 
 
 def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, Column]:
-    """Return the values of each property of an element whose lists differ in length from row to row."""
+    """Return the values of each property of an element by its name, read row by row because the lists differ in length.
+    A list property gives a pair: the length of the list in each row, and all items."""
     parts: dict[str, list[np.ndarray]] = {name: [] for name, *_ in element.properties}
     counts: dict[str, list[int]] = {name: [] for name in element.lists}
     for _ in range(element.count):
@@ -228,7 +232,7 @@ def _one_by_one(source: _Text | _Binary, element: PlyElement) -> dict[str, Colum
 
 
 def parse_ply(data: bytes) -> Mesh:
-    """Return the mesh in the bytes of a PLY file. Raises ClipError."""
+    """Return the mesh in a PLY file whose content is `data`. Raises ClipError if it is broken or has no vertices."""
     header = ply_header(data)
     source = _Binary(data, header.length, header.order) if header.order else _Text(data[header.length :])
     values: dict[str, dict[str, Column]] = {}
@@ -268,7 +272,8 @@ def _numbers(columns: Mapping[str, Column]) -> dict[str, np.ndarray]:
 
 
 def ply_points(vertices: Mapping[str, np.ndarray] | np.ndarray) -> np.ndarray:
-    """Return (N, 3) of the values x, y and z; float64 where any of them is, or is a large integer."""
+    """Return the points (N, 3) of a PLY file from its columns x, y and z. They are float32 if every value of the
+    columns' types fits into float32, else float64."""
     dtype = (
         np.float32
         if all(
@@ -288,7 +293,8 @@ _PLY_COLORS = ("red", "green", "blue", "alpha")
 
 
 def _add_ply_vertex_values(mesh: Mesh, columns: Mapping[str, Column]) -> None:
-    """Add the values of vertices other than positions to the mesh: colours, texture coordinates and further columns."""
+    """Store the columns of vertices other than positions in the mesh: colours, texture coordinates, and others under
+    their own names."""
     columns_used, vertices = set(POSITION_COLUMNS), _numbers(columns)
     if not {"nx", "ny", "nz"}.isdisjoint(columns):
         _leave_out(mesh, "normals")
@@ -306,8 +312,8 @@ def _add_ply_vertex_values(mesh: Mesh, columns: Mapping[str, Column]) -> None:
 
 
 def _add_attribute(mesh: Mesh, name: str, values: Column, prefix: str = "vertex_") -> None:
-    """Add a column as an attribute of the mesh under its name, or with `prefix` if that name is taken; lists are named
-    as not read."""
+    """Store a column as an attribute of the mesh under its name, or with `prefix` in front if the name is taken. A
+    column of lists is noted as not read."""
     if isinstance(values, tuple):
         _leave_out(mesh, f"{prefix}{name} (lists)")
         return
@@ -332,7 +338,8 @@ def _native(values: np.ndarray) -> np.ndarray:
 
 
 def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
-    """Add the materials of faces. runs: [label, faces] one after the other, for all faces."""
+    """Store the material of each face in the mesh. `runs` should be a list of [material, number of faces] that covers
+    all faces in their order; anything else is ignored."""
     fits = isinstance(runs, list) and all(
         isinstance(run, list) and len(run) == 2 and all(type(n) is int and abs(n) < 1 << 31 for n in run)
         for run in runs
@@ -345,7 +352,8 @@ def _add_ply_materials(mesh: Mesh, runs: Any) -> None:
 
 
 def _add_ply_faces(mesh: Mesh, face_values: dict[str, Column]) -> None:
-    """Add the faces, their texture coordinates per corner and further columns to the mesh."""
+    """Store the faces, the texture coordinates of their corners, and further columns of faces in the mesh.
+    `face_values` has the columns by name."""
     corner_name = next((name for name in ("vertex_indices", "vertex_index") if name in face_values), "")
     lists = face_values.get(corner_name)
     if not isinstance(lists, tuple):

@@ -38,6 +38,8 @@ class RawRows:
         return self.shape[0]
 
     def __getitem__(self, index: slice | tuple[slice, ...]) -> np.ndarray:
+        """Return the sliced rows of the array, read from the file. The step of a slice has to be 1. Raises ClipError if
+        the file ends before the rows do."""
         rows, *others = index if isinstance(index, tuple) else (index,)
         start, stop, step = rows.indices(self.shape[0])
         if step != 1:

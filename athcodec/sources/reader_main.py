@@ -37,7 +37,8 @@ THREADS = 256 << 20
 
 
 def main() -> None:
-    """Read the clip that the first line on standard input asks for, and then answer each further line with frames."""
+    """Answer questions on standard input until it ends: send the clip that the first line describes in JSON, without
+    its positions, then for each line "START STOP" the positions of these frames."""
     module = importlib.import_module(sys.argv[1])
     asked = sys.stdin.buffer
     with os.fdopen(os.dup(1), "wb") as answers:
@@ -56,7 +57,7 @@ def main() -> None:
 
 
 def limit_memory(size: int) -> None:
-    """Limit the further memory of this process to so many bytes, if the system can."""
+    """Limit the memory that this process can still take to `size` bytes, if the system allows it."""
     status = Path("/proc/self/status")
     if sys.platform == "win32" or not status.exists():
         return
@@ -71,7 +72,8 @@ def limit_memory(size: int) -> None:
 
 @contextmanager
 def _answering(answers: BinaryIO, limit: int) -> Iterator[None]:
-    """Return a context that sends an error of the block as the answer."""
+    """Send an error of the block to the process that asked, as the answer. `limit` is the memory limit in bytes, for
+    the message."""
     try:
         yield
     except MemoryError:
@@ -93,7 +95,8 @@ def _send(answers: BinaryIO, data: bytes) -> None:
 
 
 def _described(clip: MotionClip, guesses: list[str]) -> bytes:
-    """Return all but the positions, with the texts of warnings, as an .npz."""
+    """Return a clip without its positions as the bytes of an .npz archive. `guesses` are the texts of warnings that
+    reading gave."""
     arrays = {f"attributes/{name}": values for name, values in clip.attributes.items()}
     arrays |= {name: getattr(clip, name) for name in ("time", *ARRAYS) if getattr(clip, name) is not None}
     arrays["rest"] = clip.source_rest

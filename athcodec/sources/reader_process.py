@@ -31,8 +31,9 @@ MAIN = "athcodec.sources.reader_main"
 
 
 def read_apart(path: FilePath, options: ReadOptions, module: str, crashed: str) -> MotionClip:
-    """Return the clip that `open_clip` of a module gives, there. crashed: the beginning of what to say where it has
-    crashed. Raises ClipError, OSError."""
+    """Return the clip that the function `open_clip` of `module` reads in a process of its own, so that a library that
+    crashes on a damaged file ends only that process. `crashed` begins the message if it does. Raises ClipError,
+    OSError."""
     path = fspath(path)
     open_plain(path).close()
     process = _Process(path, options, module, crashed)
@@ -70,6 +71,8 @@ class _Process:
     """The process that reads."""
 
     def __init__(self, path: str, options: ReadOptions, module: str, crashed: str):
+        """Start the process and let it open `path` by the function `open_clip` of `module`. `crashed` begins the
+        message if it crashes. Raises ClipError."""
         self._lock = threading.Lock()
         self._crashed = (
             f"{crashed} has crashed on it, or found no room in {options.max_memory:,} bytes (--max-memory, max_memory=)"
@@ -90,7 +93,8 @@ class _Process:
             self.described = self.ask(json.dumps(wanted))
 
     def ask(self, line: str) -> bytes:
-        """Return the answer of the process. Raises ClipError where it reports a fault, or has ended."""
+        """Send a line to the process and return the bytes of its answer. Raises ClipError if the process reports an
+        error or has ended."""
         if not self._end.alive:
             raise ClipError("positions: the clip is closed")
         questions, answers = self._process.stdin, self._process.stdout

@@ -28,10 +28,10 @@ SUFFIX = re.compile(r"\.[^A-Z/\\]+")
 
 @cache
 def registered(group: str) -> tuple[Format, ...]:
-    """Return the formats of a group: athcodec's own, then those of other packages in the order of their entry points'
-    names.
+    """Return the formats of an entry point group, such as "athcodec.sources": athcodec's own, then those of other
+    packages in the order of their entry points' names.
 
-    A format is left out, with a SourceWarning, where it cannot be loaded or where one before it has its name.
+    A format that cannot be loaded, or whose name is taken, is left out with a SourceWarning.
     """
     from importlib.metadata import EntryPoint, entry_points  # This import takes longer than that of athcodec.
 
@@ -49,7 +49,8 @@ def registered(group: str) -> tuple[Format, ...]:
 
 
 def _formats_of(point: EntryPoint) -> Iterator[Format]:
-    """Yield the formats that an entry point of another package names."""
+    """Yield the formats that the entry point of another package names. What cannot be loaded, or is no usable format,
+    is left out with a SourceWarning."""
     from athcodec.sources import Format
 
     try:

@@ -84,7 +84,7 @@ class SceneObject:
         return sizes[domain]
 
     def check(self) -> None:
-        """Raise ClipError where faces or curves do not fit the points."""
+        """Raise ClipError if faces or curves refer to points that do not exist, or counts do not add up."""
         corners = self.face_counts.sum(dtype=np.int64)
         if (self.face_counts < 0).any() or corners != len(self.face_indices):
             raise ClipError(
@@ -100,7 +100,7 @@ class SceneObject:
             raise ClipError(f"{self.path}: got curves of {points} points, expected {self.count}")
 
     def keep(self, name: str, domain: str | None, values: np.ndarray | None) -> None:
-        """Keep a static array where its rows fit; a row per curve becomes one per vertex."""
+        """Store a static array with a row for each element of `domain`; note it as left out if rows do not fit."""
         if name in self.statics:
             return
         if values is None or domain is None or domain == "constant" and len(values) != 1:
@@ -124,8 +124,8 @@ class SceneObject:
         self.face_materials[faces] = self.materials.index(name)
 
     def repeat(self, copies: int) -> None:
-        """Repeat the object as so many copies, one after the other. They have no rest pose but where they are. Raises
-        ClipError for more vertices than make sense."""
+        """Turn the object into `copies` copies of itself, one after the other; a rest pose of its own is dropped.
+        Raises ClipError if these would have more vertices than a clip may have."""
         if self.count * copies > MOST_VERTICES:
             raise ClipError(
                 f"{self.path}: got {copies} copies of {self.count} vertices, expected {MOST_VERTICES} at most"
@@ -147,7 +147,7 @@ class SceneObject:
         self.count, self.copies = self.count * copies, copies
 
     def ordered(self, points: np.ndarray, ids: np.ndarray, where: str) -> np.ndarray:
-        """Return the points (n, 3) in the order of `self.ids`. Raises ClipError where their ids are others."""
+        """Return the points (n, 3) with these ids in the order of `self.ids`. Raises ClipError if the ids differ."""
         assert self.ids is not None
         rows = rows_by_id(ids, self.ids)
         if not len(points) == len(ids) == len(rows) or (rows < 0).any():
@@ -158,8 +158,8 @@ class SceneObject:
         return points[rows]
 
     def face_outward(self, matrices: Iterable[np.ndarray], is_reversed: bool) -> None:
-        """Reverse the corners of faces that a transform mirrors, or, where the file lists corners the other way round,
-        of those that none does. matrices: from the object to the world in each frame, (4, 4) or (copies, 4, 4)."""
+        """Reverse the corners of faces that a transform mirrors or, with `is_reversed`, of all others, so that faces
+        point outward. `matrices`: object to world in each frame, (4, 4) or (copies, 4, 4)."""
         facing = Facing()
         for matrix in matrices:
             facing.add(matrix.reshape(1, -1, 4, 4))
@@ -175,7 +175,7 @@ class SceneObject:
                 static.values = static.values[order]
 
     def turn_normals(self, matrix: np.ndarray, moves: bool) -> None:
-        """Turn normals to world space; remove them where they turn in time, or have no direction there."""
+        """Turn normals to world space by `matrix` (4, 4); drop them if the object moves or the matrix is singular."""
         normals = self.statics.get("normals")
         if normals is None or normals.values.shape[1:] != (3,):
             return
@@ -230,8 +230,8 @@ def clip_of_objects(
     options: ReadOptions,
     **more: Any,
 ) -> MotionClip:
-    """Return the clip of all objects. kept: arrays that a writer of ours has added to the file; more: further fields of
-    MotionClip."""
+    """Return the clip of all objects, one after the other. `kept` are arrays that athcodec's own writers stored in the
+    file, as (descriptor, bytes); `more` are further fields of MotionClip."""
     attributes, domains = _joined_statics(objects, options.skip)
     _add_kept(kept, attributes, domains, options.skip)
     metadata = metadata | _join_materials(objects, metadata, attributes, domains, options.skip)
@@ -271,12 +271,12 @@ def frames_of_objects(
     frame_name: Callable[[int], str] = "frame {}".format,
     context: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> Frames:
-    """Return positions of all objects in world space, frame by frame: float32, or float64 where transforms of the first
-    frame place them far from the origin.
+    """Return the positions of all objects in world space, read when frames are sliced: float32, or float64 if
+    transforms of the first frame place them far from the origin.
 
-    sample(object, frame) gives its points (n, 3) and the (4, 4) matrix, for row vectors, that takes them to the world;
-    of copies the points of one and (copies, 4, 4) matrices;
-    frame_name is how errors name a frame; frames are read inside `context()`.
+    sample(object, frame) returns the object's points (n, 3) and the matrix (4, 4), for row vectors, from them to the
+    world; for copies of an object it returns the points of one copy and matrices (copies, 4, 4).
+    frame_name(frame) is how errors name a frame; frames are read inside `context()`.
     """
     count = sum(obj.count for obj in objects)
 
@@ -327,8 +327,8 @@ def _add_kept(
     domains: dict[str, str],
     skip: Collection[str],
 ) -> None:
-    """Add the arrays that a writer of athcodec stored in the file, and what their rows stand for, unless `skip` has
-    them."""
+    """Add to `attributes` and `domains` the arrays that athcodec's own writers stored (`kept`), except those in `skip`
+    and those whose names are taken."""
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     for descriptor, raw in kept:
         name, domain, values = descriptor.name, descriptor.domain, descriptor.array(raw)
@@ -342,7 +342,7 @@ def _add_kept(
 
 
 def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
-    """Return metadata: the names, or the paths where names come twice."""
+    """Return metadata of the objects: names, or paths if two names are equal, kinds, and further details."""
     names = [obj.name for obj in objects]
     unique = len(set(names)) == len(names)
     metadata = {
@@ -353,8 +353,8 @@ def _names_and_kinds(objects: Sequence[SceneObject]) -> JsonObject:
 
 
 def presence_metadata(names: Sequence[str], presence: Sequence[np.ndarray]) -> JsonObject:
-    """Return metadata: the frames that show each object, or each of its copies, that some frame does not show.
-    presence: (T, 1) or (T, copies) bool for each object."""
+    """Return as metadata which frames show each object, or copy of it, that is hidden in some frame. `presence` has for
+    each object whether a frame shows it: bool, (T, 1), or (T, copies)."""
     stated = {}
     for name, shown in zip(names, presence):
         if (shown == shown[:, :1]).all():
@@ -394,8 +394,8 @@ def rows_by_id(ids: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Return static arrays of all objects, one after the other, and what their rows stand for where that is no
-    vertex."""
+    """Return (attributes, domains): the static arrays of all objects joined by name, and what the rows of each stand
+    for unless these are vertices."""
     attributes, domains = {}, {}
     for name in dict.fromkeys(name for obj in objects for name in obj.statics):
         if name in skip:
@@ -422,7 +422,7 @@ def _joined_statics(objects: list[SceneObject], skip: Collection[str]) -> tuple[
 
 
 def _joined_static(name: str, objects: list[SceneObject]) -> Static | None:
-    """Return an object that lacks the array has zeros; None where the objects' arrays do not go together."""
+    """Return the objects' arrays `name` as one, with zeros for objects without it, or None if their shapes differ."""
     statics = [obj.statics[name] for obj in objects if name in obj.statics]
     shapes = {static.values.shape[1:] for static in statics}
     if len(shapes) != 1:
@@ -448,7 +448,7 @@ def _common_domain(statics: list[Static], object_count: int) -> str:
 
 
 def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an object's array with a row for each element of `domain`; zeros of `shape` if it has none."""
+    """Return an object's array with a row for each element of `domain`; zeros of `shape` if `static` is None."""
     if static is None:
         return np.zeros((obj.rows(domain), *shape), np.uint8)
     if static.domain == domain:
@@ -461,7 +461,7 @@ def _spread(obj: SceneObject, static: Static | None, domain: str, shape: tuple[i
 
 
 def scene_of_json(text: str | bytes) -> JsonObject:
-    """Return what our exporters add to files of formats without a place for it; nothing if it is no JSON object."""
+    """Return what athcodec's own writers stored as JSON in a file (names, materials ...); {} for any other text."""
     with suppress(ValueError, RecursionError):
         entries = json.loads(text)
         if isinstance(entries, dict):
@@ -483,8 +483,8 @@ def scene_fields(entries: JsonObject, count: int) -> tuple[JsonObject, dict[str,
 
 
 def _object_fields(entries: Any, count: int) -> tuple[JsonObject, dict[str, np.ndarray]]:
-    """Return metadata and attributes of the objects that a file of athcodec states; empty if they do not fit `count`
-    vertices."""
+    """Return (metadata, attributes) of objects as athcodec's own writers stated them in a file. Both are empty if the
+    entries are broken or do not add up to `count` vertices."""
     entries = entries if isinstance(entries, dict) else {}
     names, numbers = entries.get("names"), {key: entries.get(key) for key in ("vertices", "copies") if key in entries}
     fits = all(
@@ -511,8 +511,8 @@ def _join_materials(
     domains: dict[str, str],
     skip: Collection[str],
 ) -> JsonObject:
-    """Add "face_material", the material of each face among "material_names", which it returns as metadata, or -1.
-    Names come in the order that the file was written from, where it says one."""
+    """Add "face_material", the number of each face's material or -1, to `attributes`, and return the metadata
+    "material_names". Names that `metadata` states come first."""
     if FACE_MATERIAL in skip or all(obj.face_materials is None for obj in objects):
         return {}
     stated = metadata.get(MATERIAL_NAMES)
@@ -528,7 +528,7 @@ def _join_materials(
 
 
 def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Return (F, k), or None where polygons are mixed, which are attributes then, or where there are none."""
+    """Return the faces (F, k), or None if there are none or if sizes differ; these are put into `attributes`."""
     counts = np.concatenate([obj.face_counts for obj in objects])
     if not len(counts):
         return None
@@ -540,7 +540,7 @@ def _faces(objects: list[SceneObject], attributes: dict[str, np.ndarray]) -> np.
 
 
 def _edges(objects: list[SceneObject]) -> np.ndarray | None:
-    """Return the edges between neighbours on each curve, closed if it is periodic."""
+    """Return the edges (E, 2) between neighbouring points of each curve, int32; periodic curves are closed."""
     edges = []
     for obj in objects:
         if obj.curve_counts is None or not obj.count:
@@ -560,7 +560,7 @@ def _edges(objects: list[SceneObject]) -> np.ndarray | None:
 
 
 def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> JsonObject:
-    """Take what a MotionClip has members for out of the attributes; others of these names are renamed."""
+    """Move the arrays that are fields of a MotionClip from `attributes` to the result; rename others so called."""
     fields = {}
     vertices = int(attributes["part_vertex_counts"].sum(dtype=np.int64))
     rest, edges = attributes.get("rest"), attributes.get("edges")
@@ -582,7 +582,7 @@ def _fields(attributes: dict[str, np.ndarray], domains: dict[str, str]) -> JsonO
 
 
 def own_metadata(text: Any) -> JsonObject:
-    """Return the JSON metadata that our exporter kept besides what the format itself holds; else nothing."""
+    """Return further metadata that athcodec's own writer stored as JSON `text`; {} if it is anything else."""
     if not isinstance(text, str) or len(text) > MAX_METADATA_BYTES:
         return {}
     try:

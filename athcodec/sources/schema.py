@@ -149,6 +149,7 @@ class _Clip:
     loaded: dict[str, np.ndarray] = field(default_factory=dict)
 
     def made(self, **watched: Any) -> MotionClip:
+        """Return the clip of the file's arrays. `watched` are further fields of MotionClip. Raises ClipError."""
         self.not_read = {kind: list(names) for kind, names in self.arrays.not_read.items()}
         self.used[POSITIONS] = name = self._chosen()
         metadata = self._metadata(name)
@@ -188,7 +189,7 @@ class _Clip:
     # ---- the positions ----
 
     def _chosen(self) -> str:
-        """Return the name of the positions. Raises ClipError where it is not clear."""
+        """Return the name of the array of positions. Raises ClipError if no array, or several, may be it."""
         stored, order = self.arrays.stored, self.options.order
         if self.options.dataset is not None:
             name = self.options.dataset.strip("/")
@@ -227,7 +228,7 @@ class _Clip:
             self._warn(f"positions: {chosen} was taken for them{beside}; --dataset (dataset=) names another array")
 
     def _order(self, name: str, known: JsonMapping) -> Order:
-        """Return what the axes of the positions are. known: arrays by their names in the schema. Raises ClipError."""
+        """Return what each axis of the positions `name` holds. `known`: arrays by schema name. Raises ClipError."""
         stored = self.arrays.stored[name]
         stated = self.options.order or order_of_labels(self.arrays.labels(name))
         try:
@@ -253,7 +254,7 @@ class _Clip:
         return next((full for full in _upwards(self.used[POSITIONS], name) if full in self.arrays.stored), None)
 
     def _of_schema(self) -> dict[str, np.ndarray | None]:
-        """Return the arrays that belong to the positions by their names in the schema, None for one that is missing."""
+        """Return the arrays beside the positions by their names in the schema, None for one that is missing."""
         known: dict[str, np.ndarray | None] = {}
         for name in sorted(RESERVED_NAMES - {POSITIONS}):
             full = self._near(name)
@@ -268,7 +269,7 @@ class _Clip:
         return self.loaded[full]
 
     def _array(self, name: str, full: str) -> np.ndarray:
-        """Return the array stored as `full`, in the form that the schema has for `name`."""
+        """Return the array stored as `full` in the shape and type that the schema has for the array `name`."""
         self.used[name] = full
         values = self._read(full)
         if name in ROWS and _is_row(self.arrays.stored[full]):
@@ -280,7 +281,7 @@ class _Clip:
         return values
 
     def _count_from_0(self, known: dict[str, np.ndarray | None]) -> None:
-        """Count vertices and branches from 0 where the file counts them from 1."""
+        """Subtract 1 from the numbers of vertices and branches in `known` if the file counts them from 1."""
         for names in (("faces",), ("edges",), ("stem_index",), ("vertex_branch", "branch_parent")):
             first = known[names[0]]
             if first is None or not first.size or first.dtype.kind not in "iu" or first.min() < 1:
@@ -292,7 +293,7 @@ class _Clip:
             self._warn(f"{names[0]}: the lowest number is {first.min()}, so they were taken to be counted from 1")
 
     def _metadata(self, name: str) -> JsonObject:
-        """Return what the file says, the groups of the positions, and the positions themselves."""
+        """Return the metadata that the file, the groups around the positions, and the positions state."""
         metadata = dict(self.arrays.metadata)
         groups = [full.rpartition("/")[0] for full in _upwards(name, "")]
         for group in reversed([group for group in groups if group]):
@@ -324,7 +325,7 @@ class _Clip:
     # ---- times ----
 
     def _times(self, known: JsonMapping, metadata: JsonObject, frame_count: int) -> np.ndarray:
-        """Return (T,) seconds: of the schema's time, else by a rate, else of what seems to be one of both."""
+        """Return the frames' times (T,) in seconds: stored, or from a stated rate, or guessed with a GuessWarning."""
         if known["time"] is not None:
             return self._in_seconds(self.used["time"], known["time"])
         if self.options.fps is not None:
@@ -355,7 +356,7 @@ class _Clip:
 
     @staticmethod
     def _row_of_times(metadata: JsonMapping, frame_count: int) -> str | None:
-        """Return the name of metadata that seem to be times: ascending numbers, one for each frame."""
+        """Return the metadata key whose value looks like times: ascending, one for each frame. None: no such key."""
         for key, row in metadata.items():
             is_row = (
                 isinstance(row, list) and len(row) == frame_count > 1 and {type(each) for each in row} <= {int, float}
@@ -365,7 +366,7 @@ class _Clip:
         return None
 
     def _in_seconds(self, name: str, values: np.ndarray) -> np.ndarray:
-        """Return times in seconds, by the unit that the file states for the array `name`."""
+        """Return the times `values` in seconds, converted from the unit that the file states for array `name`."""
         notes = dict(self.arrays.notes(name))
         unit = str(notes.pop("units", notes.pop("unit", "s"))).strip()
         self._name_notes(name, notes)
@@ -377,7 +378,7 @@ class _Clip:
         return values if factor in (None, 1.0) else values * factor
 
     def _guessed_times(self) -> list[str]:
-        """Return what seems to be times in the nearest group that has any: ascending numbers under a usual name."""
+        """Return names of arrays near the positions that look like times: ascending, and with a usual name."""
         for full in _upwards(self.used[POSITIONS], ""):
             group = full.rpartition("/")[0]
             guesses = [
@@ -391,7 +392,7 @@ class _Clip:
         return []
 
     def _guess_rate(self, metadata: JsonObject) -> None:
-        """Add the rate that metadata, or arrays of one item, state under another name than fps."""
+        """Add "fps" to the metadata if the file states a frame rate or time step under another usual name."""
         stated = {key: value for key, value in metadata.items() if _plain(key) in RATE_NAMES | STEP_NAMES}
         groups = {full.rpartition("/")[0] for full in _upwards(self.used[POSITIONS], "")}
         for name, each in self.arrays.stored.items():
@@ -415,7 +416,7 @@ class _Clip:
     # ---- all the rest ----
 
     def _further(self, name: str) -> dict[str, np.ndarray]:
-        """Return the arrays that are not of the schema; those of the positions' group by their names in it."""
+        """Return the arrays outside of the schema by name; beside positions `name`, without the group's name."""
         group, skip = name.rpartition("/")[0], set(self.options.skip)
         names_used, arrays = set(self.used.values()), {}
         names = sorted(self.arrays.stored, key=lambda each: not each.startswith(f"{group}/"))
@@ -482,7 +483,8 @@ def _plain(key: str) -> str:
 def _branches(
     positions: ArrayLike, known: Mapping[str, np.ndarray | None], metadata: JsonObject, options: ReadOptions
 ) -> BranchFields:
-    """Return the branches of the file, else those that its edges make, as fields of a MotionClip."""
+    """Return the branches that the file's arrays `known` describe, or else those that its edges form, as fields of a
+    MotionClip; nothing if the file has neither."""
     branches: BranchFields = {
         "vertex_branch": known["vertex_branch"],
         "branch_parent": known["branch_parent"],

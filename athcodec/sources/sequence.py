@@ -32,8 +32,9 @@ _LABELS = (b"vt ", b"vt\t", b"usemtl ", b"usemtl\t", b"o ", b"o\t", b"g ", b"g\t
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
-    """Return the clip in the sequence that `path` belongs to. Raises ClipError where a file is broken or, when its
-    frame is read, has other vertices, faces or edges than the first; OSError where one cannot be opened."""
+    """Return the clip whose frames are the numbered files that `path`, any one of them or a pattern, belongs to. Raises
+    ClipError if a file is broken or, as soon as its frame is read, differs from the first in vertices, faces or edges;
+    OSError if a file cannot be opened."""
     series = series_of(path, options)
     if len(series.parts) > 1:
         raise ClipError(f"{series.index}: got {len(series.parts)} files at one time, expected one")
@@ -101,6 +102,9 @@ class FileFrames:
         fast_reader: Callable[[bytes, Mesh], Callable[[bytes], np.ndarray | None]],
         budget: Budget,
     ):
+        """Read the first file and prepare frames of all `paths`. `parse(data, path, budget)` returns the mesh in a
+        file's content; `fast_reader(data, mesh)` returns a function that quickly reads the points of files that differ
+        from the first in coordinates alone, and returns None for others."""
         self.paths, self._parse, self._budget = list(paths), parse, budget
         self.unchanged = FileWatch(*self.paths)
         data = read_plain(self.paths[0], budget)
@@ -119,7 +123,8 @@ class FileFrames:
         return block
 
     def look(self) -> None:
-        """Read all files once. One that is broken says so when its frame is read."""
+        """Read all files once to learn the times that they state, which attributes change and what is not read. A
+        broken file raises no error here but when its frame is read."""
         for path in self.paths[1:]:
             data = read_plain(path, self._budget)
             self.stated.append(_time_in(data))
@@ -138,8 +143,8 @@ class FileFrames:
         return points if points is not None and points.shape == self.mesh.points.shape else None
 
     def _points(self, frame: int) -> np.ndarray:
-        """Return the points (N, 3) of the file of a frame. Raises ClipError if its topology is not that of the first
-        file."""
+        """Return the points (N, 3) in the file of a frame. Raises ClipError if the file differs from the first in
+        vertices, faces or edges."""
         path = self.paths[frame]
         data = read_plain(path, self._budget)
         points = self._quick_points(data)
@@ -166,8 +171,8 @@ def _fast_reader(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None
 
 
 def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
-    """Return a function that reads the points of OBJ files that differ from `data` in coordinates alone; it returns
-    None for others."""
+    """Return a function that takes the content of an OBJ file and returns its points (N, 3), or None if the file
+    differs from `data`, whose mesh is `mesh`, in more than coordinates."""
     dtype, colors = mesh.points.dtype, mesh.attributes.get("colors")
     elements, statements = _obj_elements(obj_lines(data)), _statements(obj_lines(data))
     if any(b"-" in line for line in elements if line.startswith(_ELEMENTS)):
@@ -176,6 +181,8 @@ def _fast_obj(data: bytes, mesh: Mesh) -> Callable[[bytes], np.ndarray | None]:
     tail = data[data.rfind(b"\nv ") + 1 :].partition(b"\n")[2]  # Usually all that is not a coordinate.
 
     def points(data: bytes) -> np.ndarray | None:
+        """Return the points (N, 3) in the content of an OBJ file, or None if the file differs from the first in more
+        than coordinates."""
         if tail and colors is None and data.endswith(tail):
             rows = [line for line in data[: -len(tail)].splitlines() if not line.startswith(b"#")]
             words = b" ".join(rows).split()
@@ -201,8 +208,8 @@ def _statements(lines: Sequence[bytes]) -> set[bytes]:
 
 
 def _fast_ply(data: bytes) -> Callable[[bytes], np.ndarray | None]:
-    """Return a function that reads the points of binary PLY files that differ from `data` in coordinates alone; it
-    returns None for others."""
+    """Return a function that takes the content of a binary PLY file and returns its points (N, 3), or None if the file
+    differs from `data` in more than coordinates."""
     header = ply_header(data)
     vertex = header.elements[0]
     if not header.order or vertex.name != "vertex" or vertex.lists:

@@ -34,12 +34,12 @@ def numbered_times(numbers: np.ndarray, fps: float | None) -> tuple[np.ndarray, 
 
 
 def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray, JsonObject]:
-    """Return (T,) seconds from 0 of frames whose times a file has as float32 or float64, and the metadata of their
-    rate.
+    """Return (time, metadata): the times (T,) in seconds from 0, and "fps" and "start_frame" as far as they are known.
+    `stored` (T,) has the times in a file's own type, float32 or float64; `fps` is a stated rate.
 
-    Where all times are whole multiples of a usual rate's step, but for the rounding of their own type, that rate is
-    meant: the clip then has it, and the times without the rounding. With a rate,
-    a first time that is not 0 gives "start_frame".
+    If all stored times are multiples of the frame time of a usual rate, rounded to their type, the clip gets that rate
+    and times without the rounding. If there is a rate and the first time is not 0, "start_frame" says at which frame
+    the clip starts.
     """
     stored = np.asarray(stored)
     times = stored.astype(np.float64)
@@ -52,8 +52,9 @@ def times_in_seconds(stored: np.ndarray, fps: float | None) -> tuple[np.ndarray,
 
 
 def warn_of_missed(keys: np.ndarray, missed: np.ndarray, fps: float, name: str, start: float | None = None) -> None:
-    """Warn with a GuessWarning where keys of a file, at ascending seconds (K,), are missed by the frames, one of which
-    is at `start` seconds (default: at the first key that is not missed, else at 0)."""
+    """Give a GuessWarning if no frame lies at some of a file's animation keys. `keys` (K,) are their times in seconds,
+    ascending, and `missed` (K,) marks those between frames at `fps`. One frame lies at `start`, in seconds; by default
+    at the first key that is not missed, or at 0."""
     if not missed.any():
         return
     met = keys[~missed]
@@ -100,7 +101,7 @@ def _start(number: float) -> JsonObject:
 
 
 def _usual_rates(times: np.ndarray) -> list[float]:
-    """Return frame rates that are usual and about that of the times (T,) in seconds, the likeliest first."""
+    """Return usual frame rates close to that of the times (T,) in seconds, the likeliest first."""
     if len(times) < 2 or not np.isfinite(times).all() or not times[1] > times[0]:
         return []
     step = np.median(np.diff(times))

@@ -36,7 +36,8 @@ class Copies:
         self._is_known = False
 
     def follow(self, codes: np.ndarray) -> None:
-        """Find the prototype of each copy and its row in each frame. Raises ClipError where a copy cannot be told."""
+        """Find the prototype of every copy, its row in the instancer's arrays and whether it is shown, for each frame.
+        `codes` (T,) are the USD time codes of the frames. Raises ClipError if copies cannot be told apart over time."""
         if self._is_known:
             return
         schema, changes_at = self.instancer, [float(codes[0])]
@@ -80,7 +81,8 @@ class Copies:
         raise ClipError(f"{self.instancer.GetPath()}: {got} in {frame_name(self._codes, frame)}, expected {expected}")
 
     def _hold(self) -> None:
-        """Note where copies stand in frames that do not have them: where they were last, or where they appear."""
+        """Note the place of each copy for frames in which the instancer lacks it: where the copy was last or, before
+        its first frame, where it will appear."""
         absent, states = self._rows < 0, np.arange(len(self._rows))
         last = np.maximum.accumulate(np.where(absent, -1, states[:, None]), axis=0)
         following = np.minimum.accumulate(np.where(absent, states[-1], states[:, None])[::-1], axis=0)[::-1]
@@ -96,7 +98,7 @@ class Copies:
             self._places[is_frame] = self._placed(frame)[self._rows[self._states[frame], copies[is_frame]]]
 
     def places(self, frame: int) -> np.ndarray:
-        """Return (copies, 4, 4) from the prototype to the instancer."""
+        """Return the matrices (copies, 4, 4) from the prototype to the instancer in a frame, for all copies."""
         state = self._states[frame]
         rows, absent = self._rows[state], np.flatnonzero(self._rows[state] < 0)
         matrices = self._placed(frame)
@@ -108,7 +110,8 @@ class Copies:
         return out
 
     def _placed(self, frame: int) -> np.ndarray:
-        """Return (rows, 4, 4) as the arrays have them."""
+        """Return the matrices (rows, 4, 4) from the prototype to the instancer in a frame, in the order of the
+        instancer's arrays. Raises ClipError if these are too short."""
         code = code_of_order(self.instancer.GetIdsAttr(), float(self._codes[frame]))
         matrices = self.instancer.ComputeInstanceTransformsAtTime(
             code, code, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
@@ -145,8 +148,8 @@ class Instances:
         return inner @ self.all.places(frame)[self.rows] @ world
 
     def add_arrays(self, obj: PrimObject, codes: np.ndarray) -> None:
-        """Add to `obj` the arrays of the instancer that have a value for each copy and do not change over `codes`, the
-        times that are read; name those that do."""
+        """Store the instancer's arrays that have a value for each copy in `obj`, if they stay the same over `codes`,
+        the time codes of the frames. Arrays that change are noted as left out."""
         obj.left_out += unread_properties(self.instancer.GetPrim())
         for primvar in UsdGeom.PrimvarsAPI(self.instancer).GetPrimvarsWithValues():
             name, values = str(primvar.GetPrimvarName()), numbers_of(value_at(primvar, codes[0]))

@@ -15,6 +15,8 @@ class Skeleton:
     """A skeleton and one mesh that it moves."""
 
     def __init__(self, query: UsdSkel.SkeletonQuery, target: UsdSkel.SkinningQuery):
+        """Prepare a mesh's skinning and blend shapes. `query` is of the skeleton, `target` of the mesh that it
+        moves."""
         self.query, self.target = query, target
         self.animation = query.GetAnimQuery()
         self.skins = target.HasJointInfluences()
@@ -27,7 +29,8 @@ class Skeleton:
             self._offsets = self._shapes.ComputeSubShapePointOffsets()
 
     def deform(self, points: Vt.Vec3fArray, code: float) -> Vt.Vec3fArray:
-        """Return points in the skeleton's space where joints move them, else in the mesh's own."""
+        """Return a mesh's points as blend shapes and joints move them at a time code. They are in the skeleton's space
+        if joints move them, else in the mesh's own. Raises ClipError."""
         points = Vt.Vec3fArray(points)
         if self._shapes is not None:
             self._blend(points, code)
@@ -38,7 +41,8 @@ class Skeleton:
         return points
 
     def _blend(self, points: Vt.Vec3fArray, code: float) -> None:
-        """Add the blend shapes at a time code to the points."""
+        """Move the points in place by the blend shapes' weights at a time code. Raises ClipError if they cannot be
+        evaluated."""
         weights = self.animation.ComputeBlendShapeWeights(code)
         if weights is None:
             return
@@ -55,7 +59,8 @@ class Skeleton:
         return self.query.GetPrim() if self.skins else self.target.GetPrim()
 
     def mirrors(self, count: int, code: float) -> bool:
-        """Return whether skinning turns a mesh of so many points inside out, by the joint that moves most of them."""
+        """Return whether skinning turns the mesh inside out at a time code, judged by the joint that moves most of its
+        `count` vertices."""
         joints = self.largest(count)
         joints = joints[joints >= 0]
         if not len(joints):
@@ -65,7 +70,8 @@ class Skeleton:
         return bool(np.linalg.det(bind[:3, :3]) * np.linalg.det(matrix[:3, :3]) < 0)
 
     def largest(self, count: int) -> np.ndarray:
-        """Return (count,) joint of the skeleton with the largest weight on each vertex, -1 for none."""
+        """Return for each of the mesh's `count` vertices the number of the skeleton's joint with the largest weight
+        (count,), -1 for a vertex without any."""
         influences = self.target.ComputeVaryingJointInfluences(count) if self.skins else None
         if not influences or count == 0:
             return np.full(count, -1, np.int32)
@@ -83,8 +89,8 @@ class Skeleton:
 def bind_skeletons(
     stage: Usd.Stage, objects: list[PrimObject], not_read: dict[str, list[str]]
 ) -> list[UsdSkel.SkeletonQuery]:
-    """Give each object the skeleton that moves it, and return the skeletons. Animations without one are named in
-    `not_read`."""
+    """Store in each object the skeleton that moves it, and return the skeletons of the stage. Animations that move no
+    skeleton, and missing ones, are added to `not_read`."""
     by_path = {obj.prim.GetPath(): obj for obj in objects}
     predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
     queries, animations = [], {}
@@ -134,7 +140,9 @@ def _missing_animation(skeleton: Usd.Prim) -> str | None:
 
 
 def skin_of(objects: list[PrimObject], queries: list[tuple[UsdObject, UsdSkel.SkeletonQuery]]) -> Skin | None:
-    """Return the joints of all skeletons, one after the other."""
+    """Return the joints of all skeletons, numbered one skeleton after the other, with the strongest joint of each
+    vertex of the objects. Return None if no joint moves any vertex. `queries` has each skeleton beside the cache that
+    owns it."""
     parents: list[np.ndarray] = []
     names: list[str] = []
     first: dict[Sdf.Path, int] = {}

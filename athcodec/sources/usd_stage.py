@@ -100,6 +100,8 @@ class _Stage:
     """An open stage, and whether the files that it is made of have stayed as they were."""
 
     def __init__(self, path: str, allow_outside: bool):
+        """Open the USD stage in `path`. Raises ClipError if it cannot be opened or, unless `allow_outside`, uses files
+        outside of its folder."""
         known = Sdf.Layer.Find(path)
         if known:
             known.Reload()  # USD keeps layers for as long as anybody has them open
@@ -128,8 +130,9 @@ class _Stage:
 
 
 def _check_layers(path: str, allow_outside: bool) -> None:
-    """Raise ClipError where a layer names one that is no plain file or, unless `allow_outside`, lies outside of the
-    folder of the first: before USD opens it. Of value clips, and of what plugins name, USD alone knows."""
+    """Raise ClipError if a layer of the stage `path` names a file that is not plain or, unless `allow_outside`, outside
+    of the folder of `path`. This is checked before USD opens the files. Value clips and files named by plugins are not
+    found here."""
     folder, waiting, seen = Path(path).parent, [path], set()
     while waiting:
         name = waiting.pop()
@@ -149,6 +152,7 @@ def _check_layers(path: str, allow_outside: bool) -> None:
 
 
 def _clip(source: _Stage, options: ReadOptions) -> MotionClip:
+    """Return the clip of the objects in an open stage. Raises ClipError if the stage has no usable object."""
     stage = source.stage
     layer = own_metadata(stage.GetRootLayer().customLayerData.get(OWN))
     not_read: dict[str, list[str]] = {"missing": source.errors} if source.errors else {}
@@ -199,7 +203,9 @@ class _Choice:
 
 
 def _find_objects(stage: Usd.Stage, only: Sequence[str], not_read: dict[str, list[str]]) -> list[PrimObject]:
-    """Return all with points. What has none, or is no object, is added to not_read by the name of its type."""
+    """Return the objects of the stage that have points, those that PointInstancers show included. If `only` is not
+    empty, an object needs one of these names. The paths of other prims are added to `not_read` under the name of their
+    type."""
     objects, choice, prototypes = list[PrimObject](), _Choice(only), set[Sdf.Path]()
     prims = iter(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
@@ -229,6 +235,8 @@ def _add_all(not_read: dict[str, list[str]], more: dict[str, list[str]]) -> None
 
 
 def _object(prim: Usd.Prim, choice: _Choice, not_read: dict[str, list[str]]) -> PrimObject | None:
+    """Return the object that a prim is, or None if it has no points to read, in which case its path is added to
+    `not_read` if the user should know of it."""
     kind, path = _kind(prim), str(prim.GetPath())
     if kind is None:
         if prim.GetTypeName() not in READ and not _is_material_subset(prim):
@@ -262,8 +270,8 @@ def _kind_not_read(prim: Usd.Prim) -> str:
 def _instanced(
     instancer: UsdGeom.PointInstancer, choice: _Choice, shown: set[Sdf.Path], not_read: dict[str, list[str]]
 ) -> list[PrimObject]:
-    """Return the meshes in the prototypes of a PointInstancer, each as often as the instancer has it. Adds to `shown`
-    the paths of the prototypes."""
+    """Return the objects in the prototypes of a PointInstancer, each with all its copies. The paths of the prototypes
+    that the instancer shows are added to `shown`; what is not read is added to `not_read`."""
     prim, path, indices = instancer.GetPrim(), instancer.GetPath(), instancer.GetProtoIndicesAttr()
     times = indices.GetTimeSamples() or [Usd.TimeCode.Default()]
     used = set().union(*(indices.Get(time) or () for time in times))
@@ -295,8 +303,8 @@ def _instanced(
 
 
 def _in_prototype(prototype: Usd.Prim, choice: _Choice, not_read: dict[str, list[str]]) -> Iterator[PrimObject]:
-    """Yield the objects below a prototype of a PointInstancer. Those of a further PointInstancer are named in
-    `not_read`."""
+    """Yield the objects below a prototype of a PointInstancer. The paths of further PointInstancers below it are added
+    to `not_read`."""
     prims = iter(Usd.PrimRange(prototype, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)))
     for prim in prims:
         if prim.IsA(UsdGeom.PointInstancer):
@@ -311,7 +319,8 @@ def _in_prototype(prototype: Usd.Prim, choice: _Choice, not_read: dict[str, list
 
 
 def _unshown(instancer: Usd.Prim, prototypes: set[Sdf.Path]) -> Iterator[Usd.Prim]:
-    """Yield the first prims with a shape below an instancer that are in no prototype: USD shows none of these."""
+    """Yield the topmost prims with a shape below a PointInstancer that are in none of its `prototypes`, because USD
+    does not show these."""
     prims = iter(Usd.PrimRange(instancer, Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
     for prim in prims:
         if prim.GetPath() in prototypes:
@@ -329,11 +338,12 @@ def _kind(prim: Usd.Prim) -> str | None:
 
 
 def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, list[str]]) -> list[PrimObject]:
-    """Return the objects that any frame shows, each with the frames that do; the others are named in `not_read`."""
+    """Return the objects that at least one frame shows, and store in each which frames do. The paths of others are
+    added to `not_read`. `codes` (T,) are the time codes of the frames. Raises ClipError if no object is left."""
     known: dict[Sdf.Path, np.ndarray] = {}
 
     def inherited(prim: Usd.Prim) -> np.ndarray:
-        """Return (T,) whether a prim does not say that it is invisible."""
+        """Return for each frame (T,) whether the prim itself does not state that it is invisible."""
         attribute = visibility(prim)
         if attribute is None:
             return np.ones(len(codes), bool)
@@ -362,7 +372,9 @@ def _shown(objects: list[PrimObject], codes: np.ndarray, not_read: dict[str, lis
 
 
 def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[PrimObject, int], np.ndarray]) -> None:
-    """Fill in what the objects are at the first frame; `matrix` is from an object to the world in a frame."""
+    """Read what stays the same of each object, such as its faces and attributes, and its vertex count at the first
+    frame. `matrix(object, frame)` returns the matrix from the object to the world; `codes` (T,) are the time codes of
+    the frames."""
     first, cache = 0, UsdGeom.XformCache(codes[0])
     for obj in objects:
         _follow_ids(obj, codes)
@@ -393,7 +405,8 @@ def _measure(objects: list[PrimObject], codes: np.ndarray, matrix: Callable[[Pri
 
 
 def _follow_ids(obj: PrimObject, codes: np.ndarray) -> None:
-    """Note the ids of points that stand in another order in some frame."""
+    """Store the ids of an object of points in it, in ascending order, if points change their order over the frames at
+    `codes`."""
     if obj.kind != "points":
         return
     attribute = UsdGeom.Points(obj.prim).GetIdsAttr()
@@ -404,6 +417,8 @@ def _follow_ids(obj: PrimObject, codes: np.ndarray) -> None:
 
 
 def _topology(obj: PrimObject, codes: np.ndarray) -> None:
+    """Read the faces of a mesh or the vertex counts of curves, and their details, into the object. `codes` are the time
+    codes of the frames. Raises ClipError if they change over time or do not fit the points."""
     if obj.kind == "mesh":
         mesh = UsdGeom.Mesh(obj.prim)
         obj.face_counts = fixed(obj, mesh.GetFaceVertexCountsAttr(), codes)
@@ -424,7 +439,7 @@ def _topology(obj: PrimObject, codes: np.ndarray) -> None:
 
 
 def _bind_materials(obj: PrimObject) -> None:
-    """Take the names of the materials that the mesh and subsets of its faces are bound to."""
+    """Store the names of the materials of a mesh and of subsets of its faces in the object."""
     binding = UsdShade.MaterialBindingAPI(obj.prim)
     material, _ = binding.ComputeBoundMaterial()
     if material:
@@ -450,6 +465,8 @@ def _note(obj: PrimObject, name: str, attribute: Usd.Attribute, usual: str) -> N
 
 
 def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> JsonObject:
+    """Return the metadata that the stage states: frame rate, first frame, unit and up axis. `codes` (T,) are the time
+    codes of the frames and `rate` is in frames per second."""
     start = float(codes[0]) * (rate / stage.GetTimeCodesPerSecond())
     metadata: JsonObject = {"fps": float(rate), "start_frame": int(start) if start == int(start) else start}
     if stage.HasAuthoredMetadata(UsdGeom.Tokens.metersPerUnit):
@@ -467,8 +484,8 @@ def _metadata(stage: Usd.Stage, codes: np.ndarray, rate: float) -> JsonObject:
 
 
 def _statics(obj: PrimObject, codes: np.ndarray, matrix: np.ndarray) -> None:
-    """Store the primvars, normals and widths of a prim that are the same in all frames. matrix: to the world at the
-    first frame."""
+    """Read the primvars, normals and widths of a prim that stay the same over `codes`, the time codes of the frames,
+    into the object. `matrix` (4, 4) takes the object to the world at the first frame."""
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).FindPrimvarsWithInheritance():
         if obj.skeleton is not None and str(primvar.GetPrimvarName()).startswith("skel:"):
             continue  # which has moved it
@@ -497,7 +514,7 @@ def _statics(obj: PrimObject, codes: np.ndarray, matrix: np.ndarray) -> None:
 
 
 def _rename_first_uv(obj: PrimObject) -> None:
-    """Rename the first texture coordinates to those that a renderer takes if no primvar is called st."""
+    """Rename the first array of texture coordinates to "uv" if the object has no array of that name yet."""
     if "uv" in obj.statics:
         return
     for primvar in UsdGeom.PrimvarsAPI(obj.prim).GetPrimvars():
@@ -528,7 +545,8 @@ def _keep_unless_it_changes(
 
 
 def _keep(obj: PrimObject, name: str, values: Any, interpolation: str, primvar: UsdGeom.Primvar | None = None) -> None:
-    """Keep a static array if it has numbers, and rows that fit the prim; notes the names of others."""
+    """Store a static array in the object under `name` if `values` are numbers whose rows fit its interpolation;
+    otherwise note the name as left out."""
     values, element_size = numbers_of(values), 1 if primvar is None else primvar.GetElementSize()
     if values is not None and element_size > 1 and len(values) % element_size == 0:
         values = values.reshape(-1, element_size, *values.shape[1:])
@@ -546,7 +564,8 @@ WRITTEN_DTYPES = ("|i1", "|b1", "<i2", "<u2", ">i2", ">u2", ">i4", ">u4", ">i8",
 
 
 def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
-    """Yield the arrays that athcodec's own writer stored on the default prim: what each is, and its bytes."""
+    """Yield the arrays that athcodec's own writer stored on the stage's default prim, each as a pair of its descriptor
+    and its bytes."""
     root = stage.GetDefaultPrim()
     for attribute in root.GetAuthoredPropertiesInNamespace(OWN) if root else ():
         values = attribute.Get() if isinstance(attribute, Usd.Attribute) else None
@@ -563,7 +582,8 @@ def _kept_arrays(stage: Usd.Stage) -> Iterator[tuple[ArrayDescriptor, bytes]]:
 
 
 def _points(obj: PrimObject, codes: np.ndarray, frame: int) -> np.ndarray:
-    """Return the points (n, 3) float32 of an object in a frame, moved by its skeleton, in the order of its ids."""
+    """Return the points (n, 3) float32 of an object in a frame, after its skeleton has moved them, in ascending order
+    of ids if it has any. `codes` has the time code of each frame."""
     ids = None if obj.ids is None else UsdGeom.Points(obj.prim).GetIdsAttr()
     code = float(codes[frame]) if ids is None else code_of_order(ids, float(codes[frame]))
     points = obj.points.Get(code)

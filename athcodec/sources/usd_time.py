@@ -29,7 +29,9 @@ class _Keys:
 def time_codes(
     stage: Usd.Stage, objects: list[PrimObject], fps: float | None, irregular: bool, not_read: dict[str, list[str]]
 ) -> tuple[np.ndarray, float]:
-    """Return time codes to read, and frames per second. Keys that lie elsewhere are added to not_read."""
+    """Return (codes, rate): the USD time codes (T,) of the frames to read, and frames per second. `fps` is the caller's
+    rate; `irregular` says that athcodec's writer stored a time code for every frame. Keys outside of the stage's range
+    are added to `not_read`."""
     codes_per_second = stage.GetTimeCodesPerSecond()
     if not 0 < codes_per_second < math.inf:
         raise ClipError(f"timeCodesPerSecond: got {codes_per_second}, expected a positive number")
@@ -67,8 +69,9 @@ def _off_grid(times: np.ndarray, start: float, step: float) -> np.ndarray:
 
 
 def _rate(stage: Usd.Stage, keys: _Keys, start: float, not_read: dict[str, list[str]]) -> float:
-    """Return frames per second: a frame for each time code, unless framesPerSecond has frames at keys that these miss,
-    or more frames of splines; where it is another rate and is not taken, it is added to not_read."""
+    """Return the clip's frames per second: one frame for each time code, or the stage's framesPerSecond if only these
+    frames meet all keys, or if splines gain frames by it. A stated framesPerSecond that is not used is added to
+    `not_read`. `start` is the first time code."""
     codes_per_second, stated = stage.GetTimeCodesPerSecond(), stage.GetFramesPerSecond()
     if (
         not stage.HasAuthoredMetadata("framesPerSecond")
@@ -91,13 +94,14 @@ def _name_keys_outside(times: np.ndarray, start: float, end: float, not_read: di
 
 
 def _keys(objects: list[PrimObject]) -> _Keys:
-    """Return the time codes at which anything may change that places or shapes the objects, and the splines among
-    it."""
+    """Return the time codes at which something changes that places or shapes the objects, whether splines are among it,
+    and which splines go on beyond their knots."""
     times: set[float] = set()
     splines: JsonObject = {}
     seen: set[Sdf.Path] = set()
 
     def add(attribute: Usd.Attribute) -> None:
+        """Add the time samples and spline knots of an attribute to the keys."""
         if attribute.GetPath() in seen:
             return
         seen.add(attribute.GetPath())

@@ -29,9 +29,9 @@ PURPOSE_BINDINGS = ("material:binding:full", "material:binding:preview")
 
 
 def left_out_of_stage(stage: Usd.Stage, prototypes: Collection[Sdf.Path]) -> dict[str, list[str]]:
-    """Return prims that are inactive, overs of nothing or classes that nothing takes, variants that are not selected,
-    layers of a package that no other names, and data of the layer. prototypes: what instancers show, wherever it
-    stands."""
+    """Return the names of what the stage holds and nothing shows, by kind: inactive prims, `over`s without a prim,
+    classes that no prim inherits, variants that are not selected, unused layers of a package, and custom layer data.
+    `prototypes` are the prims that instancers show."""
     left_out: dict[str, list[str]] = {}
     classes = []
 
@@ -75,6 +75,8 @@ class _PrimsOnce:
         return self
 
     def __next__(self) -> Usd.Prim:
+        """Return the next prim of the stage, leaving out prims of native instances that came before in another
+        instance."""
         for prim in self._range:
             source = (prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath()
             if source in self._seen:
@@ -102,7 +104,7 @@ def _has_shape(prim: Usd.Prim) -> bool:
 
 
 def _other_variants(prim: Usd.Prim) -> Iterator[str]:
-    """Yield for each variant set of a prim a text with the variants that are not read."""
+    """Yield one line of text for each variant set of a prim that has variants which are not selected."""
     if not prim.HasVariantSets():
         return
     for name in prim.GetVariantSets().GetNames():
@@ -115,7 +117,7 @@ def _other_variants(prim: Usd.Prim) -> Iterator[str]:
 
 
 def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
-    """Return the paths in the stage that inherits, specializes and references of prims lead to."""
+    """Return the paths of prims in the stage that other prims inherit, specialize or reference."""
     paths = set()
 
     def follow(node: Pcp.NodeRef) -> None:
@@ -131,7 +133,8 @@ def _sources_of_arcs(stage: Usd.Stage) -> set[Sdf.Path]:
 
 
 def _other_layers(root: Sdf.Layer) -> list[str]:
-    """Return the layers of a .usdz that its first one does not lead to."""
+    """Return the names of layers in a .usdz package that are neither its first layer nor reached from it. For other
+    files the list is empty."""
     if not zipfile.is_zipfile(root.realPath):
         return []
     with zipfile.ZipFile(root.realPath) as package:
@@ -152,8 +155,8 @@ def _other_layers(root: Sdf.Layer) -> list[str]:
 
 
 def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
-    """Return the files of value clips, which USD opens when a value is asked for; and the names of those that are
-    missing."""
+    """Return (files, missing): the files of the stage's value clips, which USD opens only when a value is asked for,
+    and texts that name those that do not exist."""
     files, missing = [], []
     for prim in stage.TraverseAll():
         if not prim.HasAuthoredMetadata("clips"):
@@ -173,8 +176,8 @@ def clip_layers(stage: Usd.Stage) -> tuple[list[str], list[str]]:
 
 
 def unread_properties(prim: Usd.Prim) -> list[str]:
-    """Return the names of attributes and relationships, or their namespaces, and metadata that are authored on a prim,
-    differ from their fallback and are not read."""
+    """Return the names of properties and metadata that are authored on a prim, differ from their fallback and are not
+    read. Properties of one namespace are named by the namespace."""
     unread: dict[str, None] = {}
     order = UsdGeom.Xformable(prim).GetXformOpOrderAttr().Get() if prim.IsA(UsdGeom.Xformable) else None
     operations = {name.removeprefix("!invert!") for name in order or ()}

@@ -77,7 +77,8 @@ def held_at(times: Sequence[float] | np.ndarray, codes: np.ndarray) -> np.ndarra
 
 
 def fixed(obj: PrimObject, attribute: Usd.Attribute, codes: np.ndarray) -> np.ndarray:
-    """Return integers that stay the same in every frame; ClipError where they change."""
+    """Return the integers of an attribute, int32. Raises ClipError if they change over `codes`, the time codes of the
+    frames."""
     query = Usd.AttributeQuery(attribute)
     first = array_of(query.Get(codes[0]), np.int32)
     if query.GetNumTimeSamples() > 1 and query.ValueMightBeTimeVarying():
@@ -129,7 +130,7 @@ def changes(source: Usd.Attribute | UsdGeom.Primvar, codes: np.ndarray) -> bool:
 
 
 def numbers_of(values: Any) -> np.ndarray | None:
-    """Return a value of USD as an array of numbers with a row for each element; None if it is nothing of that kind."""
+    """Return a value of USD as an array of numbers with a row for each element, or None if it holds no numbers."""
     if values is None:
         return None
     try:
@@ -162,7 +163,7 @@ def frame_name(codes: np.ndarray, frame: int) -> str:
 
 @contextmanager
 def quietly() -> Iterator[Tf.DiagnosticTrap]:
-    """Keep USD's messages off stderr; its errors become ClipErrors of one line."""
+    """Keep USD's messages off stderr while the block runs, and turn USD's errors into ClipErrors of one line."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield trap

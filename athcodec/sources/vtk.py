@@ -48,8 +48,9 @@ _BROKEN = (
 
 
 def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
-    """Open the clip in the series that `path` belongs to. Raises ClipError where a file is broken or, when its frame is
-    read, has other cells than the first; OSError where one cannot be opened."""
+    """Open the clip whose frames are the VTK files that `path` stands for: any one of a numbered series, a pattern or
+    an index. Raises ClipError if a file is broken or, as soon as its frame is read, has other cells than the first;
+    OSError if one cannot be opened."""
     try:
         series = series_of(path, options)
         steps = _Steps(series, options)
@@ -84,6 +85,8 @@ class _Steps:
     """See fields.Steps."""
 
     def __init__(self, series: Series, options: ReadOptions):
+        """Read every file of the series once to learn which arrays stay the same and which times the files state.
+        Raises ClipError, OSError."""
         self._series, self._options = series, options
         self._max_memory = options.max_memory // STEPS_HELD
         self.unchanged = FileWatch(*(file for frame in series.frames for file in frame))
@@ -156,7 +159,9 @@ class _Steps:
         return self._now[1]
 
     def _read(self, path: Path, budget: Budget, above: tuple[Path, ...] = ()) -> Grid:
-        """Return the data set in a file, or in those that it lists; above: the files that list it."""
+        """Return the data set in a VTK file or, if the file only lists others, the joined data sets of these. `above`
+        has the files through which this one was reached. Raises ClipError if a file lists itself or lists are nested
+        too deep."""
         self._file_count += 1
         if self._file_count > MOST_FILES:
             raise ClipError(f"{above[0]}: got more than {MOST_FILES} files, expected fewer for one frame")

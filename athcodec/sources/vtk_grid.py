@@ -59,6 +59,8 @@ class Grid:
     title: str = ""
 
     def __post_init__(self) -> None:
+        """Check that the cells' arrays fit each other, leave out data whose rows do not fit points or cells, and remove
+        hidden cells. Raises ClipError."""
         if (
             len(self.types) != len(self.stops)
             or (self.starts > self.stops).any()
@@ -75,7 +77,7 @@ class Grid:
         self._hide()
 
     def _hide(self) -> None:
-        """Remove the cells that a ghost array of VTK marks as hidden, and count them."""
+        """Remove the cells that a ghost array of VTK marks as hidden, and add their number to `hidden_count`."""
         shown = np.ones(len(self.types), bool)
         for name, bits in GHOSTS.items():
             values = self.cell_data.get(name)
@@ -97,8 +99,8 @@ class Grid:
         return topology_of(blocks_of(*self.cells, VTK_NAMES), len(self.points))
 
     def time(self) -> tuple[str, float | np.float32] | None:
-        """Return the field that states the time of the data set, and its value; one of STEP_NAMES where no other
-        does."""
+        """Return (name, value) of the field that states the time of the data set; a field that counts steps
+        (STEP_NAMES) is used only if no other states a time. Return None if there is none."""
         known = {name.lower(): name for name in reversed(self.field_data)}
         for name in (*TIME_NAMES, *STEP_NAMES):
             values = self.field_data.get(known.get(name, ""))
@@ -115,8 +117,9 @@ def starts_of(stops: np.ndarray) -> np.ndarray:
 
 
 def poly_cells(cells: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (types, stops, nodes) of PolyData's cells, which are in a list for each kind: (stops, nodes) by names of
-    POLY_CELLS."""
+    """Return (types, stops, nodes) of the cells of VTK's PolyData: the VTK type of each cell, where its nodes end in
+    `nodes`, and the nodes of all cells one after the other. `cells` has (stops, nodes) for each list of cells, by the
+    list's name in POLY_CELLS."""
     none = np.zeros(0, np.int64)
     types, stops, nodes = [none], [none], [none]
     for kind, (numbers, other) in POLY_CELLS.items():
@@ -128,7 +131,9 @@ def poly_cells(cells: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.n
 
 
 def lattice_cells(size: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (types, stops, nodes): hexahedra, quads or lines, along the axes that have more than one point."""
+    """Return (types, stops, nodes) of the cells between the points of a regular grid with `size` points along x, y and
+    z: the VTK type of each cell, where its nodes end in `nodes`, and the nodes of all cells. Cells are hexahedra, quads
+    or lines, by how many axes have more than one point."""
     strides = np.cumprod([1, *size])[:3]
     along = [axis for axis in range(3) if size[axis] > 1]
     first = np.zeros(1, np.int64)
@@ -144,8 +149,9 @@ def lattice_cells(size: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:
-    """Return one data set of several, one after the other, whose points become objects of these names; neighbours of
-    one name are one object. Arrays that not all of them have are left out and named."""
+    """Return several data sets joined into one, one after the other. The points of each become the object with its name
+    in `names`; neighbours with the same name become one object. Arrays that some data sets lack are noted as left
+    out."""
     filled = [(grid, name) for grid, name in zip(grids, names, strict=True) if len(grid.points)] or [(grids[0], "")]
     grids, names = [grid for grid, _ in filled], [name for _, name in filled]
     if len(grids) == 1 and not any(names):
@@ -184,7 +190,8 @@ def joined(grids: Sequence[Grid], names: Sequence[str]) -> Grid:
 
 
 def _common(data: Sequence[dict[str, np.ndarray]], left_out: list[str]) -> dict[str, np.ndarray]:
-    """Return the arrays that all have in one form, joined; names of the others are added to left_out."""
+    """Return by name the arrays that every data set has with the same width and kind of number, joined. The names of
+    others are added to `left_out`."""
     shared = {}
     for name in dict.fromkeys(name for arrays in data for name in arrays):
         values = [arrays[name] for arrays in data if name in arrays]

@@ -61,6 +61,8 @@ class _Legacy:
     """The sections of a file, taken one after the other."""
 
     def __init__(self, data: bytes, budget: Budget):
+        """Read the first lines of a legacy VTK file whose content is `data`. Raises ClipError if it is neither ASCII
+        nor BINARY."""
         self._data, self._budget, self._at = data, budget, 0
         self._line()
         self._title = self._line(or_blank=True)
@@ -79,7 +81,7 @@ class _Legacy:
         self._other: dict[str, None] = {}
 
     def grid(self) -> Grid:
-        """Read the whole file and return its data set. Raises ClipError."""
+        """Read the whole file and return its data set. Raises ClipError if it is broken."""
         place, count = "FIELD", 0
         while (line := self._line()) != "":
             word, *rest = line.split()
@@ -114,8 +116,8 @@ class _Legacy:
     # ---- text ----
 
     def _line(self, or_blank: bool = False) -> str:
-        """Return the next line with anything on it, "" at the end of the file; or_blank: the next one, whatever it
-        holds."""
+        """Return the next line that is not blank, without spaces around it, or "" at the end of the file. With
+        `or_blank`, return the next line even if it is blank."""
         while self._at < len(self._data):
             end = self._data.find(b"\n", self._at)
             end = len(self._data) if end < 0 else end
@@ -133,7 +135,8 @@ class _Legacy:
         return self._data[start : start + len(word)].upper() == word
 
     def _words(self, count: int) -> list[bytes]:
-        """Return the next `count` words of a text file, and pass them."""
+        """Return the next `count` words of a text file and move on behind them. Raises ClipError if the file ends
+        before."""
         left = self._data[self._at :]
         if count > len(left):
             raise ClipError(f"got the end of the file, expected {count} numbers")
@@ -146,7 +149,8 @@ class _Legacy:
         return words[:count]
 
     def _array(self, kind: str, count: int, width: int = 1) -> np.ndarray:
-        """Return (count,) or (count, width) numbers of a type of VTK."""
+        """Return the next `count` numbers (count,) or, if `width` is above 1, rows of numbers (count, width). `kind` is
+        VTK's name of their type, such as "float". Raises ClipError if the file ends before or the type is unknown."""
         if count < 0 or width < 1:
             raise ClipError(f"got {count} rows of {width} numbers, expected some")
         name = _TYPES.get(kind.lower())
@@ -171,7 +175,7 @@ class _Legacy:
         return values if width == 1 else values.reshape(count, width)
 
     def _skip_strings(self, count: int) -> None:
-        """Pass `count` strings, which are not read."""
+        """Move on behind the next `count` strings without reading them. Raises ClipError if the file ends before."""
         if not self._is_binary:
             for _ in range(count):
                 if self._at >= len(self._data):
@@ -203,7 +207,9 @@ class _Legacy:
             raise ClipError(f"got a data set of the type {self._kind[:40]!r}, expected one of {', '.join(known)}")
 
     def _geometry(self, word: str, words: list[str], line: str) -> None:
-        """Read what a keyword of the geometry begins: points, cells, their types, or the axes of a grid."""
+        """Read the section of points, cells, cell types or grid axes that begins with the keyword `word`. `words` are
+        the other words of its first line, and `line` is that line for messages. Raises ClipError for an unknown
+        keyword."""
         if word == "POINTS":
             self._points = self._array(_word(words, 1, line), _number(words, 0, line), 3)
         elif word in _POLY:
@@ -223,7 +229,9 @@ class _Legacy:
             raise ClipError(f"got {line[:60]!r}, expected a section of a legacy VTK file; save it as .vtu or .vtp")
 
     def _cell_list(self, words: list[str], line: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return (stops, nodes). From version 5.0 on, offsets and nodes are arrays of their own."""
+        """Return (stops, nodes) of the section of cells that the words on its first line announce: where each cell's
+        nodes end in `nodes`, and the nodes of all cells. Version 5 of the format has separate arrays for both, older
+        ones a single array."""
         first, second = _number(words, 0, line), _number(words, 1, line)
         if self._next_is(b"OFFSETS"):
             kind = self._line().split()[1]
@@ -257,7 +265,8 @@ class _Legacy:
         return values.astype(np.int64)
 
     def _built(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return points, types, stops and nodes."""
+        """Return (points, types, stops, nodes) of the data set: points (N, 3), the VTK type of each cell, where its
+        nodes end in `nodes`, and the nodes of all cells. Raises ClipError if parts are missing."""
         if not self._kind:
             raise ClipError("got no DATASET, expected one")
         if self._kind == "STRUCTURED_POINTS":
@@ -298,7 +307,9 @@ class _Legacy:
     # ---- attributes ----
 
     def _attribute(self, place: str, count: int, word: str, words: list[str], line: str) -> None:
-        """Read the array of points or cells that a keyword such as SCALARS begins. place: POINT_DATA or CELL_DATA."""
+        """Read the array that begins with the keyword `word`, such as SCALARS, and store it. `place` is "POINT_DATA" or
+        "CELL_DATA", `count` the number of its rows, `words` are the other words of its first line and `line` is that
+        line for messages."""
         if word == "LOOKUP_TABLE":
             size = _number(words, 1, line)
             self._array("unsigned_char" if self._is_binary else "float", size, 4)
@@ -320,7 +331,8 @@ class _Legacy:
             raise ClipError(f"got {line[:60]!r}, expected an attribute of a legacy VTK file; save it as .vtu or .vtp")
 
     def _fields(self, place: str, count: int) -> None:
-        """Read `count` arrays behind FIELD."""
+        """Read the `count` arrays that follow the keyword FIELD and store them under `place`: "POINT_DATA", "CELL_DATA"
+        or "FIELD"."""
         for _ in range(count):
             line = self._line()
             if line.upper() == "METADATA":
@@ -331,8 +343,8 @@ class _Legacy:
             self._keep(place, name, _word(words, 3, line), rows, width)
 
     def _keep(self, place: str, name: str, kind: str, count: int, width: int) -> None:
-        """Read an array and store it under its name, or note that it is left out: strings, and fields of the whole data
-        set that are no time."""
+        """Read an array (count, width) of VTK's type `kind` and store it under `place` and `name`. Strings, and fields
+        of the whole data set that state no time, are only noted as left out."""
         values = None
         if kind.lower() in _STRINGS:
             self._skip_strings(count * width)

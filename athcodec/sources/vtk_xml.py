@@ -77,6 +77,8 @@ class VtkXml:
     """The content of one file of VTK's XML formats. Raises ClipError where it is none of those that are read."""
 
     def __init__(self, data: bytes, budget: Budget):
+        """Parse a VTK XML file whose content is `data`. Raises ClipError if its type or compression is none that is
+        read."""
         self._budget = budget
         data, self._appended = _without_raw(data)
         self._root = parse_xml(data, "VTKFile", budget)
@@ -98,7 +100,8 @@ class VtkXml:
         self._unpack = _UNPACKERS.get(name or "")
 
     def files(self) -> list[Listed] | None:
-        """Return the files that a list names; None for a data set."""
+        """Return the files that a list of files (.pvtu, .vtm ...) names, or None if this file is a data set itself.
+        Raises ClipError if the list is empty."""
         if self._type not in _LISTS:
             return None
         tag, attribute = _LISTS[self._type]
@@ -113,7 +116,8 @@ class VtkXml:
         return files
 
     def fields(self) -> tuple[dict[str, np.ndarray], JsonObject, list[str]]:
-        """Return fields that may be times, what our writer adds, and the names of the other fields."""
+        """Return (times, metadata, others) of the field data: arrays that may state the time, by name; what athcodec's
+        own writer stored; and the names of the other fields."""
         times: dict[str, np.ndarray] = {}
         metadata: JsonObject = {}
         others = []
@@ -129,8 +133,8 @@ class VtkXml:
         return times, metadata, others
 
     def grid(self) -> Grid:
-        """Return the data set, whose pieces are joined. Raises ClipError, and ValueError and the like for broken
-        files."""
+        """Return the data set with its pieces joined. Raises ClipError or, for a broken file, ValueError, KeyError and
+        the like."""
         whole = self._root.find(self._type)
         pieces = [] if whole is None else whole.findall("Piece")
         if whole is None or not pieces:
@@ -148,7 +152,7 @@ class VtkXml:
         return grid
 
     def _name_others(self, whole: ElementTree.Element) -> None:
-        """Note what a file says that nothing is read of."""
+        """Note the names of elements and keys in the file that are not read. `whole` is the element of the data set."""
         for element in (*self._root, *whole, *(part for piece in whole.findall("Piece") for part in piece)):
             if element.tag not in _READ_TAGS and element.tag != self._type:
                 self._other[element.tag[:40]] = None
@@ -159,7 +163,7 @@ class VtkXml:
                 self._other["names of components"] = None
 
     def _piece(self, piece: ElementTree.Element) -> Grid:
-        """Return points, cells and arrays of one Piece element. Raises ClipError."""
+        """Return the points, cells and arrays of one Piece element as a data set. Raises ClipError."""
         points = piece.find("Points/DataArray")
         if points is None:
             if int(piece.get("NumberOfPoints", "-1")) != 0:
@@ -198,7 +202,8 @@ class VtkXml:
         return types, stops, nodes
 
     def _arrays(self, piece: ElementTree.Element, tag: str) -> dict[str, np.ndarray]:
-        """Return the arrays in PointData or CellData of a piece by name; those of other types are left out."""
+        """Return by name the arrays in a piece's `tag`, "PointData" or "CellData". Arrays of an unknown type are noted
+        as left out."""
         arrays = {}
         for element in (*piece.findall(f"{tag}/DataArray"), *piece.findall(f"{tag}/Array")):
             name = element.get("Name", "")
@@ -218,7 +223,8 @@ class VtkXml:
         return values.astype(np.int64)
 
     def _array(self, element: ElementTree.Element) -> np.ndarray:
-        """Return the numbers of a DataArray element, whichever way it stores them. Raises ClipError."""
+        """Return the numbers of a DataArray element, which may be text, base64 or appended raw bytes. Raises
+        ClipError."""
         dtype = np.dtype(_TYPES[element.get("type", "")])
         form = element.get("format", "ascii")
         if form == "ascii":
@@ -237,7 +243,7 @@ class VtkXml:
         return np.frombuffer(data, dtype.newbyteorder(self._order)).astype(dtype)
 
     def _appended_at(self, offset: int) -> bytes:
-        """Return the bytes of the array that begins at an offset of AppendedData."""
+        """Return the bytes of the array that begins at `offset` in the file's AppendedData element."""
         if self._appended is not None:
             if not 0 <= offset < len(self._appended):
                 raise ClipError(f"got data at {offset}, expected less than {len(self._appended)}")
@@ -247,7 +253,8 @@ class VtkXml:
         return self._decoded(text[offset:].encode())
 
     def _decoded(self, text: bytes) -> bytes:
-        """Return bytes from base64, in which the counts before packed data are encoded by themselves."""
+        """Return the bytes of an array from its base64 text, decompressed if the file has a compressor. The counts in
+        front of compressed data are base64 text of their own."""
         size = self._count.itemsize
         if self._unpack is None:
             length = self._numbers(_from_base64(text, size), 1)[0]
@@ -260,7 +267,8 @@ class VtkXml:
         return self._unpacked(head + _from_base64(body, packed))
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Return the bytes that follow a header of VTK, decompressed if the file has a compressor."""
+        """Return the bytes of an array that follow the header of sizes at the beginning of `data`, decompressed if the
+        file has a compressor. Raises ClipError if bytes are missing."""
         size = self._count.itemsize
         first = self._numbers(data, 1)[0]
         if self._unpack is None:
@@ -297,7 +305,8 @@ def _from_base64(text: bytes, size: int) -> bytes:
 
 
 def _without_raw(data: bytes) -> tuple[bytes, bytes | None]:
-    """Return the XML of a file without the raw bytes that are appended in it, and these; None where there are none."""
+    """Return (xml, raw): the file's XML without the raw bytes appended in it, and these bytes, None if there are none.
+    Raises ClipError if the appended data has no end."""
     tags = re.finditer(rb"<AppendedData([^<>]*+)>", data)
     match = next((tag for tag in tags if re.search(rb"encoding\s*+=\s*+[\"']raw[\"']", tag[1])), None)
     if match is None:

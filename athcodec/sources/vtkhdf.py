@@ -40,7 +40,8 @@ SURFACE_CELLS = {"Vertices": ({1: 1}, 2), "Lines": ({2: 3}, 4), "Polygons": ({3:
 
 
 def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watched: Any) -> MotionClip:
-    """Return the clip in an open file. watched: resource and unchanged as in MotionClip. Raises ClipError."""
+    """Return the clip in an open VTKHDF file. `path` gives names for messages and objects; `watched` are the fields
+    resource and unchanged of MotionClip. Raises ClipError."""
     budget, name = Budget(options.max_memory), Path(path).stem
     if options.axes is not None:
         raise ClipError(
@@ -70,8 +71,8 @@ def clip_of_vtkhdf(file: h5py.File, path: FilePath, options: ReadOptions, **watc
 
 
 def _groups(file: h5py.File, only: Sequence[str]) -> tuple[dict[str, h5py.Group], list[str]]:
-    """Return the meshes of a file by name, and the names of blocks that are none. Raises ClipError where there is no
-    mesh."""
+    """Return (meshes, others): the groups of the file that are meshes, by name, and the names of blocks that are not.
+    If `only` is not empty, a block's name has to match one of these patterns. Raises ClipError if no mesh is left."""
     root = file[ROOT]
     kind = _kind(root)
     if kind in (GRID, SURFACE):
@@ -94,7 +95,8 @@ def _groups(file: h5py.File, only: Sequence[str]) -> tuple[dict[str, h5py.Group]
 
 
 def _block_names(root: h5py.Group) -> dict[str, str]:
-    """Return the names that the assembly has for blocks, by the names of their groups."""
+    """Return the readable names that the file's assembly gives to blocks, by the names of their groups. Return nothing
+    if two blocks have the same name."""
     names: dict[str, str] = {}
     assembly = root.get(ASSEMBLY)
 
@@ -118,6 +120,8 @@ class _Part:
     """See parts.Part: a grid or surface."""
 
     def __init__(self, name: str, group: h5py.Group, budget: Budget):
+        """Read the cells of the mesh in an HDF5 group, and its times. `name` is what the object is called; `budget`
+        limits the memory that reading takes."""
         self.name, self._group, self._budget = name, group, budget
         self._is_surface, self._kept = _kind(group) == SURFACE, dict[str, np.ndarray]()
         steps = group.get("Steps")
@@ -171,7 +175,8 @@ class _Part:
     # ---- where things lie ----
 
     def _stored_times(self, steps: H5Object) -> np.ndarray:
-        """Return the times (T,) of the group `Steps`. Raises ClipError."""
+        """Return the stored times of the mesh's steps (T,), from the group `Steps`. Raises ClipError if there are too
+        few or they are no numbers."""
         count = int(steps.attrs.get("NSteps", 0))
         values = self._array("Steps/Values").reshape(-1)
         if count < 1 or len(values) < count:
@@ -181,7 +186,8 @@ class _Part:
         return values[:count] if values.dtype.kind == "f" else values[:count].astype(np.float64)
 
     def _pieces(self, step: int) -> range:
-        """Return the numbers of the pieces that make up the data set at a step. Raises ClipError."""
+        """Return the numbers of the stored pieces that together are the mesh at a step. Raises ClipError if there are
+        no such pieces."""
         first = self._of_step("PartOffsets", step, 0)
         total = self._group["NumberOfPoints"].shape[0]
         count = self._of_step("NumberOfParts", step, 1 if self._steps is not None else total)
@@ -212,8 +218,8 @@ class _Part:
         return self._of_step(f"{DATA[center]}Offsets/{name}", step, place), count
 
     def _of_step(self, name: str, step: int, missing: int, column: int = 0) -> int:
-        """Return the integer that the array `name` of the group Steps has for a step; `missing` if there is no such
-        array."""
+        """Return the integer in row `step` and `column` of the array `name` in the group Steps, or `missing` if the
+        array does not exist. Raises ClipError if it has no such row."""
         if self._steps is None or name not in self._steps:
             return missing
         values = self._array(f"Steps/{name}")
@@ -231,7 +237,8 @@ class _Part:
     # ---- reading ----
 
     def _read_cells(self, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return types (C,), where the nodes of each cell start and stop, and the nodes."""
+        """Return (types, starts, stops, nodes) of the cells at a step: the VTK type of each cell (C,), where its nodes
+        start and stop in `nodes` (C,), and the nodes of all cells."""
         kinds = SURFACE_CELLS if self._is_surface else {"": ({}, 0)}
         pieces = self._pieces(step)
         points = np.cumsum([0, *self._counts("NumberOfPoints", pieces)])
@@ -247,7 +254,9 @@ class _Part:
     def _cells_of(
         self, step: int, prefix: str, column: int, pieces: range, piece: int, numbers: tuple[dict[int, int], int]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return types, numbers of nodes, and nodes of the cells of one kind in a piece."""
+        """Return (types, sizes, nodes) of the cells of one kind in one piece: the VTK type and the number of nodes of
+        each cell, and the nodes of all cells. `prefix` is the kind's group and `column` its column in arrays per step;
+        `numbers` gives VTK types by cell size, and the type for other sizes. `piece` counts within `pieces`."""
         within = f"{prefix}/" if prefix else ""
         if within and prefix not in self._group:
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -268,7 +277,8 @@ class _Part:
         return np.array([by_size.get(size, other) for size in sizes.tolist()], np.int64), sizes, nodes
 
     def _rows(self, name: str, first: int, count: int, whole: bool = False) -> np.ndarray:
-        """Return `count` rows of an array from row `first` on. whole: require integers, and return int64."""
+        """Return `count` rows of the array `name`, from row `first` on. With `whole`, they have to be integers and are
+        returned as int64. Raises ClipError if there are no such rows."""
         dataset = self._dataset(name)
         if not 0 <= first <= first + count <= dataset.shape[0]:
             raise ClipError(f"{name}: got {dataset.shape[0]} rows, expected {count} from {first} on")

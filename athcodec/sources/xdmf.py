@@ -71,7 +71,7 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
 
 
 def _clip(items: Items, path: FilePath, options: ReadOptions) -> MotionClip:
-    """Return the clip of the chosen grids of an XDMF document. Raises ClipError."""
+    """Return the clip of the grids that an XDMF document shows or `options` choose. Raises ClipError."""
     scene = _Scene(items, fspath(path), options)
     selection = _Selection(scene)
     tracks = selection.chosen()
@@ -105,6 +105,7 @@ class _Scene:
     """Reads the grids of a file as tracks, with their times and what the file says of all of them."""
 
     def __init__(self, items: Items, shown_path: str, options: ReadOptions):
+        """Read the grids of an XDMF file. `shown_path` is the file's name in warnings. Raises ClipError."""
         self.items, self.documents, self._path, self.options = items, items.documents, shown_path, options
         self._grid_count, self._warned = 0, set[str]()
         self.not_read: dict[str, list[str]] = {"series": [], "mesh": [], "element": []}
@@ -123,7 +124,7 @@ class _Scene:
     # ---- from grids to tracks ----
 
     def _tracks_of(self, grid: Element, depth: int) -> list[Track]:
-        """Return the tracks of a grid. Raises ClipError."""
+        """Return the meshes in a Grid element, over time. `depth` counts the Grids around it. Raises ClipError."""
         self._grid_count += 1
         most = MOST_VISITS + VISITS_PER_ELEMENT * self.documents.size
         if depth > MOST_NESTED or self._grid_count > most:
@@ -149,7 +150,7 @@ class _Scene:
         return time is not None and track.times is None and len(track.steps) == 1
 
     def _series(self, collection: Element, name: str, grids: Sequence[Element], depth: int) -> list[Track]:
-        """Return the tracks of a temporal collection: each of its grids is a step of all of them."""
+        """Return the meshes of a temporal collection over time; each of its `grids` is one step of every mesh."""
         steps = [self._tracks_of(grid, depth + 1) for grid in grids]
         if not steps:
             return []
@@ -183,7 +184,7 @@ class _Scene:
         return float(numbers[0]) if len(numbers) == 1 else None
 
     def _time_elsewhere(self, grid: Element) -> np.ndarray:
-        """Return the time that a grid without a Time states as Information, or as an Attribute of the whole grid."""
+        """Return the time (1,) that a grid states as Information or Attribute, or an empty array if it states none."""
         for element in self.documents.children(grid, "Information", "Attribute"):
             is_whole = local_name(element) == "Information" or element.get("Center", "").lower() == "grid"
             if is_whole and element.get("Name", "").lower() in TIME_NAMES:
@@ -206,7 +207,7 @@ class _Scene:
     def _series_times(
         self, collection: Element, stated: Sequence[np.ndarray | None], grids: Sequence[Element]
     ) -> np.ndarray | None:
-        """Return the times of a collection's steps: their own, or those of the collection. None where it has none."""
+        """Return the times of a collection's steps, stated by the steps or by the collection, or None."""
         count = len(stated)
         missing = [number for number, time in enumerate(stated) if time is None]
         if not missing:
@@ -233,7 +234,8 @@ class _Scene:
         return numbers
 
     def times(self, track: Track) -> tuple[np.ndarray, JsonObject]:
-        """Return (T,) seconds from 0, and what the file says of rate, unit and up axis."""
+        """Return a track's times (T,) in seconds from 0, and metadata that the file states, such as "fps" and
+        "unit"."""
         information, stored, count = self._facts, track.times, len(track.steps)
         fps = information.get("fps") if self.options.fps is None else self.options.fps
         if stored is None or not track.is_series:
@@ -250,8 +252,8 @@ class _Scene:
         return time, information | metadata
 
     def _information(self) -> JsonObject:
-        """Return fps, start_frame, unit and up_axis, where a domain has Information of these names; and those of
-        objects and materials that our writer adds as JSON."""
+        """Return what Information elements state by these names: fps, start_frame, unit and up_axis, and the names of
+        objects and materials, which athcodec's own writer stores as JSON."""
         information: JsonObject = {}
         self._name_unknown(self.documents.root, ("Domain", "Information"))
         for domain in (self.documents.root, *self._domains):
@@ -298,8 +300,8 @@ class _Selection:
         self.other_fields: list[str] = []
 
     def chosen(self) -> list[Track]:
-        """Return the tracks that are the clip; the others are named. Raises ClipError where it is not clear which they
-        are."""
+        """Return the tracks (meshes over time) that make up the clip, and name the others as not read. Raises ClipError
+        if it is unclear which they are."""
         tracks = self._scene.tracks
         if self._scene.options.only:
             tracks = [t for t in tracks if any(fnmatchcase(t.name, pattern) for pattern in self._scene.options.only)]
@@ -315,7 +317,7 @@ class _Selection:
         return chosen
 
     def _still(self, tracks: Sequence[Track]) -> list[Track]:
-        """Return the meshes of a file without a series: they are one frame."""
+        """Return the meshes of a file without time series, which form one frame. Raises ClipError if times differ."""
         with_points = [track for track in tracks if self._element(track, "Geometry") is not None]
         if not with_points:
             raise ClipError("got no grid with a Geometry, expected points")
@@ -329,7 +331,7 @@ class _Selection:
         return with_points
 
     def _groups(self, series: Sequence[Track]) -> list[Track]:
-        """Return the series, those of one mesh at the same times in one: that has all their data."""
+        """Return the series, with series of one mesh at the same times merged into one that has the data of all."""
         groups: list[Track] = []
         for track in series:
             group = next((each for each in groups if self._belong_together(each, track)), None)
@@ -342,7 +344,7 @@ class _Selection:
         return groups
 
     def _belong_together(self, one: Track, other: Track) -> bool:
-        """Return whether two series are of one mesh, of different grids at the top, at the same times."""
+        """Return whether two series show the same mesh at the same times and come from different top-level grids."""
         if one.families & other.families or len(one.steps) != len(other.steps):
             return False
         if one.times is None or other.times is None:
@@ -354,7 +356,7 @@ class _Selection:
         return self._same_mesh(one, other)
 
     def _same_mesh(self, one: Track, other: Track) -> bool:
-        """Return whether two tracks have the same points and cells in their first step, in one place or in several."""
+        """Return whether two tracks have the same points and cells in their first step, shared or stored twice."""
         geometry = self._element(one, "Geometry"), self._element(other, "Geometry")
         topology = self._element(one, "Topology"), self._element(other, "Topology")
         if None in geometry:
@@ -373,8 +375,8 @@ class _Selection:
         return False
 
     def _moving(self, groups: Sequence[Track]) -> list[Track]:
-        """Return the series that are read of several: those with the field, or those that move, all at the same
-        times."""
+        """Return the series to read of several: those that have the wanted field or that move, and those beside them in
+        the same grid. Raises ClipError if their times differ."""
         wanted = self._scene.options.field
         if wanted is not None:
             moving = [track for track in groups if wanted in self._fields(track)]
@@ -407,7 +409,7 @@ class _Selection:
         )
 
     def _name_others(self, chosen: Sequence[Track], others: Sequence[Track]) -> None:
-        """Name what is not read: fields of other series of a mesh that is, other series, and meshes of no step."""
+        """Note what is not read: other series, meshes without steps, and fields of series that share a chosen mesh."""
         points = {self._scene.documents.source(self._element(track, "Geometry")) for track in chosen}
         for track in others:
             if any(self._same_mesh(track, each) for each in chosen):
@@ -425,7 +427,7 @@ class _Selection:
                 self.other_fields += [f"{track.name}/{name}" for center in (NODE, CELL) for name in part.names(center)]
 
     def mesh_for(self, track: Track) -> Element | None:
-        """Return the grid whose mesh a track without any has: the only one in the file, which a GuessWarning names."""
+        """Return the file's only grid with a mesh, for a track without one; None if the track has a mesh of its own."""
         if self._element(track, "Geometry") is not None:
             return None
         meshes = [
@@ -460,6 +462,7 @@ class _Part:
     """See parts.Part: a track."""
 
     def __init__(self, items: Items, track: Track, mesh: Element | None, with_mesh: bool = True):
+        """Prepare the mesh of a track. `mesh` is the Grid that has its points and cells if its steps have none."""
         self.name, self._items, self._documents = track.name, items, items.documents
         self._steps, self._mesh = track.steps, mesh
         self._attributes = [self._attributes_of(step) for step in self._steps]
@@ -470,6 +473,7 @@ class _Part:
         self.cell_count = sum(len(block.rows) for block in self.blocks)
 
     def points(self, step: int) -> np.ndarray:
+        """Return the points (N, 2) or (N, 3) at a step. Raises ClipError if there are none."""
         geometry = self._element(step, "Geometry")
         if geometry is None:
             raise ClipError("got no grid with a Geometry, expected points")
@@ -511,8 +515,8 @@ class _Part:
         return values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
 
     def is_static(self, name: str, center: str) -> bool:
-        """Return whether a field is the same in all steps, by reference or by value. The last step is compared
-        first: what moves is far from its start there."""
+        """Return whether a field has the same values in all steps. The last step is compared first, because a field
+        that changes has changed most there."""
         elements = [step.get((name, center)) for step in self._attributes]
         if any(element is None for element in elements):
             return False
@@ -537,8 +541,8 @@ class _Part:
         return one is other or self._documents.source(one) == self._documents.source(other)
 
     def _attributes_of(self, grids: Sequence[Element]) -> dict[tuple[str, str], Element]:
-        """Return the attributes of a step by name and center. Those of a name that several grids have, as collections
-        that were joined may, are called by their grid as well."""
+        """Return the Attribute elements of a step by (name, center). If several of `grids` have the same name and
+        center, further ones get the grid's name in front."""
         elements: dict[tuple[str, str], Element] = {}
         for number, grid in enumerate(grids):
             for element in self._documents.children(grid, "Attribute"):
@@ -556,7 +560,7 @@ class _Part:
     # ---- cells ----
 
     def _blocks(self, element: Element | None, geometry: Element | None) -> list[Block]:
-        """Return the cells that a Topology element states, as blocks of one kind each."""
+        """Return the cells that a Topology element states, one Block for each type of cell. Raises ClipError."""
         if element is None:
             return []
         kind = (element.get("TopologyType") or element.get("Type") or "").lower()

@@ -84,7 +84,9 @@ def same_block(one: Block, other: Block) -> bool:
 
 
 def structured_blocks(kind: str, element: Element, budget: Budget) -> list[Block]:
-    """Return the cells between the points of a curvilinear grid, whose last dimension is the fastest."""
+    """Return the cells between the points of a curvilinear grid. `kind` is "quad" for grids of two dimensions, or the
+    name of a cell of eight nodes for three. `element` states the number of points along each, the last changing
+    fastest."""
     shape = [int(size) for size in (element.get("Dimensions") or element.get("NumberOfElements") or "").split()]
     if len(shape) != (2 if kind == "quad" else 3) or min(shape) < 1:
         raise ClipError(f"Topology: got the dimensions {shape}, expected {2 if kind == 'quad' else 3} of points")
@@ -104,7 +106,8 @@ def whole_numbers(values: np.ndarray) -> np.ndarray:
 
 
 def mixed_blocks(stream: np.ndarray) -> list[Block]:
-    """Return cells one behind the other, each with its type before it, and its number of nodes where that varies."""
+    """Return the cells in a stream of integers, grouped by type. Each cell is its type number, its number of nodes if
+    the type leaves it open, and its nodes. Raises ClipError."""
     types, starts, stops, at = [], [], [], 0
     numbers = stream.tolist()
     while at < len(numbers):

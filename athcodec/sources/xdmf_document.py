@@ -55,6 +55,8 @@ class Documents:
         return f"{self.folder(element)}\n".encode("utf-8", "surrogateescape") + ElementTree.tostring(element).strip()
 
     def _load(self, path: Path) -> Element:
+        """Parse the XML file `path`, count its elements, note it as a file that the clip depends on, and return its
+        root element. Raises ClipError, OSError."""
         root = parse_xml(read_plain(path, self._budget), TAG, self._budget)
         self._pointers[path] = Pointers(root)
         self.size += sum(1 for _ in root.iter())
@@ -64,7 +66,8 @@ class Documents:
         return root
 
     def _included(self, elements: Sequence[Element], left: int) -> list[Element]:
-        """Return the elements, with what is included in place of each xi:include."""
+        """Return the elements, with every xi:include replaced by the elements that it stands for. `left` is how many
+        more nested includes are allowed. Raises ClipError if it reaches 0."""
         if left <= 0:
             raise ClipError(f"xi:include: got more than {MOST_FOLLOWED} that lead to each other, expected an end")
         included: list[Element] = []
@@ -76,7 +79,8 @@ class Documents:
         return included
 
     def _targets(self, include: Element) -> list[Element]:
-        """Return the elements that an xi:include stands for. Raises ClipError where there are none."""
+        """Return the elements that an xi:include stands for, or its fallback if they cannot be found. Raises ClipError
+        if it has no fallback either."""
         href, pointer = unquote(include.get("href", "")), include.get("xpointer")
         fallback = next((child for child in include if local_name(child) == FALLBACK), None)
         try:
@@ -95,6 +99,8 @@ class Documents:
         return elements
 
     def _document(self, name: str, element: Element) -> Pointers:
+        """Return the document in the file that `element` calls `name`, relative to the element's own file; "" names
+        that file itself. Raises ClipError if it does not exist."""
         home = self._home.get(element, self._path)
         if not name:
             return self._pointers[home]
@@ -107,7 +113,8 @@ class Documents:
         return self._pointers[path]
 
     def _followed(self, element: Element) -> Element:
-        """Return the element that a reference stands for, or the element itself."""
+        """Return the element that `element` refers to by its attribute Reference, or the element itself if it has none.
+        Raises ClipError if references form a cycle or lead to another kind of element."""
         for _ in range(MOST_FOLLOWED):
             reference = element.get("Reference")
             if not reference:

@@ -66,7 +66,8 @@ class Items:
             file.close()
 
     def read(self, item: Element | None, depth: int = 0) -> np.ndarray:
-        """Return the array of a DataItem. Raises ClipError."""
+        """Return the array of a DataItem element. `depth` counts the DataItems around it. Raises ClipError if it is
+        broken or None."""
         if item is None:
             raise ClipError("got no DataItem, expected one")
         if depth > MOST_NESTED:
@@ -100,6 +101,8 @@ class Items:
             return np.array(text.split(), np.float64).astype(_dtype(item))
 
     def _binary(self, item: Element, shape: tuple[int, ...]) -> np.ndarray:
+        """Return the numbers of `shape` in the binary file that a DataItem names, as a flat array, decompressed if
+        needed. Raises ClipError if the file is too short."""
         path = self._file_named((item.text or "").strip(), item)
         dtype, count = _dtype(item).newbyteorder(_ORDERS.get(item.get("Endian", "").lower(), "=")), math.prod(shape)
         seek, size = int(item.get("Seek", 0)), path.stat().st_size
@@ -120,6 +123,8 @@ class Items:
         return values.astype(dtype.newbyteorder("="))
 
     def _hdf(self, item: Element, selection: Any = ()) -> np.ndarray:
+        """Return the array in the HDF5 dataset that a DataItem names. `selection` has a slice for each axis, () for
+        all. Raises ClipError if it is no array of numbers, or too large."""
         text, _, part = (item.text or "").strip().partition("|")
         name, inside = _split(text)
         path = self._file_named(name, item)
@@ -153,7 +158,8 @@ class Items:
             raise ClipError(f"{path.name}: {inside[:80]!r}: cannot be read: {error}") from None
 
     def _slab(self, item: Element, depth: int) -> np.ndarray:
-        """Return the part of an array that a HyperSlab item selects by start, stride and count."""
+        """Return the part of an array that a HyperSlab item selects by the start, stride and count of each axis.
+        `depth` counts the DataItems around it."""
         children = self.documents.children(item, "DataItem")
         if len(children) != 2:
             raise ClipError(f"HyperSlab: got {len(children)} DataItems, expected two")
@@ -164,7 +170,7 @@ class Items:
         return _shaped(values, _shape(item) or tuple(count.tolist()))
 
     def _function(self, item: Element, depth: int) -> np.ndarray:
-        """Return the array that a Function item computes from its operands."""
+        """Return the array that a Function item computes from its operands. `depth` counts the DataItems around it."""
         text = item.get("Function", "")
         operands = [self.read(child, depth + 1) for child in self.documents.children(item, "DataItem")]
         self.budget.need(
@@ -188,6 +194,8 @@ class _Function:
         self._text, self._operands = text, operands
 
     def value(self) -> Any:
+        """Return the value of the function's expression. Raises ClipError if it is longer or uses other operations than
+        are known."""
         if len(self._text) > LONGEST_FUNCTION:
             raise self._unknown()
         named = re.sub(r"\$(\d+)", r"_\1", self._text).replace(";", f",{AFTER},")
@@ -203,6 +211,8 @@ class _Function:
         )
 
     def _of(self, node: ast.expr) -> Any:
+        """Return the value of one node of the parsed expression: a number or an array. Raises ClipError for an unknown
+        operation."""
         if isinstance(node, ast.Constant) and type(node.value) in (int, float):
             return node.value
         if isinstance(node, ast.Name) and re.fullmatch(r"_\d{1,4}", node.id):
@@ -221,7 +231,8 @@ class _Function:
         raise self._unknown()
 
     def _alike(self, *values: Any) -> tuple[Any, ...]:
-        """Return operands that have as many numbers in another shape get the shape of the first."""
+        """Return the operands, with arrays reshaped to the shape of the largest one; single numbers stay as they are.
+        Raises ClipError if arrays differ in how many numbers they have."""
         shape = max((np.shape(value) for value in values), key=math.prod)
         if any(np.size(value) not in (1, math.prod(shape)) for value in values):
             shapes = " and ".join(str(np.shape(value)) for value in values)
@@ -231,8 +242,7 @@ class _Function:
         return tuple(value if np.size(value) == 1 else np.reshape(value, shape) for value in values)
 
     def _joined(self, arguments: Sequence[ast.expr]) -> np.ndarray:
-        """Return the arrays of JOIN: side by side as columns, or one after the other where a semicolon separates
-        them."""
+        """Return the arrays of JOIN as columns of one array or, if semicolons separate them, one after the other."""
         is_after = [isinstance(each, ast.Name) and each.id == AFTER for each in arguments]
         values = [np.atleast_1d(self._of(each)) for each, after in zip(arguments, is_after) if not after]
         if any(is_after):

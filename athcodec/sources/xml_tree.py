@@ -15,8 +15,8 @@ _NAMED_DOCTYPE = re.compile(
 
 
 def parse_xml(data: bytes, tag: str, budget: Budget) -> ElementTree.Element:
-    """Return the root element, of this tag. A DOCTYPE with declarations is refused: entities, and the defaults of
-    attributes, can grow without end. Raises ClipError."""
+    """Return the root element of the XML in `data`, whose name has to be `tag`. Raises ClipError for another root, for
+    broken XML, and for a DOCTYPE with declarations, because entities can grow without end."""
     if b"<!DOCTYPE" in _NAMED_DOCTYPE.sub(b"", data, count=1) or b"\0" in data:
         raise ClipError("got XML with declarations in its DOCTYPE or in UTF-16, expected plain UTF-8 without any")
     budget.need_for(data, b"<=", XML_BYTES, "XML")

@@ -45,7 +45,8 @@ class Pointers:
         return self._elements[key]
 
     def of_xpointer(self, pointer: str) -> list[Element]:
-        """Return the elements of an XPointer: the first of its parts that names any. Raises ClipError."""
+        """Return the elements that an XPointer names. If it has several parts, the first part that names any elements
+        counts. Raises ClipError for an unknown scheme."""
         elements: list[Element] = []
         for scheme, text in _parts(pointer):
             if scheme in ("xpointer", "xpath1", "xpath"):
@@ -66,7 +67,8 @@ class Pointers:
         return elements[:1]
 
     def _by_numbers(self, text: str) -> list[Element]:
-        """Return the element of /1/2/3, or of that below an id."""
+        """Return the element at a path of child numbers counted from 1, such as "/1/2/3", or "id/2" from the element
+        with that id. The list is empty if there is none."""
         name, *numbers = text.strip().split("/")
         elements = self._by_id(name) if name else [self._top]
         for number in numbers:
@@ -84,7 +86,7 @@ class Pointers:
                 yield each
 
     def along(self, axis: str, element: Element) -> list[Element]:
-        """Return the elements that the axis, such as "child" or "parent", leads to from an element."""
+        """Return the elements that an XPath axis, such as "child" or "parent", leads to from an element."""
         if axis == "self":
             return [element]
         if axis == "child":
@@ -103,7 +105,8 @@ class Pointers:
 
 
 def _parts(pointer: str) -> Iterator[tuple[str, str]]:
-    """Yield scheme and text of each part of a pointer; a bare name has no scheme."""
+    """Yield (scheme, text) for each part of an XPointer, such as ("element", "/1/2") for element(/1/2); a bare name has
+    the scheme "". Raises ClipError."""
     if len(pointer) > LONGEST_POINTER:
         raise ClipError(f"xpointer: got {len(pointer)} characters, expected at most {LONGEST_POINTER}")
     at, is_bare = 0, True
@@ -130,6 +133,7 @@ class _Parser:
     """The expression of a path as a function."""
 
     def __init__(self, path: str):
+        """Split a path into tokens. Raises ClipError if it is too long or has characters that are not known."""
         self._path, self._tokens, at = path, list[str](), 0
         if len(path) > LONGEST_POINTER:
             raise self._unknown()
@@ -172,7 +176,8 @@ class _Parser:
         return finders[0] if len(finders) == 1 else lambda document, start: _once(f(document, start) for f in finders)
 
     def _steps(self) -> Finder:
-        """Parse a path, "/a/b//c" or "(a | b)/c", and return a function that finds its elements."""
+        """Parse a path, such as "/a/b//c" or "(a | b)/c", and return a function (document, start) that returns its
+        elements."""
         steps: list[Finder] = []
         is_absolute = False
         if self._take("("):
@@ -202,8 +207,8 @@ class _Parser:
         return find
 
     def _step(self) -> Finder:
-        """Parse one step of a path, such as "name[1]", ".." or "child::name", and return a function that finds its
-        elements."""
+        """Parse one step of a path, such as "name[1]", ".." or "child::name", and return a function (document, element)
+        that returns the elements one step from `element`."""
         if self._take("."):
             return lambda document, element: [element]
         if self._take(".."):
@@ -230,7 +235,7 @@ class _Parser:
         return tests
 
     def _name_test(self) -> Callable[[Element], bool]:
-        """Parse the name in a step, and return a function that tells whether an element has it."""
+        """Parse the name in a step, and return a function that tells whether an element has this name; "*" fits all."""
         name = self._next
         self._at += 1
         if name == "*" or (name == "node" and self._take("(", ")")):
@@ -264,6 +269,8 @@ class _Parser:
         return tests[0] if len(tests) == 1 else lambda *at: all(bool(test(*at)) for test in tests)
 
     def _comparison(self) -> Test:
+        """Parse a value, or two with = or != between them, and return a function that computes the value or the
+        comparison for an element."""
         left = self._value()
         if not self._next or self._next not in ("=", "!="):
             return left
@@ -278,8 +285,8 @@ class _Parser:
         return compare
 
     def _value(self) -> Test:
-        """Parse a value in a predicate: text, a number, an attribute, a function or a path; return a function that
-        computes it."""
+        """Parse a value in a predicate (text, a number, an attribute, a function or a path), and return a function that
+        computes it for an element."""
         token = self._next
         following = self._tokens[self._at + 1 : self._at + 2]
         if token[:1] in ("'", '"'):
@@ -302,6 +309,8 @@ class _Parser:
         return lambda document, element, place, count: path(document, element)
 
     def _function(self, name: str) -> Test:
+        """Parse the arguments of the function `name`, and return a function that calls it for an element. Raises
+        ClipError if no such function is known."""
         self._at += 2
         values = []
         while not self._take(")"):
@@ -326,7 +335,8 @@ _FUNCTIONS: dict[tuple[str, int], Callable[..., Any]] = {
 
 
 def _filtered(document: Pointers, elements: list[Element], tests: list[Test]) -> list[Element]:
-    """Return the elements that pass all tests; a number is the place of the one that does."""
+    """Return the elements that pass all predicates of a step. A predicate whose value is an integer passes the element
+    at that place, counted from 1."""
     for test in tests:
         values = [test(document, each, place, len(elements)) for place, each in enumerate(elements, 1)]
         elements = [

@@ -62,6 +62,8 @@ class GltfFile:
     ClipError, OSError."""
 
     def __init__(self, path: FilePath, max_memory: int = MAX_MEMORY):
+        """Open the glTF or GLB file `path` and read its JSON. Reading takes at most `max_memory` bytes of memory.
+        Raises ClipError, OSError."""
         self.path, self.budget = fspath(path), Budget(max_memory)
         self._files: list[BinaryIO] = []
         self._buffers: dict[int, _Bytes] = {}
@@ -88,6 +90,7 @@ class GltfFile:
     # ---- structure ----
 
     def _read_json(self, file: BinaryIO) -> bytes:
+        """Return the file's JSON text, and note where the binary chunk of a GLB lies. Raises ClipError."""
         self.budget.need(self.size, "file")
         head = file.read(_GLB_HEADER.size)
         text: bytes | None = None
@@ -123,6 +126,7 @@ class GltfFile:
         return text
 
     def _check_version(self) -> None:
+        """Raise ClipError unless the file is of glTF 2 and requires only extensions that are read here."""
         version = str(entry(self.json, "asset").get("version"))
         if not version.startswith("2."):
             raise ClipError(f"asset: got version {version[:20]!r}, expected 2.0")
@@ -135,7 +139,8 @@ class GltfFile:
                 )
 
     def item(self, kind: str, index: JsonValue) -> JsonObject:
-        """Return entry `index` of the array `kind` ("nodes", "accessors" ...). Raises ClipError."""
+        """Return entry `index` of the top-level array `kind`, such as "nodes". Raises ClipError if it does not
+        exist."""
         every = self.json.get(kind)
         entries = every if isinstance(every, list) else []
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(entries):
@@ -154,7 +159,8 @@ class GltfFile:
         return integer(self.item("accessors", index), "count", low=1)
 
     def array(self, index: JsonValue) -> np.ndarray:
-        """Return accessor `index` as (count, width) in its component type. Raises ClipError."""
+        """Return the values of accessor `index`, (count, width), in the type that they are stored in. Raises
+        ClipError."""
         accessor, where = self.item("accessors", index), f"accessor {index}"
         dtype = looked_up(COMPONENTS, accessor.get("componentType"), f"{where}: componentType")
         width = looked_up(WIDTHS, accessor.get("type"), f"{where}: type")
@@ -185,8 +191,8 @@ class GltfFile:
         return self.floats(index).astype(np.float32) if is_normalized else self.array(index)
 
     def _strided(self, accessor: JsonMapping, dtype: np.dtype, width: int, count: int, where: str) -> np.ndarray:
-        """Return the elements (count, width) of an accessor or a part of one, from its buffer view. where: what
-        messages call it."""
+        """Return the elements (count, width) of an accessor, or of a part of one, from its buffer view. `where` names
+        it in messages. Raises ClipError if they do not fit into the view."""
         index = accessor.get("bufferView")
         view = self.item("bufferViews", index)
         item, offset = dtype.itemsize * width, integer(accessor, "byteOffset", 0)
@@ -202,7 +208,8 @@ class GltfFile:
         return np.ndarray((count, width), dtype, raw, strides=(stride, dtype.itemsize))
 
     def _sparse(self, sparse: JsonMapping, values: np.ndarray, where: str) -> np.ndarray:
-        """Return the values of an accessor with the changes of its sparse part."""
+        """Return a copy of an accessor's `values` in which the rows that its `sparse` object lists are replaced.
+        `where` names the accessor in messages."""
         count = integer(sparse, "count", low=1, stop=len(values) + 1)
         indices, changed = entry(sparse, "indices"), entry(sparse, "values")
         dtype = np.dtype(looked_up(COMPONENTS, indices.get("componentType"), f"{where}: sparse indices"))
@@ -218,8 +225,8 @@ class GltfFile:
         return self._binary.read(0, self._binary.size) if self._binary is not None else b""
 
     def part(self, holder: JsonMapping, key: str) -> tuple[_Bytes, int, int]:
-        """Return where the bytes of the buffer view `key` lie: a buffer to `read`, an offset and a size. Raises
-        ClipError."""
+        """Return (buffer, offset, size) of the buffer view whose number `holder` has under `key`: its buffer, and where
+        in it the view's bytes lie. Raises ClipError if the view is compressed or cut off."""
         index = integer(holder, key)
         view = self.item("bufferViews", index)
         offset, size = integer(view, "byteOffset", 0), integer(view, "byteLength", low=1)
@@ -237,8 +244,8 @@ class GltfFile:
         return self._slice(view, integer(view, "byteOffset", 0) + offset, size, f"bufferView {index}")
 
     def _unpacked(self, index: int, name: str) -> bytes:
-        """Return the unpacked bytes of a buffer view that the extension `name` has compressed; the last few are
-        kept."""
+        """Return the bytes of buffer view `index`, decompressed from the extension `name`. The last few results are
+        cached."""
         if index not in self._unpacked_views:
             packed = entry(entry(self.item("bufferViews", index), "extensions"), name)
             raw = self._slice(packed, integer(packed, "byteOffset", 0), integer(packed, "byteLength", low=1), name)
@@ -265,8 +272,8 @@ class GltfFile:
         return self._buffers[index]
 
     def _buffer(self, index: int) -> _Bytes:
-        """Return the bytes behind buffer `index`: the binary chunk, a data URI or a file beside this one. Raises
-        ClipError."""
+        """Return the bytes of buffer `index`, which are the binary chunk, a data URI or another file. Raises ClipError
+        if there are fewer than stated."""
         buffer = self.item("buffers", index)
         uri = buffer.get("uri")
         if uri is None and index == 0 and self._binary is not None:
@@ -319,6 +326,7 @@ class _FilePart(_Bytes):
 
 
 def _parsed(text: bytes) -> JsonObject:
+    """Return the JSON object in `text`. Raises ClipError if it is none."""
     try:
         document = json.loads(text.decode("utf-8-sig"), parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:
@@ -333,6 +341,7 @@ def _no_constant(name: str) -> None:
 
 
 def _data_uri(uri: str) -> bytes:
+    """Return the bytes in a base64 data URI. Raises ClipError if it is none."""
     head, _, data = uri.partition(",")
     if not head.endswith(";base64"):
         raise ClipError(f"buffers: got the URI {head[:60]!r}, expected data in base64")

@@ -18,7 +18,9 @@ def unpacked_size(packed: JsonMapping) -> int:
 
 
 def unpack(raw: bytes, packed: JsonMapping) -> bytes:
-    """Return the bytes of a buffer view whose extension object is `packed`. Raises ClipError, MissingExtra."""
+    """Return the bytes of a buffer view that EXT_meshopt_compression has compressed to `raw`. `packed` is its extension
+    object, which states count, stride, mode and filter. Raises ClipError, and MissingExtra if the package meshoptimizer
+    is missing."""
     try:
         import meshoptimizer as library
     except ImportError:

@@ -58,6 +58,8 @@ class GltfMotion:
     """
 
     def __init__(self, path: FilePath, name: str | None = None):
+        """Open the motion called `name` in the GLB `path`; without a name, the only motion. Raises ClipError,
+        OSError."""
         self.path = os.fspath(path)
         with naming(path, *BROKEN):
             self._gltf = GltfFile(path)
@@ -68,7 +70,8 @@ class GltfMotion:
         self._place = 0
 
     def _chosen(self, name: str | None) -> int:
-        """Return the number of the motion of this name, or of the only one. Raises ClipError."""
+        """Return the number of the motion called `name` or, if it is None, of the only motion in the GLB. Raises
+        ClipError."""
         names = motion_names(self._gltf.json)
         if not names:
             raise ClipError(
@@ -118,7 +121,8 @@ class GltfMotion:
             return self._rest()
 
     def _rest(self) -> np.ndarray:
-        """Return the rest pose (N, 3) that the primitives of the GLB hold for the motion. Raises ClipError."""
+        """Return the rest pose (N, 3) float32 of the motion's N vertices, from the GLB's primitives that it moves.
+        Raises ClipError if a vertex has no position or two different ones."""
         total = sum(len(vertices) for _, vertices in self._places)
         count = 1 + max(int(vertices.max()) for _, vertices in self._places)
         if count > total:
@@ -146,7 +150,8 @@ class GltfMotion:
 
 
 def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
-    """Return the primitives that one of the file's motions moves. Raises ClipError."""
+    """Return the primitives that motion `number` of the file moves, each with the motion's vertex for each of its
+    vertices. Raises ClipError."""
     places, count = [], len(motion_names(file.json))
     for mesh in file.items("meshes"):
         for primitive in entries(mesh, "primitives"):
@@ -157,7 +162,8 @@ def places_of(file: GltfFile, number: int) -> list[GltfPlace]:
 
 
 def _vertices(file: GltfFile, primitive: JsonObject, binding: JsonObject) -> np.ndarray:
-    """Return the motion's vertex of each vertex of a primitive, (n,)."""
+    """Return for each of the n vertices of a primitive the vertex of the motion that moves it, (n,). `binding` is the
+    primitive's extension object. Raises ClipError."""
     attributes: JsonObject = entry(primitive, "attributes")
     count = len(file.array(integer(attributes, "POSITION")))  # The file may have bytes for fewer vertices.
     if VERTEX_ATTRIBUTE not in attributes:

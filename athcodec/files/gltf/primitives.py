@@ -27,7 +27,9 @@ def corners(file: GltfFile, primitive: JsonObject, count: int, name: str) -> np.
 
 
 def rows_of(corners: np.ndarray, mode: int) -> np.ndarray:
-    """Return corners of LINES (1), LINE_LOOP, LINE_STRIP, TRIANGLES (4), TRIANGLE_STRIP or TRIANGLE_FAN (6) as rows."""
+    """Return the lines (n, 2) or triangles (n, 3) of a primitive. `corners` are its vertex numbers in order, and `mode`
+    says how they are joined, as in glTF: 1 LINES, 2 LINE_LOOP, 3 LINE_STRIP, 4 TRIANGLES, 5 TRIANGLE_STRIP, 6
+    TRIANGLE_FAN."""
     if mode == 1:
         return corners[: len(corners) // 2 * 2].reshape(-1, 2)
     if mode in (2, 3):
