@@ -82,6 +82,9 @@ _MODULES = ("errors", "metrics")
 
 
 def __getattr__(name: str) -> Any:
+    """Import a public name of the package when it is first used, and return it. Raise AttributeError if there is no
+    such name.
+    """
     if name in _MODULES:
         return import_module(f"athcodec.{name}")
     for module, names in _LAZY.items():

@@ -21,7 +21,7 @@ BINDINGS = "_native.py"  # The module whose signatures have to be those of the l
 def library_path() -> Path:
     """Return the path of the C core's shared library.
 
-    Raises ImportError if it is missing, or of another version than the Python that runs.
+    Raise ImportError if it is missing, or was built for another version of the package than the running one.
     """
     if (beside := _RUNNING / LIBRARY_NAME).is_file():
         return beside

@@ -294,7 +294,9 @@ lib = _bind()
 
 
 def _core_layouts() -> dict[str, dict[str, tuple[int, int]]]:
-    """Return the core's structs by name: (offset, size) of each field, and of the whole struct under ""."""
+    """Return the layouts of the C core's structs: by a struct's name and a field's name, the pair of offset and size in
+    bytes. The field "" stands for the whole struct.
+    """
     structs: dict[str, dict[str, tuple[int, int]]] = {}
     offset, size, index = c_size_t(), c_size_t(), 0
     while (entry := lib.ath_layout(index, byref(offset), byref(size))) is not None:
@@ -308,7 +310,9 @@ CORE_LAYOUTS = _core_layouts()
 
 
 def check_layouts(mirrors: dict[str, type[ctypes.Structure] | np.dtype]) -> None:
-    """Raise ImportError unless these classes and dtypes have the layouts of the core's structs."""
+    """Raise ImportError unless the given ctypes classes and NumPy dtypes have the same layouts as the C core's structs
+    of the same names.
+    """
     for struct, mirror in mirrors.items():
         if isinstance(mirror, np.dtype):
             layout = {"": (0, mirror.itemsize)}
@@ -342,9 +346,9 @@ check_layouts(MIRRORS)
 
 
 def address(array: np.ndarray | None, dtype: npt.DTypeLike, size: int) -> int | None:
-    """Return a pointer to a contiguous array of at least `size` items of `dtype`.
+    """Return the address of the data of a contiguous array that has at least `size` items of `dtype`; None for None.
 
-    Raises TypeError if the array is anything else: a mistake of the caller that would corrupt memory.
+    Raise TypeError if the array is anything else, because the C core would corrupt memory.
     """
     if array is None:
         return None
@@ -373,8 +377,9 @@ def crc32c(data: BytesLike, crc: int = 0) -> int:
 
 
 def encode_stream(function_name: str, capacity: int, *arguments: object, model: np.ndarray | None = None) -> bytes:
-    """Run one of the core's writers, with more room until its stream fits. `model` is its scratch memory, by default
-    that of `new_model`."""
+    """Run one of the C core's writers and return the stream that it writes. `capacity` is the size of the buffer in
+    bytes, which grows until the stream fits, and `model` the writer's scratch memory, by default that of `new_model`.
+    """
     model = new_model() if model is None else model
     while True:
         buffer = np.empty(capacity, np.uint8)

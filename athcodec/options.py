@@ -57,10 +57,8 @@ def set_numbers(record: Any, *, reals: Iterable[str] = (), wholes: Iterable[str]
 
 
 def ladder_of(ladder: str | Sequence[float]) -> tuple[float, ...]:
-    """Return the largest errors over the diagonal, descending, of a ladder's name or errors, in text with commas
-    between them.
-
-    Raises ValueError.
+    """Return the errors of a ladder's layers, over the diagonal, in descending order. `ladder` is a ladder's name, a
+    sequence of errors, or text with commas between errors. Raise ValueError.
     """
     if isinstance(ladder, str) and ladder in LADDERS:
         return LADDERS[ladder]

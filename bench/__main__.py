@@ -22,6 +22,9 @@ VERBS = {name: import_module(f"bench.{name}") for name in " ".join(_NAMES).split
 
 
 def main(argv: Sequence[str]) -> int:
+    """Run one verb of `python -m bench`, print its tables and write its figures as JSON if asked to. Return the exit
+    status: 1 if the verb reports a broken promise, such as an error above its bound, else 0.
+    """
     args = parser().parse_args(argv)
     args.argv = list(argv)
     result = tables.environment(argv) | VERBS[args.verb].run(args)
@@ -32,6 +35,7 @@ def main(argv: Sequence[str]) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line, with a subcommand for each verb and the verb's own arguments."""
     top = argparse.ArgumentParser(prog="python -m bench", description="Measures athcodec on motion clips.")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     for name, module in VERBS.items():

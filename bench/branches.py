@@ -47,6 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Encode every chosen clip with its named branches and with branches that athcodec has to find. Return the table
+    that compares the bytes, and an empty list of broken promises; figures that are stored already are not measured
+    again.
+    """
     store = Store(args.results, environment(args.argv), KEYS)
     names: list[str] = []
     for name, depends, clip in _clips(args):
@@ -64,7 +68,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _clips(args: argparse.Namespace) -> Iterator[tuple[str, dict[str, str], MotionClip]]:
-    """Yield clips that name branches, with what their figures depend on."""
+    """Yield clips that name their branches: the clip's name, a mapping of what its stored figures depend on (such as
+    its digest), and the clip.
+    """
     codec = fingerprint_of_athcodec()
     chosen = args.clips or (() if args.suite else SCENES)
     for name in (name for name in chosen if name in SCENES):
@@ -88,6 +94,9 @@ def _without_branches(clip: MotionClip) -> dict[str, MotionClip]:
 
 
 def _figures(clip: MotionClip, without: MotionClip, rel_error: float) -> dict[str, Any]:
+    """Encode `clip`, whose branches are named, and `without`, whose branches athcodec finds, at `rel_error` of the
+    diagonal. Return for each of the two its bytes, its numbers of roots and branches, and the seconds of encoding.
+    """
     figures: dict[str, Any] = {}
     for name, variant in (("true", clip), ("found", without)):
         data, seconds = file_and_seconds(variant, rel_error=rel_error, **POSITIONS)
@@ -105,7 +114,9 @@ def _shown(rows: Results) -> Results:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """Return what the figures show, in sentences for a document."""
+    """Return a sentence for a document that sums up stored results: by how many per cent files grow if athcodec finds
+    the branches, compared with named ones.
+    """
     rows = [row for row in contents["sizes"] if row["true"] >= LEAST_BYTES and row["bound"] == REL_ERROR]
     parts = []
     for knowledge, subject in (("faces", "meshes"), ("edges", "skeletons with edges"), ("points", "points alone")):

@@ -41,6 +41,9 @@ def files_of(path: Path) -> list[Path]:
 
 
 def add_clips(parser: argparse.ArgumentParser, kinds: str = "motion clips") -> None:
+    """Add the positional argument `clips` to a parser: paths of source files, by default the sample that ships with
+    athcodec. `kinds` names the accepted files in the help.
+    """
     parser.add_argument(
         "clips",
         nargs="*",
@@ -65,6 +68,9 @@ def add_rel_error(parser: argparse.ArgumentParser, default: Any = REL_ERROR) -> 
 
 
 def add_ladder(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the option `--ladder` to a parser: the largest errors of the layers over the diagonal. `default` names the
+    entry of LADDERS that is used without the option.
+    """
     parser.add_argument(
         "--ladder",
         type=ladder_of,
@@ -94,7 +100,10 @@ def encoded(
     host_rest: bool = False,
     segment_frames: int | None = None,
 ) -> Iterator[Encoded]:
-    """Encode the clip at `path` without attributes into a file that is deleted with the context."""
+    """Encode the clip at `path` without attributes and yield the result with an open decoder; the .ath file is deleted
+    with the context. `rel_error` is the error bound over the diagonal, `ladder` the larger errors at which layers end,
+    and `host_rest` leaves the rest pose out of the file.
+    """
     with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file = Path(folder) / "clip.ath"
         settings = {"attributes": "none", "effort": effort, "ladder": ladder, "host_rest": host_rest}
@@ -115,7 +124,9 @@ def measure(
 
 
 def beginning(clip: athcodec.MotionClip, frames: int) -> athcodec.MotionClip:
-    """Return the first frames of a clip, in memory, with its structure and faces alone."""
+    """Return the first `frames` frames of a clip, read into memory, with its branches, edges and faces but without
+    other attributes.
+    """
     return athcodec.MotionClip(
         clip.block(0, min(frames, clip.frame_count)),
         clip.time[:frames],

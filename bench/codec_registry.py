@@ -73,6 +73,9 @@ def chosen(names: Iterable[str]) -> dict[str, Codec]:
 
 
 def _named(name: str) -> Codec:
+    """Return the codec with a name such as "athcodec", or an instance of the class that "MODULE:NAME" tells. Raise
+    SystemExit with the known names if there is no such codec.
+    """
     if ":" in name:
         module, _, attribute = name.partition(":")
         return _instance(getattr(importlib.import_module(module), attribute))
@@ -116,7 +119,9 @@ def _athcodec_files() -> set[Path]:
 
 
 def _bench_files(module: str) -> set[Path]:
-    """Return the file of a module and the C files that it compiles, and those of all codec modules that it imports."""
+    """Return the paths of a module's source file, of the C files that it compiles, and of all codec modules that it
+    imports, with their C files.
+    """
     files: set[Path] = set()
     names = [module]
     while names:
@@ -131,7 +136,9 @@ def _bench_files(module: str) -> set[Path]:
 
 
 def _c_files(sources: Iterable[Path]) -> set[Path]:
-    """Yield C files and what they include of the core, recursively."""
+    """Return the paths of C files and of all headers of the core that they include, directly or through other
+    headers.
+    """
     files, waiting = set(), list(sources)
     while waiting:
         file = waiting.pop()
@@ -151,6 +158,9 @@ def _spec(name: str):
 
 
 def _imports(file: Path) -> list[str]:
+    """Return the dotted names of all modules that a Python file imports, and of all names that it imports from
+    modules.
+    """
     names: list[str] = []
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
@@ -169,7 +179,9 @@ def _digest(files: tuple[Path, ...]) -> str:
 
 
 def _code(file: Path) -> bytes:
-    """Return the contents of a source file without comments, docstrings, imports and layout; of others, all of it."""
+    """Return what decides the behaviour of a source file: of Python its code without comments, docstrings, imports and
+    layout, of any other file all its bytes.
+    """
     if file.suffix in (".c", ".h", ".inl"):
         return "".join(re.sub(r"/\*.*?\*/|//[^\n]*", "", file.read_text(), flags=re.DOTALL).split()).encode()
     if file.suffix != ".py":

@@ -131,7 +131,9 @@ def rows(
 
 
 def _row(clip: Mapping[str, Any], sizes: Sizes, bounds: Sequence[float]) -> dict[str, Any]:
-    """Return the row of a clip: its sizes by athcodec and by the best other codec at each bound."""
+    """Return a row of the table for one clip: its name, and at each of `bounds` the bytes of athcodec's file and of the
+    smallest file of another codec.
+    """
 
     def size(codec: str, bound: float) -> int | None:
         return sizes[codec, bound]["bytes"] if (codec, bound) in sizes else None
@@ -183,8 +185,10 @@ def _beside(size_of_athcodec: int | None, best: Point | None) -> str | None:
 
 
 def losses(clips: Iterable[Mapping[str, Any]], points: Sequence[Point], bounds: Collection[float]) -> str:
-    """Return sentences on where another codec's or the source's file is smaller, on clips with a level that is worse
-    than the one before, on what has no file, and on the versions and time limits."""
+    """Return sentences about where athcodec does worse: clips on which another codec's file or the source's own is
+    smaller, clips with a level that is worse than the level before, and clips without a file. The sentences end with
+    the versions and time limits of the codecs.
+    """
     compared, smaller, larger, coarser = 0, [], [], []
     names = [clip["clip"] for clip in clips]
     points_of_clips = [point for point in points if point["clip"] in names and point["bound"] in bounds]
@@ -226,7 +230,9 @@ def _count_in_words(compared: int, smaller: int) -> str:
 
 
 def lost_text(suites: Iterable[Mapping[str, Any]], bounds: Collection[float] = BOUNDS) -> str:
-    """Return a table, by kinds of motion, of the sizes at which another codec's file is smaller, and why."""
+    """Return a Markdown table, by kinds of motion, of the pairs of clip and bound at which another codec's file is
+    smaller than athcodec's, with the reasons.
+    """
     kinds: dict[str, list[tuple[str, Point, Point]]] = {}
     compared = 0
     for contents in suites:
@@ -245,7 +251,9 @@ def lost_text(suites: Iterable[Mapping[str, Any]], bounds: Collection[float] = B
 
 
 def _lost_row(kind: str, lost: Sequence[tuple[str, Point, Point]]) -> dict[str, Any]:
-    """Return the row of one kind of motion about the files in which another codec is smaller."""
+    """Return the table's row for one kind of motion. `lost` has a triple for each case in which another codec's file is
+    smaller: the clip's name, athcodec's result, and the other codec's result.
+    """
     savings = [100 * (1 - best["bytes"] / ours["bytes"]) for _, ours, best in lost]
     chunks = [_chunk_bytes(ours) for _, ours, _ in lost]
     motion, rest = (
@@ -278,7 +286,9 @@ def _percent(one: int, other: int) -> str:
 
 
 def by_codec(points: Sequence[Point], clip: str, bounds: Collection[float]) -> list[dict[str, Any]]:
-    """Return a row for each codec on one clip: its bytes at each bound and without loss, or why it has none."""
+    """Return one row per codec for the clip named `clip`: the bytes at each bound and without loss, or the reason why
+    there is no file.
+    """
     points_of_clip = [point for point in points if point["clip"] == clip and point["bound"] in (*bounds, 0)]
     columns = dict.fromkeys(
         exponent(bound) for bound in sorted({point["bound"] for point in points_of_clip}, reverse=True)
@@ -311,7 +321,9 @@ def clips_text(contents: Mapping[str, Any], bounds: Collection[float] = BOUNDS) 
 
 
 def totals_text(suites: Iterable[Mapping[str, Any]]) -> str:
-    """Return a sentence on all sizes of the suites: how many athcodec wins and loses, and by how much."""
+    """Return a sentence about all results of the suites: in how many cases athcodec's file is smaller or larger than
+    that of the best other codec, and by how much.
+    """
     clips, ratios = set(), []
     for contents in suites:
         for clip in contents["clips"]:
@@ -336,8 +348,9 @@ def totals_text(suites: Iterable[Mapping[str, Any]]) -> str:
 
 
 def overview_text(suites: Sequence[Mapping[str, Any]]) -> str:
-    """Return the totals of all suites but the first, which has the sample alone, and a table of a few clips at 1e-4,
-    below its options, for readers who want one table."""
+    """Return a short comparison for readers: a sentence with the totals of all suites but the first, which has only the
+    sample, and a table of a few clips at an error bound of 1e-4, below the options that were used.
+    """
     shown, points = [], ([], [])
     for contents in suites:
         clips = [clip for clip in contents["clips"] if clip["clip"] in OVERVIEW]

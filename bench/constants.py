@@ -129,6 +129,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Halve and double each numeric constant of the encoder, module by module and then one by one, and encode the clips
+    with it. Return tables of what files and work change.
+    """
     warnings.simplefilter("ignore")
     known = [one for one in constants() if args.modules is None or one.module.rpartition(".")[2] in args.modules]
     groups: dict[str, list[Constant]] = {}
@@ -153,7 +156,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 @cache
 def constants() -> tuple[Constant, ...]:
-    """Return all constants, by module."""
+    """Return all numeric constants of the encoder's modules, sorted by module."""
     numbers = []
     for folder in FOLDERS:
         package = import_module(folder)
@@ -196,8 +199,9 @@ def _top_names(module: ModuleType) -> list[str]:
 
 @contextmanager
 def changed(some: Iterable[Constant], factor: float) -> Iterator[None]:
-    """Have constants times a factor in their modules, in those that import them by name, and in defaults of
-    functions."""
+    """Multiply constants by `factor` while the context lasts: in their own modules, in modules that import them by
+    name, and in the defaults of functions.
+    """
     before: list[tuple[Any, str, Any]] = []
     try:
         for one in some:
@@ -217,7 +221,7 @@ def changed(some: Iterable[Constant], factor: float) -> Iterator[None]:
 
 @cache
 def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
-    """Return each module and name under which the package knows a constant."""
+    """Return the pairs of module and name under which the package refers to a constant."""
     places = [(sys.modules[constant.module], constant.name)]
     for name, module in list(sys.modules.items()):
         if name.startswith("athcodec.") and getattr(module, "__file__", None):
@@ -229,7 +233,9 @@ def _places(constant: Constant) -> tuple[tuple[ModuleType, str], ...]:
 
 @cache
 def _defaults(constant: Constant) -> tuple[tuple[Any, int], ...]:
-    """Return functions of the constant's module that have it as a default, and its place among these."""
+    """Return pairs of a function of the constant's module that has the constant as a default value, and the index of
+    that value among the function's defaults.
+    """
     module = sys.modules[constant.module]
     return tuple(
         (getattr(module, node.name), index)
@@ -283,6 +289,9 @@ class _Files:
         return {"clip": clip, "frames": self._args.frames, "bound": bound, "constants": name, "factor": factor}
 
     def _measure(self, name: str, some: Sequence[Constant], factor: float, clip: str) -> None:
+        """Encode a clip with some constants multiplied by `factor`, and store its bytes (None if encoding fails), work
+        and seconds under `name`.
+        """
         total, start = _Total(), time.process_time()
         size: int | None = None
         with changed(some, factor), patch.object(progress.Work, "add", total.adding(progress.Work.add)):
@@ -316,7 +325,9 @@ def _is_above(change: tuple[float, float]) -> bool:
 
 
 def _rows(files: _Files, group: str, members: Sequence[Constant]) -> list[dict[str, Any]]:
-    """Return a row for each constant of a module. What the module as a whole does not move, none of them moves."""
+    """Return a row for each constant of the module `group`. Where the module's constants together change no file, none
+    is measured alone and all get the module's row.
+    """
     rows = []
     for one in members:
         row = _row(files, one.full_name if len(members) > 1 else group, one.full_name)
@@ -327,6 +338,9 @@ def _rows(files: _Files, group: str, members: Sequence[Constant]) -> list[dict[s
 
 
 def _row(files: _Files, name: str, title: str) -> dict[str, Any]:
+    """Return the table's row of a constant or module `name`, shown as `title`: the largest change of bytes and work in
+    per cent when it is halved and doubled, and whether it changes any file at all.
+    """
     row: dict[str, Any] = {"constant": title}
     all_changes = []
     for factor, word in zip(FACTORS, ("halved", "doubled")):
@@ -345,7 +359,9 @@ def _row(files: _Files, name: str, title: str) -> dict[str, Any]:
 
 
 def left_text(contents: Mapping[str, Any]) -> str:
-    """Return for a document how many constants are left, and what all stored figures say of them."""
+    """Return sentences for a document: how many constants the encoder has, and for how many of them halving or doubling
+    changes files, by the stored results.
+    """
     usual, largest = {}, defaultdict(list)
     for row in contents["files"]:
         if row["constants"] == NONE:
@@ -378,6 +394,9 @@ VERDICTS = (  # What stored figures say of constants.
 
 
 def _verdict(one: Constant, moved: Mapping[str, Sequence[bool]]) -> str:
+    """Return the word of VERDICTS that says whether a constant changes any file. `moved` has, by the name of a constant
+    or module, whether each measured file changed.
+    """
     by_itself, as_module = moved.get(one.full_name), moved.get(_module(one))
     if by_itself is not None:
         return VERDICTS[0] if any(by_itself) else VERDICTS[1]

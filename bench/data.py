@@ -140,7 +140,9 @@ def default_folder() -> Path:
 
 
 def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
-    """Return the file, and the seconds it took to make; None if it existed."""
+    """Return the path of the clip's file, and the seconds that it took to make; None instead of the seconds if the file
+    existed.
+    """
     if name == SAMPLE:
         return athcodec.sample_path(), None
     if name not in RECIPES:
@@ -157,6 +159,9 @@ def _found_or_made(name: str, folder: Path) -> tuple[Path, float | None]:
 
 
 def _make(name: str, path: Path) -> float:
+    """Make the clip `name` by its recipe and write it to `path`; return the seconds that this took. Raise
+    MissingProgram if its program is not installed, and Different if the content is not what every machine should make.
+    """
     start, recipe = time.perf_counter(), RECIPES[name]
     if isinstance(recipe, foreign.Foreign) and (why := recipe.missing()):
         raise foreign.MissingProgram(why)
@@ -182,7 +187,7 @@ def _make(name: str, path: Path) -> float:
 
 
 def digest(path: Path) -> str:
-    """Return digest of positions, rest pose and branches: the input of a codec."""
+    """Return a hexadecimal digest of a clip's positions, rest pose and branches, which are all that codecs get."""
     total = hashlib.sha256()
     with athcodec.read(path) as clip:
         for array in (clip.rest, clip.vertex_branch, clip.branch_parent):
@@ -199,7 +204,9 @@ def recipe_text(name: str) -> str:
 
 
 def _recipe_in(path: Path, name: str) -> str | None:
-    """Return the recipe by which a clip's file was made; None if it is not known."""
+    """Return the description of how the file at `path` was made, as stored in or beside it; None if nothing is
+    stored.
+    """
     try:
         if path.suffix != ".h5":
             return path.with_name(f"{name}.recipe").read_text()
@@ -210,7 +217,9 @@ def _recipe_in(path: Path, name: str) -> str | None:
 
 
 def tip_motion(clip: athcodec.MotionClip) -> float:
-    """Return the RMS distance of the stems' last vertices from their mean positions, over the plant's height."""
+    """Return the RMS distance of the last vertices of all stems from their mean positions, as a fraction of the plant's
+    height.
+    """
     order = np.arange(clip.vertex_count) if clip.stem_index is None else clip.stem_index
     last = np.lexsort((order, clip.vertex_branch))
     ends = last[np.flatnonzero(np.diff(clip.vertex_branch[last], append=clip.branch_count))]
@@ -221,6 +230,9 @@ def tip_motion(clip: athcodec.MotionClip) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench data` to a parser: names of clips, a suite, and the folder in which clips are
+    kept.
+    """
     parser.add_argument(
         "names",
         nargs="*",
@@ -239,6 +251,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Make the chosen clips that do not exist yet, and return a table of them: their sizes, branches and motion, how
+    each was made, and the seconds this took.
+    """
     names = _wanted(args.names, args.suite)
     folder = args.folder or default_folder()
     rows = []
@@ -263,6 +278,9 @@ def _wanted(names: Sequence[str], suite: str | None) -> list[str]:
 
 
 def _row(clip: athcodec.MotionClip) -> dict[str, Any]:
+    """Return facts of a clip for a table: numbers of vertices, frames, branches and faces, the generations of branches,
+    megabytes as float32, and how far tips move in per cent of the plant's height.
+    """
     return {
         "vertices": clip.vertex_count,
         "frames": clip.frame_count,

@@ -77,6 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure decoding of each clip by a C program: whole files, single levels, refining from level to level, memory
+    and seeks, and SZ3 beside them. Return the tables, and the clips whose decoded bits differ.
+    """
     tables: dict[str, list[dict[str, Any]]] = {name: [] for name in TABLES}
     broken = []
     with tempfile.TemporaryDirectory() as name:
@@ -115,6 +118,9 @@ class Case:
     """A clip's .ath file, with the program that times the decoder on it."""
 
     def __init__(self, path: Path, folder: Path, rel_error: float, program: Path, ladder: Sequence[float] = ()) -> None:
+        """Encode the clip at `path` into `folder`, unless it is an .ath file already, and keep the checksum of its
+        decoded positions. `program` is the compiled C program that measures.
+        """
         self.path, self._program = path, program
         self.file = path if path.suffix == ".ath" else folder / "clip.ath"
         if path.suffix != ".ath":
@@ -152,6 +158,9 @@ def compile_program(folder: Path) -> Path:
 
 
 def _whole_rows(figures: dict[str, Any], whole: dict[str, float]) -> list[dict[str, Any]]:
+    """Return rows (what is measured, value, unit) about decoding a whole file. `figures` are the C program's
+    measurements by level; `whole` has the milliseconds of opening and of decoding all frames.
+    """
     levels = level_rows(figures)
     deep, coarse = levels[-1], levels[min(1, len(levels) - 1)]
     seeks, decode_ms = figures["seeks"], whole["decode_ms"]
@@ -183,6 +192,9 @@ def _whole_rows(figures: dict[str, Any], whole: dict[str, float]) -> list[dict[s
 
 
 def level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a row for each level from the C program's measurements: its bytes, the milliseconds to prepare and write
+    all frames, and microseconds per frame for vertices and for matrices.
+    """
     rows = []
     for level in figures["levels"]:
         share = 1e3 * level["prepare_ms"] / figures["frames"]
@@ -207,6 +219,9 @@ def level_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def onward_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a row for each pair of levels that a decoder refines between: milliseconds of decoding onward from the
+    kept coarser level, and anew from the start, and the bytes of memory kept for it.
+    """
     rows = []
     for pair in figures["onward"]:
         segments = figures["segments"] * figures["levels"][pair["from"]]["segment_bytes"]
@@ -226,7 +241,9 @@ def onward_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def sz3_rows(case: Case, rel_error: float, rounds: int) -> list[dict[str, Any]]:
-    """Return one row for a clip, whose file `case` has; none for an .ath file, which does not hold the source."""
+    """Return one row that compares the decoding times of athcodec and SZ3 on the same clip, as medians of `rounds`; an
+    empty list for an .ath file, which does not hold the source.
+    """
     if case.path.suffix == ".ath":
         return []
     with athcodec.read(case.path) as clip:
@@ -265,7 +282,9 @@ def _sz3_job(positions: np.ndarray, bound: float, algorithm: str) -> Callable[[]
 
 
 def memory_rows(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return rows for level 1 and the deepest level, each with one segment and with two."""
+    """Return rows of the bytes of memory that decoding takes, at level 1 and at the deepest level, with one prepared
+    segment and with two.
+    """
     levels, rows = figures["levels"], []
     positions = 12 * figures["vertices"] * figures["longest_segment"]
     for level in sorted({min(1, len(levels) - 1), len(levels) - 1}):

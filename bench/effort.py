@@ -77,6 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Learn the order of the encoder's choices that saves most bytes for its work on one half of the clips, and judge
+    it on the other half. Return tables of the learned order and of the resulting files.
+    """
     warnings.simplefilter("ignore")  # Bounds and units are those of the clips; every run would warn of them again.
     halves = {"learning": _cases(args.learning, LEARNING), "judging": _cases(args.judging, JUDGING)}
     store = Store(args.results, environment(args.argv), KEYS)
@@ -116,7 +119,9 @@ class _State:
     is_small: bool  # Whether all choices are made again, as in small clips.
 
     def after(self, name: str) -> tuple[_State, dict[str, float]]:
-        """Return the state after one more choice, and its figures."""
+        """Return the state of the search after the choice `name` is made as well, and the figures of that choice: the
+        file's cost "before" and "after", and the "share" of the allowed work that it took.
+        """
         trials = self.trials.apart()
         before = trials.cost(self.settings)
         if name == settled.__name__ and not self.is_small:
@@ -138,7 +143,9 @@ class _Learner:
         self._store, self._rel_error = store, rel_error
 
     def learned(self, clips: Sequence[Case]) -> Order:
-        """Return the order in which choices save most for their work on some clips."""
+        """Return the order of the encoder's choices in which each next choice saves most bytes for its work, averaged
+        over `clips`.
+        """
         with ExitStack() as stack:
             states, done = self._first_states(clips, stack), ()
             first, states = self._best_order(order.BEFORE_STEPS, states, done)
@@ -158,7 +165,9 @@ class _Learner:
     def _best_order(
         self, names: Sequence[str], states: list[_State], done: tuple[str, ...]
     ) -> tuple[tuple[str, ...], list[_State]]:
-        """Return the order in which each next choice saves most for its work, and the clips' states after it."""
+        """Order the choices `names` so that each next choice saves most bytes for its work. Return that order, and the
+        states of the clips after all of them; `done` has the choices made before.
+        """
         left, chosen = list(names), ()
         while left:
             tried = {name: self._applied(states, done + chosen, name) for name in left}
@@ -174,7 +183,9 @@ class _Learner:
         return [state for state in states if state is not None]
 
     def _applied(self, states: list[_State], done: tuple[str, ...], name: str) -> list[_State]:
-        """Return the states after one more choice, whose figures are stored."""
+        """Return the states of all clips after the choice `name`, made after the choices in `done`, and store the
+        figures of that choice for each clip.
+        """
         others = []
         for state in states:
             other, figures = state.after(name)
@@ -192,7 +203,7 @@ class _Learner:
 
 
 def _first_state(clip: athcodec.MotionClip, name: str, rel_error: float) -> _State | None:
-    """Return what a search begins with; None: the clip's file needs no search."""
+    """Return the state in which the search for a clip's settings begins, or None if the clip's file needs no search."""
 
     def noted(search: Search) -> None:
         raise _Searching(search)
@@ -218,7 +229,9 @@ def _means(store: Store, clips: Iterable[str], rel_error: float, done: Sequence[
 
 
 def _measure_file(store: Store, case: Case, rel_error: float, one: Order, effort: str) -> None:
-    """Store the bytes of a clip's file whose choices are made in some order."""
+    """Encode a clip with the choices in the order `one` and store the bytes and seconds of its file. `effort` is the
+    encoder's effort, "default" or "best".
+    """
     key = {"clip": case.name, "bound": rel_error, "order": _text(one), "effort": effort}
     if store.find("files", key) is not None:
         return
@@ -235,6 +248,9 @@ def _text(one: Order) -> str:
 
 
 def _order_rows(store: Store, halves: Mapping[str, list[Case]], rel_error: float, learned: Order) -> list[dict]:
+    """Return a row for each choice in the learned order: the per cent of the bytes that it saves and of the work that
+    it takes, on average over each half of the clips.
+    """
     names, rows = (*learned[0], *STEPS, *learned[1]), []
     for number, name in enumerate(names):
         row: dict[str, Any] = {"choice": name}
@@ -248,6 +264,10 @@ def _order_rows(store: Store, halves: Mapping[str, list[Case]], rel_error: float
 def _file_rows(
     store: Store, chosen: Sequence[Case], rel_error: float, of_encoder: Order, learned: Order
 ) -> list[dict[str, Any]]:
+    """Return a row for each clip that compares its bytes with the encoder's order of choices, with the learned order,
+    and at effort "best".
+    """
+
     def file(case: Case, one: Order, effort: str = "default") -> dict[str, Any]:
         key = {"clip": case.name, "bound": rel_error, "order": _text(one), "effort": effort}
         return store.find("files", key) or {}
@@ -272,8 +292,9 @@ def _file_rows(
 
 
 def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return means over the clips of one half: the learned order against the encoder's, and default effort against
-    best."""
+    """Return a summary of the files of one half: the mean bytes with the learned order over those with the encoder's
+    order, how many files at default effort are much larger than at effort "best", and the sum of the seconds.
+    """
     return {
         "clips": len(rows),
         "files that differ": sum(row["learned / encoder"] != 1 for row in rows),

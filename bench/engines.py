@@ -59,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Run the tests that play the shipped tree in game engines and browsers, and store what they measure. Return the
+    table of engines, and whether any test failed.
+    """
     store = Store(RESULTS, environment(args.argv), {"engines": ["engine"]})
     with tempfile.TemporaryDirectory() as folder:
         measured = Path(folder) / "engines.jsonl"
@@ -73,7 +76,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """Return the table of a document, in the order of EXAMPLES."""
+    """Return the stored measurements as a Markdown table for a document, one row per engine in the order of
+    EXAMPLES.
+    """
     rows: Results = contents["engines"]
     text = "| engine | version | example | lines | ms a frame, near | ms a frame, far |\n|---|---|---|--:|--:|--:|\n"
     for engine, (path, form) in EXAMPLES.items():

@@ -112,6 +112,9 @@ beam for maps, gaps in bases, the sheet's own rotation, ends first and copies in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench features` to a parser: clips or a suite, error bounds, the features to leave out, and
+    where results are kept.
+    """
     parser.add_argument(
         "clips", nargs="*", metavar="CLIP", help="files, or names of clips (default: print the figures that are kept)"
     )
@@ -132,6 +135,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Encode each clip with and without each feature of the format, and store both sizes. Return the tables of what the
+    features save, and the files whose error exceeds their bound.
+    """
     wanted = args.features or [(feature,) for feature in Feature if not (args.alone and feature in OF_OPTIONS)]
     store, broken = Store(args.results, environment(args.argv), KEYS), []
     chosen = cases(args.clips, args.suite or "quick") if args.clips or args.suite else []
@@ -183,7 +189,9 @@ class _Files:
         self.broken: list[str] = []
 
     def sizes(self, features: tuple[Feature, ...]) -> tuple[int, int]:
-        """Return the bytes with some features, by the options of all of them, and without them."""
+        """Return two numbers of bytes: of the file that may use some features, made with the options of all of them,
+        and of the file without these features.
+        """
         feature, options = features[0], self._options(features)
         plan, size = self._file(options)
         if not any(self._uses(plan, feature) for feature in features):
@@ -211,6 +219,9 @@ class _Files:
         return self._kept[key]
 
     def _made(self, options: dict[str, Any], without: frozenset[Feature]) -> tuple[Draft, int]:
+        """Encode the clip with further `options` and without some features. Return the plan that the encoder made and
+        the bytes of the file; a file whose error exceeds its bound is added to `broken`.
+        """
         settings = {"attributes": "none", "rest_error": "bound", "ladder": self._ladder, "without": without} | options
         plan = draft(self._clip, rel_error=self._bound, **settings)
         coded = code_segments(self._clip, plan, range(plan.segment_count))
@@ -221,7 +232,7 @@ class _Files:
         return plan, summary.bytes
 
     def _uses(self, plan: Draft, feature: Feature) -> bool:
-        """Return whether a file has the feature, as far as its settings tell."""
+        """Return whether the file that a plan describes uses a feature, as far as the plan's settings tell."""
         choice, is_host = plan.choice, plan.options.host_rest
         settings, both = choice.settings, (choice.settings, choice.first_layer)
         layered = choice.first_layer.bound > settings.bound
@@ -262,7 +273,7 @@ class _Files:
 
 
 def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row for each feature that was measured, in per cent of the bytes with it."""
+    """Return a row for each measured feature: by how many per cent of the bytes with it files grow without it."""
     growth: dict[str, dict[str, float]] = {}
     makers: dict[str, set[str]] = {}
     for row in sizes:
@@ -293,7 +304,7 @@ def summary(sizes: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def decisions(contents: Mapping[str, Iterable[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """Return for each feature the rows that decide whether it stays."""
+    """Return, for each feature, the rows of the stored results that decide whether the feature stays in the format."""
     rows = []
     for feature in Feature:
         best = [_best_of_makers(contents[name], feature.name.lower()) for name in ("sizes", "alone")]
@@ -337,7 +348,7 @@ def _rounded(value: float) -> str:
 
 
 def table_text(contents: Mapping[str, Any]) -> str:
-    """Return the tables of spec/rationale.md: Markdown, with the clips that were measured below each."""
+    """Return the tables of spec/rationale.md as Markdown, with the measured clips listed below each table."""
     parts = []
     for name, heading, notes in (
         ("sizes", "Left out of files that have all others", (NOTE, NOT_JUDGED)),

@@ -51,7 +51,9 @@ _DRAWN = "(canvas) => { athcodecViewer.stage.render(); return canvas.toDataURL()
 
 
 def grown() -> athcodec.MotionClip:
-    """Return the sample that grows as a loop: it holds its end and then goes back, slowly at first and at last."""
+    """Return the sample that grows, changed into a loop: it holds its last pose, and then shrinks back, slowly at the
+    beginning and the end.
+    """
     clip = sapling()
     share = np.arange(1, RETURN_FRAMES + 1) / (RETURN_FRAMES + 1)
     place = (clip.frame_count - 1) * (1.0 - share * share * (3.0 - 2.0 * share))
@@ -85,6 +87,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Draw the still pictures of the documentation's gallery and write them, with the files that they show, to a
+    folder. Return a table of the written files and their bytes.
+    """
     args.out.mkdir(parents=True, exist_ok=True)
     samples = {name: athcodec.sample_path(name) for name in SAMPLES}
     for path in samples.values():
@@ -117,7 +122,7 @@ def _encoded(folder: Path) -> dict[str, Path]:
 
 
 def _forest() -> bytes:
-    """Return a picture of a forest that the viewer draws, as WebP bytes."""
+    """Return a picture of a forest that the viewer draws on WebGPU, as the bytes of a WebP file."""
     from PIL import Image
 
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:

@@ -76,6 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Encode the chosen clips and measure every level: bytes, errors beside the paper's method, and gaps where branches
+    join. Return the tables, and lines about levels that break a promise.
+    """
     levels, gaps, files, broken = [], [], [], []
     names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
     for path in map(data.path_of, names) if args.all else args.clips:
@@ -126,7 +129,10 @@ def _measure_paper(clip: athcodec.MotionClip, ath: Ath, depth: int) -> ErrorMete
 
 
 def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> dict[str, float | int | None]:
-    """Return errors of one level over the diagonal, beside those of the paper's method with the same nodes."""
+    """Return the row of one level: its nodes and bytes, its largest and RMS error over the diagonal, the errors of the
+    paper's method with the same nodes, and the RMS error over the paper's. `paper` is None where the paper has no such
+    level.
+    """
     diagonal = error.diagonal
     return {
         "nodes": stored.nodes,
@@ -140,7 +146,9 @@ def _level_row(stored: Level, error: ErrorMeter, paper: ErrorMeter | None) -> di
 
 
 def _better(levels: list[Level], level: int, meter: MotionMeter) -> dict[str, float | None]:
-    """Return how much worse than the level before, and than the source's own second differences, a level is."""
+    """Return two ratios for a level: its larger error (largest or RMS) over that of the level before, None at level 0,
+    and its second differences in time over those of the source.
+    """
     before, this = levels[max(level - 1, 0)], levels[level]
     pairs = (this.max_error, before.max_error), (this.rms_error, before.rms_error)
     worse = max(ratio / other if other else float(ratio > 0) for ratio, other in pairs)
@@ -173,7 +181,9 @@ def _broken_lines(path: Path, stored: Level, error: ErrorMeter, decoder: athcode
 
 
 def _file_row(name: str, result: Encoded) -> dict[str, Any]:
-    """Return what the levels of a file are worth in each of its clips."""
+    """Return a row about one file: its numbers of clips and levels, its bytes, the share of them in its first level,
+    the largest ratio of a level's error to that of the level before, and how far feet that stand still move.
+    """
     decoder, last = result.decoder, result.decoder.levels[-1].bytes
     parts = [decoder.play(clip.name) for clip in decoder.file.clips]
     return {
@@ -198,8 +208,9 @@ def _worst_ratio(part: athcodec.Decoder) -> float:
 
 
 def _foot_drift(result: Encoded) -> float | None:
-    """Return how far any foot that stands still moves at any level, over the extent of its plant; None: no foot
-    does."""
+    """Return the largest distance that any level moves a root's first vertex which stands still in the source, over the
+    extent of its plant. Return None if no such vertex stands still.
+    """
     hierarchy, clip, decoder = result.decoder.file.hierarchy, result.clip, result.decoder
     roots = np.flatnonzero(hierarchy.branch_parent < 0)
     starts = hierarchy.first_vertex[roots]
@@ -219,7 +230,7 @@ def _foot_drift(result: Encoded) -> float | None:
 
 
 def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
-    """Return a line for each thing that a file should have and has not."""
+    """Return a line for each promise about a whole file that a row of `_file_row` does not keep."""
     lines = []
     if row["of the one before"] > 1:
         lines.append(f"{row['of the one before']:.3f} of the level before in a clip; expected at most 1")
@@ -235,7 +246,9 @@ def _broken_file_lines(row: dict[str, Any], is_predicted: bool) -> list[str]:
 
 
 def _gap_row(result: Encoded, ath: Ath, level: int, diagonal: float) -> dict[str, Any]:
-    """Return how far branches come off their attach points at a level, beside the paper's method."""
+    """Return how far branches are from the points that they hang on, at a level of the file and in the paper's method:
+    numbers of joints, and the largest and RMS gaps over `diagonal`.
+    """
     clip = result.clip
     frames = np.unique(np.linspace(0, clip.frame_count - 1, GAP_FRAMES).astype(int)).tolist()
     source = np.concatenate([clip.block(frame, frame + 1) for frame in frames])
@@ -257,6 +270,9 @@ class _Joints:
     """The attach points between two pieces of a level, by the branch attached there, in file order."""
 
     def __init__(self, decoder: athcodec.Decoder, level: int) -> None:
+        """Find the joints of a level: branches whose part moves apart from the part of the vertex that they hang on.
+        Raise RuntimeError if a joint that is to be measured hangs on a part without exact stems.
+        """
         self.decoder, self.level = decoder, level
         hierarchy, parts = decoder.file.hierarchy, decoder.affines(0, level)
         part_of_branch = np.searchsorted(parts.first_vertex, hierarchy.first_vertex, side="right") - 1

@@ -43,6 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Encode each clip, and the clip repeated several times, in processes of their own. Return the table of their peak
+    memory.
+    """
     rows = []
     for path in args.clips:
         segment = str(_segment_frames(path))
@@ -71,6 +74,7 @@ def _process(*words: str) -> dict[str, int]:
 
 
 def _row(peak: dict[str, int]) -> dict[str, float | int]:
+    """Return the table's row from the figures of `_encode`, with bytes as megabytes of 1,000,000 bytes."""
     return {
         "frames": peak["frames"],
         "segments": peak["segments"],
@@ -86,7 +90,9 @@ def _row(peak: dict[str, int]) -> dict[str, float | int]:
 
 
 def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> dict[str, int]:
-    """Encode a file, and return its facts and the peak memory of this process before and after, in bytes."""
+    """Encode a source file to `target`. Return the numbers of frames and segments, the bytes of the positions and of
+    the file, and the peak memory of this process after its imports and at the end, in bytes.
+    """
     imports = peak_bytes()
     with athcodec.read(source) as clip:
         summary = athcodec.encode(clip, target, rel_error=rel_error, segment_frames=segment_frames, attributes="none")
@@ -105,7 +111,9 @@ def _encode(source: str, target: str, rel_error: float, segment_frames: int) -> 
 
 
 def _repeat(source: str, target: str, times: int) -> dict[str, int]:
-    """Write the clip repeated `times` times, gzip-compressed."""
+    """Write the clip of `source` to `target`, repeated `times` times, as gzip-compressed HDF5. Return its number of
+    frames as "frames".
+    """
     with athcodec.read(source) as clip:
         period = clip.frame_count / clip.fps
         time = np.concatenate([clip.time + period * i for i in range(times)])

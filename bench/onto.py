@@ -70,6 +70,9 @@ class Case:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench onto` to a parser: names of cases, the error bound, and the path of a picture to draw
+    instead.
+    """
     parser.add_argument(
         "clips",
         nargs="*",
@@ -87,6 +90,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Bind each mesh to the decoded skeleton of its plant and compare it with its own motion. Return the table, and
+    lines about meshes whose edges stretch or joints open too far; or only draw the picture that was asked for.
+    """
     if args.picture:
         args.picture.write_text(drawn(), "utf-8")
         return {
@@ -105,7 +111,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def case_of(name: str) -> Case:
-    """Return a canopy on its beams, or one of OTHERS. Raises KeyError for other names."""
+    """Return the case of a name: a skeleton, the mesh that it is to move, and which vertices of the mesh are wood.
+    Raise KeyError for a name that is neither a canopy nor one of OTHERS.
+    """
     if name == SCAN:
         beams = thickened(SCANNED.skeleton(), THICKER)
         scan = scanned(beams, CELL, NOISE, SCANNED.seed)
@@ -130,7 +138,9 @@ def case_of(name: str) -> Case:
 
 
 def bones(path: Path, mesh: athcodec.MotionClip) -> athcodec.MotionClip:
-    """Return the joints of a GLB's skin as centre lines, with the ends of the last bones, at the times of its mesh."""
+    """Return the joints of a GLB's skin as a clip of centre lines, with the tips of the last bones, at the times of the
+    mesh.
+    """
     with closing(GltfFile(path)) as file:
         scene = Scene(file)
         joints = {joint for skin in file.items("skins") for joint in skin["joints"]}
@@ -162,8 +172,9 @@ def bones(path: Path, mesh: athcodec.MotionClip) -> athcodec.MotionClip:
 
 
 def measured(case: Case, rel_error: float) -> dict[str, Any]:
-    """Return the row of the table for a case: bytes of the skeleton's file and of the mesh's, how far the mesh that the
-    skeleton drives is from its motion, and how much its edges stretch."""
+    """Return the table's row of a case: the bytes of the skeleton's file and of the mesh's own, the distance of the
+    mesh that the skeleton moves from the mesh's own motion, and how much its edges stretch.
+    """
     from time import perf_counter
 
     with tempfile.TemporaryDirectory() as folder:
@@ -207,6 +218,9 @@ class _Figures:
     """Errors, stretch and gaps of a mesh that moves with a skeleton, beside those of its own motion."""
 
     def __init__(self, case: Case):
+        """Prepare to measure a case: find the edges of its mesh with their lengths at rest, and the pairs of vertices
+        where stems join.
+        """
         self._wood = case.is_wood
         self._meters = ErrorMeter(), ErrorMeter()
         edges = edges_of(case.mesh)
@@ -218,7 +232,9 @@ class _Figures:
         self._gaps = [0.0, 0.0]
 
     def add(self, moved: np.ndarray, direct: np.ndarray) -> None:
-        """Measure frames (k, V, 3) of a mesh bound to the plant against those of the mesh as it was simulated."""
+        """Measure frames `moved` (k, V, 3) of the mesh as the plant moves it against the same frames `direct` (k, V, 3)
+        of the mesh's own simulation.
+        """
         for meter, some in zip(self._meters, (self._wood, ~self._wood)):
             if some.any():
                 meter.add(direct[:, some], moved[:, some])
@@ -230,7 +246,9 @@ class _Figures:
                 self._gaps[number] = max(self._gaps[number], wider)
 
     def row(self) -> dict[str, Any]:
-        """Return the measured errors, stretches and gaps as a row of the table."""
+        """Return what was measured as a row of the table: distances of wood and leaves, stretch of edges, and gaps at
+        joints.
+        """
         wood, leaves = self._meters
         stretch, direct = (float(np.quantile(np.concatenate(each), TAIL)) for each in self._stretch)
         row: dict[str, Any] = {"wood max": wood.max_error, "wood RMS": wood.rms_error}
@@ -256,8 +274,9 @@ def _lengths(frames: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _joints(case: Case, edge: float) -> np.ndarray:
-    """Return pairs of vertices that nearly touch at rest, (J, 2): of a stem and of one that grows on it. A mesh that
-    names no branches has none."""
+    """Return pairs of vertices (J, 2) of two stems, one of which grows on the other, that are closer at rest than a
+    part of `edge`, the median length of an edge. A mesh without named branches has no such pairs.
+    """
     from scipy.spatial import cKDTree
 
     mesh, wood = case.mesh, np.flatnonzero(case.is_wood)
@@ -276,7 +295,7 @@ def _joints(case: Case, edge: float) -> np.ndarray:
 
 
 def drawn() -> str:
-    """Return an SVG of a skeleton in the wind, and of three meshes that move by its file."""
+    """Return an SVG, as text, of a skeleton in the wind and of three meshes that move by the skeleton's file."""
     skeleton = data.RECIPES[DRAWN].skeleton()
     encoded = athcodec.encode(skeleton, rel_error=REL_ERROR, exact_rest=True)
     with athcodec.open(encoded) as plant:
@@ -334,7 +353,9 @@ def _lines(points: np.ndarray, edges: np.ndarray, colour: str) -> str:
 
 
 def _polygons(points: np.ndarray, faces: np.ndarray, wood: np.ndarray) -> str:
-    """Return polygons in front view, far ones first."""
+    """Return the SVG polygons of faces (F, 4) seen from the front, the far ones first. `points` is (V, 3), and `wood`
+    (F,) tells faces of wood, drawn brown, from those of leaves, drawn green.
+    """
     corners = points[faces].astype(np.float64)
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)

@@ -52,6 +52,9 @@ def _chains(result: Encoded) -> list[np.ndarray]:
 
 
 def _svg(result: Encoded, frame: int) -> str:
+    """Return an SVG, as text, with a panel for each level: one frame as decoded at the level, coloured by its error,
+    over the original.
+    """
     chains, original = _chains(result), np.asarray(result.clip.block(frame, frame + 1)[0], float)
     shown = [result.decoder.positions(frame, level.level) for level in result.decoder.levels]
     low = np.min([points.min(axis=0) for points in (original, *shown)], axis=0)

@@ -46,6 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure the prefixes of files with and without layers of precision against files that are encoded directly at the
+    same error. Return tables of prefixes, of bytes at round errors, and of whole files.
+    """
     rows, at_errors, sizes = [], [], []
     for path in args.clips:
         curves = _own_files(path, args.rel_error)
@@ -70,7 +73,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _own_files(path: Path, rel_error: float) -> dict[str, Curve]:
-    """Return sizes of files of their own by each measure of their error."""
+    """Encode a clip directly at several error bounds down to `rel_error`, and return for each measure of the error,
+    largest and RMS, the curve of bytes over error.
+    """
     rows = []
     for bound in _bounds(rel_error):
         with encoded(path, bound) as result:
@@ -90,7 +95,9 @@ def _bounds(rel_error: float) -> list[float]:
 
 
 def _prefixes(result: Encoded, curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
-    """Yield a row for each level: its bytes and errors, and the bytes of a file encoded directly at the same error."""
+    """Yield a row for each level of a file: its bytes and errors, and the bytes of a file encoded directly at the same
+    error. `curves` has the bytes of such files over each measure of the error.
+    """
     scale = _diagonal(result)
     for level in result.decoder.levels:
         row = {"level": level.level, "bytes": level.bytes}
@@ -102,7 +109,10 @@ def _prefixes(result: Encoded, curves: dict[str, Curve]) -> Iterator[dict[str, A
 
 
 def _at_errors(prefixes: list[dict[str, Any]], curves: dict[str, Curve]) -> Iterator[dict[str, Any]]:
-    """Yield a row for each of the errors 1e-2, 3e-3, 1e-3 and so on, by both measures."""
+    """Yield a row for each error 1e-1, 3e-2, 1e-2 and so on over the diagonal that the prefixes reach: for each measure
+    of the error, the level and bytes of the prefix, the bytes of a file encoded directly at that error, and the ratio
+    of the two.
+    """
     for error in (digit * 10.0**-decade for decade in range(1, 9) for digit in (1, 0.3)):
         row: dict[str, Any] = {}
         for kind in MEASURES:

@@ -59,6 +59,9 @@ whole process, Python and imports included; when encoding with the clip in memor
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench rd` to a parser: clips or a suite, error bounds, codecs, the time limit, and which
+    results are listed or measured again.
+    """
     parser.add_argument(
         "clips",
         nargs="*",
@@ -97,6 +100,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure every chosen codec at every bound on every clip, as far as results are not stored yet. Return the tables
+    of the stored results.
+    """
     file, args.json = args.json, None  # written by the store; a listing is no result
     if args.list:
         return _listing(args)
@@ -135,7 +141,9 @@ def _listing(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _about(store: Store, case: Case) -> dict[str, Any]:
-    """Return facts about a clip, with a digest of its content."""
+    """Store and return facts about a clip: its name and origin, its numbers of frames, vertices and branches, the bytes
+    of its source, and a digest of its content.
+    """
     program, colon, _ = case.description.partition(": ")
     row = {"clip": case.name, "what": case.description} | ({"program": program} if colon else {})
     if case.path is None:
@@ -175,6 +183,9 @@ class _Job:
 
 
 def _point(job: _Job, store: Store, again: bool) -> None:
+    """Measure one codec at one bound on one clip and store the result, unless a usable one is stored. `again` repeats
+    measurements that have failed.
+    """
     known = store.find("points", job.identity, job.depends)
     if known is not None and known["status"] != MISSING and (known["status"] == OK or not again):
         return
@@ -193,6 +204,9 @@ def _was_measured(job: _Job, store: Store) -> bool:
 
 
 def _measure(job: _Job) -> dict[str, Any]:
+    """Encode and decode in processes of their own and return the figures, with a "status" that tells success from each
+    kind of failure, and "why" it failed.
+    """
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         for step in ("encode", "decode"):
@@ -218,6 +232,10 @@ class _TooSlow(Exception):
 
 
 def _process(words: Iterable[str], timeout: float) -> dict[str, Any]:
+    """Run a worker process with some words of a command line, and return the figures that it prints as JSON. Raise
+    TimeoutExpired, _TooSlow or _Failed if it takes more than `timeout` seconds or its limit of processor time, or ends
+    with an error.
+    """
     command = [sys.executable, "-m", "bench.rd_worker", *words]
     options = {"cwd": ROOT, "env": os.environ | ONE_THREAD, "text": True, "start_new_session": True}
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options) as process:
@@ -248,8 +266,9 @@ def _print_progress(job: _Job, result: dict[str, Any]) -> None:
 def summary(
     contents: dict[str, list[dict[str, Any]]], names: list[str], bounds: Collection[float], in_short: bool = False
 ) -> dict[str, Any]:
-    """Return tables of the results of these clips and bounds; `in_short`: the one of all clips, and what has no
-    file."""
+    """Return tables and broken promises for the clips `names` and the error bounds `bounds`. With `in_short` there are
+    only the table of all clips and the list of results without a file, else a table for each clip as well.
+    """
     clips = [row for row in contents["clips"] if row["clip"] in names]
     points = [point for point in contents["points"] if point["clip"] in names and point["bound"] in (0, *bounds)]
     note = compare.losses(clips, points, bounds)
@@ -276,6 +295,9 @@ def title(clip: str) -> str:
 
 
 def _row(point: dict[str, Any]) -> dict[str, Any]:
+    """Return the table's row of one stored result: bytes, errors, seconds and megabytes of encoding and decoding, and
+    the codec's settings or the reason of a failure.
+    """
     megabytes = {name: point[name] / 1e6 for name in ("encode_peak_bytes", "decode_peak_bytes") if name in point}
     settings = point["settings"] if point["status"] == OK else f"{point['status'].upper()}: {point['why']}"
     return {

@@ -38,6 +38,9 @@ from bench.speed import processor_seconds
 
 
 def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
+    """Encode the clip at `clip_path` with a codec and write the bytes to `file`. `rel_bound` is the error bound over
+    the diagonal and `limit` the seconds of processor time allowed. Return the bytes, seconds, peak memory and settings.
+    """
     with athcodec.read(clip_path) as clip:
         source = Source(_with_branches(clip, codec, rel_bound))
         bound = rel_bound * source.diagonal
@@ -49,6 +52,9 @@ def encode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: fl
 
 
 def decode(codec: Codec, clip_path: str, rel_bound: float, file: Path, limit: float) -> dict[str, Any]:
+    """Decode the bytes of `file` with a codec and compare them with the clip at `clip_path`. `limit` is the seconds of
+    processor time allowed. Return errors, seconds, peak memory and bits per vertex and frame.
+    """
     data = file.read_bytes()
     codec.decode(data)  # a warm-up: only its memory counts
     peak = peak_bytes()
@@ -81,7 +87,9 @@ def _timed(step: Callable[[], Any], limit: float) -> tuple[float, float, Any]:
 
 
 def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, Any]:
-    """Return errors over the diagonal; "broken" describes a wrong type, shape or error."""
+    """Return the largest, RMS and Karni-Gotsman errors ("max", "rms", "kg") of decoded positions, the first two over
+    the diagonal. "broken" is a sentence, present if the type, the shape or the largest error is wrong.
+    """
     shape = source.positions.shape
     if getattr(decoded, "shape", None) != shape or decoded.dtype != np.float32:
         is_array = isinstance(decoded, np.ndarray)
@@ -97,8 +105,9 @@ def _errors(source: Source, decoded: np.ndarray, rel_bound: float) -> dict[str, 
 
 
 def _levels(data: bytes, clip: athcodec.MotionClip) -> dict[str, float | None]:
-    """Return how much a level's error exceeds that of the level before, and how much the file jerks at its seams, at
-    worst."""
+    """Return the worst growth of the error from one level of a file to the next, by largest and RMS error, and how much
+    the decoded motion and the source jerk at seams between segments.
+    """
     with athcodec.open(data, strict=True) as decoder:
         meters = measured_levels(decoder, clip)
 

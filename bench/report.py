@@ -32,7 +32,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def sections() -> Iterator[tuple[Path, str, str]]:
-    """Yield every part of a document that comes from a file of results that is there: document, name and text."""
+    """Yield each part of a document that is written from stored results: the document's path, the name of the part, and
+    its text. Parts whose results are not stored are left out.
+    """
     texts = {"features": features.table_text, "rd": compare.clips_text} | dict.fromkeys(rd.KEPT, compare.suite_text)
     for name, text in texts.items():
         file = rd.RESULTS / f"{name}.json"
@@ -57,7 +59,7 @@ def sections() -> Iterator[tuple[Path, str, str]]:
 
 
 def picture_text() -> str:
-    """Return what the moving picture shows, by the file that it shows."""
+    """Return the caption of the moving picture, with facts of the file that the picture shows."""
     path = athcodec.sample_path("leafed")
     with athcodec.open(path) as decoder:
         raw, size = decoder.file.info()["frames"] * decoder.file.vertex_count * 12, path.stat().st_size

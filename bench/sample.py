@@ -41,6 +41,9 @@ frame to its first, over the largest between two frames after each other.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench sample` to a parser: the plants to make, the folder to write to, the error bound and
+    the effort.
+    """
     parser.add_argument(
         "--only",
         nargs="+",
@@ -75,7 +78,9 @@ def _grown(folder: Path) -> tuple[dict[str, Any], list[str]]:
 
 
 def _made(name: str, args: argparse.Namespace) -> tuple[dict[str, Any], list[str]]:
-    """Return the table of one plant's file, and what of it is not within its bound."""
+    """Make and encode the sample of one plant. Return the table of its clips, and a line for each clip whose error
+    exceeds the bound.
+    """
     clip, out = PLANTS[name](), args.out / athcodec.sample_path(name).name
     ladder = LADDERS.get(name, DEFAULT_LADDER)
     athcodec.encode(clip, out, rel_error=args.rel_error, rest_error="bound", effort=args.effort, ladder=ladder)

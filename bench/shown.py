@@ -42,6 +42,9 @@ def picked(title: str, clips: tuple[str, ...] = (), **columns: str) -> Callable[
 
 
 def _sizes(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of file sizes, one per clip, with the bytes at each error bound in a column
+    of its own. `tables` has the stored tables by title.
+    """
     rows_of_clips: dict[str, Row] = {}
     for row in tables["Sizes"]:
         shown = rows_of_clips.setdefault(
@@ -52,6 +55,9 @@ def _sizes(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _levels(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of levels: bytes up to the level, RMS errors and gaps, beside those of the
+    paper's method.
+    """
     gaps = {(row["clip"], row["level"]): row for row in tables["Gaps at the attach points"]}
     rows = []
     for row in tables["Levels"]:
@@ -63,6 +69,9 @@ def _levels(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _prefixes(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of prefixes of files with layers: bytes and error of each prefix, and its
+    bytes over those of a file encoded directly at the same error.
+    """
     return [
         {"clip": row["clip"], "level": row["level"], "prefix": row["bytes"], "largest error": row["max"]}
         | {"own file": row["own at max"], "prefix / own": row["/own at max"], "at equal RMS": row["/own at RMS"]}
@@ -73,6 +82,9 @@ def _prefixes(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _ladders(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of bytes at round errors on one clip: with layers, without layers, and of a
+    file encoded directly at that error.
+    """
     rows_of_errors: dict[float, Row] = {}
     names = {"layers": "default", "none": "--ladder none"}
     for row in tables["At an error"]:
@@ -103,6 +115,9 @@ def _decoding(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _structure(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of scenes: bytes with branches that athcodec finds, over those with named
+    branches and over those of the parts encoded alone.
+    """
     defaults = {row["scene"]: row for row in tables["Default options"]}
     rows = []
     for row in tables["Found against true branches and against parts"]:
@@ -116,6 +131,9 @@ def _structure(tables: dict[str, list[Row]]) -> list[Row]:
 
 
 def _onto(tables: dict[str, list[Row]]) -> list[Row]:
+    """Return the rows of a document's table of meshes that move by a skeleton's file: bytes, distances from the mesh's
+    own motion, stretch of edges and gaps at joints.
+    """
     return [
         {name: row[name] for name in ("clip", "nodes", "vertices", "frames")}
         | {"skeleton's file": row["skeleton bytes"], "mesh's own file": row["mesh bytes"], "diagonal": row["size"]}

@@ -41,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Encode each clip at each error bound, effort and ladder of layers, and check the errors by decoding. Return
+    tables of sizes, of bytes per kind of chunk and of the encoder's choices, and lines about bounds that are not kept.
+    """
     sizes, chunks, choices, broken = [], [], [], []
     for path in args.clips:
         for rel_error in args.rel_error:
@@ -66,6 +69,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _size_row(result: Encoded, meter: ErrorMeter, rel_error: float) -> dict[str, Any]:
+    """Return the row of one file: bytes, compression ratio, bits per vertex and frame, its largest error over the
+    bound, whether the bound is kept, and further errors. `rel_error` is the bound over the diagonal.
+    """
     summary, clip = result.summary, result.clip
     # the bound in the file, and the one requested on the diagonal as measured here
     bound = min(summary.max_error_bound, rel_error * meter.diagonal)

@@ -45,6 +45,9 @@ Differ: which of the choices that a summary names are others then, beside steps.
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench speed` to a parser: clips or all suites, the error bound, and whether samples of
+    plants are measured.
+    """
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument("--all", action="store_true", help="all clips of all suites, made if they are missing")
@@ -56,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Measure how long encoding and decoding take on each clip. Return the tables, and lines about clips whose encoding
+    takes more processor time than its limit.
+    """
     names = dict.fromkeys(name for suite in data.SUITES.values() for name in suite)
     rows = [_row(path, args.rel_error) for path in (map(data.path_of, names) if args.all else args.clips)]
     tables = [table(f"Speed, bound {args.rel_error:g}, medians in seconds", rows, NOTE)]
@@ -68,6 +74,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _row(path: Path, rel_error: float) -> dict[str, Any]:
+    """Return the row of one clip: seconds of encoding, processor time over its limit, and seconds of decoding and of
+    showing one frame, beside reading gzip-compressed HDF5.
+    """
     with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
         file, gzip = Path(folder) / "clip.ath", Path(folder) / "clip.h5"
         work, middle = clip.frame_count * clip.vertex_count, clip.frame_count // 2
@@ -108,7 +117,9 @@ def _row(path: Path, rel_error: float) -> dict[str, Any]:
 
 
 def _sample_row(path: Path, rel_error: float) -> dict[str, Any]:
-    """Compare a file whose choices are made on a sample of the plant with one whose choices are made on all of it."""
+    """Encode a clip twice, with the encoder's choices made on a sample of the plant and on all of it. Return the bytes
+    and the processor time of the first as fractions of the second's, and the names of choices that differ.
+    """
     summaries, seconds, large = [], [], sample.LARGE
     try:
         for sample.LARGE in (large, sys.maxsize):
@@ -137,7 +148,9 @@ def processor_seconds() -> float:
 
 
 def _in_turns(*steps: Callable[[], None]) -> list[float]:
-    """Return the median seconds of each step; steps alternate, after a warm-up round."""
+    """Return the median seconds of each step. The steps are called one after the other in several rounds, after one
+    that is not counted.
+    """
     seconds: list[list[float]] = []
     for _ in range(DECODES + 1):
         seconds.append([])

@@ -38,7 +38,9 @@ class Store:
         return result if is_right else None
 
     def add(self, name: str, result: dict[str, Any]) -> dict[str, Any]:
-        """Add or replace a result of this command and commit, and replaces the file in one step."""
+        """Add a result to the table `name`, or replace the one with the same key, together with the commit that
+        measured it. The file is rewritten in one step. Return the stored result.
+        """
         result = result | {name: self._environment[name] for name in ("command", "commit")}
         self._results[name][self._key(name, result)] = result
         if self.file is not None:
@@ -69,6 +71,9 @@ def commits(results: Iterable[Mapping[str, Any]]) -> str:
 
 
 def _table_of(results: Results) -> dict[str, Any]:
+    """Return results as columns and rows, which are shorter as JSON: texts, lists and mappings stand in "distinct", and
+    the rows have their numbers.
+    """
     columns = list(dict.fromkeys(column for result in results for column in result))
     distinct: dict[str, dict[str, int]] = {
         column: {} for column in columns if any(isinstance(result.get(column), (str, list, dict)) for result in results)
@@ -85,6 +90,7 @@ def _table_of(results: Results) -> dict[str, Any]:
 
 
 def _results_of(table: dict[str, Any]) -> Results:
+    """Return the results that `_table_of` has turned into columns and rows."""
     distinct = table["distinct"]
     return [
         {
@@ -97,7 +103,9 @@ def _results_of(table: dict[str, Any]) -> Results:
 
 
 def _layout(value: Any, newline: str = "\n") -> str:
-    """Return JSON with a line for each value of an object and each item of a list."""
+    """Return a value as JSON text with a line for each value of an object and each item of a list. `newline` is the
+    line break with the indentation so far.
+    """
     if isinstance(value, dict):
         items = [f"{json.dumps(name)}: {_layout(item, newline + ' ')}" for name, item in value.items()]
     elif isinstance(value, list):

@@ -27,7 +27,9 @@ def cases(words: Iterable[str], suite: str) -> list[Case]:
 
 
 def _case(word: str) -> Case:
-    """Return the case for a file, or for a clip of this name, which is made if it is not there."""
+    """Return the case of a word: the file at that path, or else the clip of that name, which is made if it does not
+    exist yet.
+    """
     if Path(word).is_file():
         return Case(Path(word).stem, Path(word), "given on the command line")
     if word not in (data.SAMPLE, *data.RECIPES):

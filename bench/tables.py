@@ -29,7 +29,9 @@ def table(title: str, rows: list[dict[str, Any]], *notes: str) -> dict[str, Any]
 
 
 def environment(argv: Sequence[str]) -> dict[str, Any]:
-    """Return the command (paths by their last part only), commit, versions and machine."""
+    """Return what a result depends on beside its input: the command, with paths reduced to their last part, the commit,
+    the versions of packages, and the machine.
+    """
     words = [Path(word).name if os.sep in word else word for word in argv]
     versions = {"python": platform.python_version()} | {name: version(name) for name in DISTRIBUTIONS}
     system = f"{platform.system()} {platform.machine()}"
@@ -42,8 +44,9 @@ def environment(argv: Sequence[str]) -> dict[str, Any]:
 
 @cache
 def commit(code: tuple[str, ...] = CODE) -> str:
-    """Return the commit of the clone that measures, with a mark if code at these paths has changed since; "unknown"
-    outside a clone."""
+    """Return the hash of the clone's current commit, with a mark if files below the paths `code` have changed since, or
+    "unknown" outside a clone.
+    """
 
     def git(*words: str) -> str:
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
@@ -69,9 +72,9 @@ def write_json(result: dict[str, Any], file: Path) -> None:
 
 
 def as_text(result: dict[str, Any]) -> str:
-    """Return the output of a verb: tables, broken lines, commit, machine.
+    """Return the result of a verb as text: its tables, the lines about broken promises, the commit and the machine.
 
-    Notes that several tables have in common are printed below the first one.
+    Notes that several tables have in common are printed below the first of them.
     """
     parts, printed = [], set()
     for part in result["tables"]:
@@ -108,6 +111,7 @@ def _column(name: str, values: list[Any]) -> list[str]:
 
 
 def _cell(value: Any) -> str:
+    """Return a value as the text of a table's cell: rounded numbers, "yes" or "no", and a sign for missing values."""
     if value is None:
         return MISSING
     if isinstance(value, bool):

@@ -73,6 +73,9 @@ class _Handler(BaseHTTPRequestHandler):
     server: ThrottledServer
 
     def do_GET(self) -> None:
+        """Answer a request with a file in memory at the limited rate, with a file of the viewer's page at once, or with
+        status 404.
+        """
         name = unquote(self.path.split("?")[0]).lstrip("/") or "index.html"
         if name in self.server.files:
             self._file(name, self.server.files[name])
@@ -82,6 +85,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._respond(404, b"", {})
 
     def _file(self, name: str, data: bytes) -> None:
+        """Send a file of `data`, or the range of bytes that the request names, at the limited rate, and log the name,
+        the first byte and the number of bytes sent.
+        """
         requested = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", "")) if self.server.ranges else None
         first, last = (int(requested[1]), min(int(requested[2]), len(data) - 1)) if requested else (0, len(data) - 1)
         entry = [name, first, 0]
@@ -95,6 +101,9 @@ class _Handler(BaseHTTPRequestHandler):
         self._respond(206 if requested else 200, data[first : last + 1], headers, entry)
 
     def _respond(self, status: int, body: bytes, headers: dict[str, str], entry: list | None = None) -> None:
+        """Send a status, headers and a body. With `entry`, an item of the log, the body is sent at the limited rate,
+        and the item's last number counts the bytes sent.
+        """
         self.send_response(status)
         for name, value in (headers | {"Content-Length": str(len(body))}).items():
             self.send_header(name, value)

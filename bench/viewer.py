@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Take a screenshot of the viewer that compares two levels of one clip's file, and return a table that names it."""
     [clip] = args.clips
     with encoded(clip, args.rel_error, ladder=LADDERS["decades"]) as result, chromium() as browser:
         data, right = result.summary.path.read_bytes(), result.decoder.file.deepest - 1

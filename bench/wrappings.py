@@ -34,6 +34,7 @@ normals, for programs that do not know ATH_motion, and is the rest pose of the m
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bench wrappings` to a parser: clips, the error bound, and the largest number of joints."""
     add_clips(parser)
     add_rel_error(parser)
     parser.add_argument(
@@ -46,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Write each clip to the files that other programs open and return the table of their bytes and errors, and lines
+    about .ath files that exceed the bound.
+    """
     rows, broken = [], []
     for path in args.clips:
         with tempfile.TemporaryDirectory() as folder, athcodec.read(path) as clip:
@@ -66,6 +70,9 @@ class _Wrappings:
         self._diagonal = _diagonal(clip)
 
     def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield a row for each kind of file: its name, its bytes and its largest error over the diagonal. Formats that
+        refuse the clip get a row with the reason.
+        """
         yield self._row("float32", 12 * self._clip.frame_count * self._clip.vertex_count, 0.0)
         for name, file, options in (
             ("USD crate", "a.usdc", {}),
@@ -102,6 +109,9 @@ class _Wrappings:
             return _largest(self._clip, blocks) / self._diagonal
 
     def _ours(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of the .ath file alone, of an .ath file that a USD layer references, and of a GLB with the
+        motion inside.
+        """
         path, settings = self._folder / "ours.ath", {"rel_error": self._bound, "rest_error": "bound", "ladder": "none"}
         athcodec.encode(self._clip, path, **settings)
         with athcodec.open(path) as decoder:
@@ -113,6 +123,9 @@ class _Wrappings:
             yield self._in_gltf(settings)
 
     def _in_gltf(self, settings: dict[str, Any]) -> dict[str, Any]:
+        """Put the clip's motion into the GLB that was written before and return its row. `settings` are the options of
+        the encoder.
+        """
         path, glb = self._folder / "inside.ath", self._folder / "ours.glb"
         with Into(self._folder / "a.glb", ReadOptions()) as into:
             clip = into.clip.replace(positions=into.clip.block(0, into.clip.frame_count))

@@ -168,6 +168,9 @@ def failures(decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()
 
 
 def asked(chosen: list[Vector], without: Iterable[str] = ()) -> list[tuple[Vector, str]]:
+    """Return pairs of a vector and an item that a decoder is asked for, but for the items in `without`; "levels" there
+    leaves out all levels, and "limits" all items that exceed a limit.
+    """
     left_out = set(without)
     return [
         (vector, item)
@@ -192,7 +195,9 @@ class Approximately:
         self.largest = 0.0
 
     def failures(self, decoder: Decoder, chosen: list[Vector], without: Iterable[str] = ()) -> Iterator[str]:
-        """Yield a line for each item whose result is not what it should be, positions within their tolerance."""
+        """Yield a line for each item whose result is wrong. Positions may differ from those of an exact decoder by a
+        tolerance.
+        """
         jobs = [job for job in asked(chosen, without) if not is_position(*job) or is_measured(*job)]
         for (vector, item), answer in zip(jobs, decoder(jobs), strict=True):
             if not is_position(vector, item) or isinstance(answer, Exception):
@@ -204,7 +209,9 @@ class Approximately:
                 yield f"{vector.name}, {item}: got positions {got:.3g} tolerances from those of an exact decoder"
 
     def tolerances(self, vector: Vector, level: int, answer: bytes) -> float:
-        """Return how far the furthest vertex of an answer is from where it should be."""
+        """Return how far the furthest vertex of a decoder's answer is from its exact position, in tolerances: 1 is the
+        largest distance allowed, and infinity means an answer of another length.
+        """
         data = vector.path.read_bytes()
         kind = positions_type(data)
         exact, deepest = (np.frombuffer(package(data, str(at), vector.mesh), kind) for at in (level, last_level(data)))
@@ -288,6 +295,9 @@ def command(words: list[str]) -> Decoder:
 
 
 def ask_command(words: list[str | Path]) -> bytes | Exception:
+    """Run a decoder's command line and return what it writes to standard output. Return, and do not raise, Refused with
+    the error's name that it prints, or OSError if it crashes or takes too long.
+    """
     try:
         done = subprocess.run(words, capture_output=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
@@ -301,7 +311,9 @@ def ask_command(words: list[str | Path]) -> bytes | Exception:
 
 
 def one_by_one(ask: Callable[[bytes, str, bytes | None], bytes]) -> Decoder:
-    """Yield a function that takes a file's bytes, an item and the host's mesh, and may raise Refused."""
+    """Return a decoder that answers a list of vectors and items one after the other. `ask` takes a file's bytes, an
+    item and the host's mesh, and returns the answer or raises Refused.
+    """
 
     def decoder(jobs: list[tuple[Vector, str]]) -> Iterator[bytes | Exception]:
         for vector, item in jobs:
@@ -341,7 +353,9 @@ def small_document(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
 
 
 def package(data: bytes, item: str, mesh: bytes | None = None, is_small: bool = False) -> bytes:
-    """Return the C core through Python, and the package's reader of static data."""
+    """Return the answer of this package, the C core through Python, to an item about a file. `mesh` has the bytes of
+    the host's mesh and `is_small` selects the limits of the small profile; raise Refused if the file is refused.
+    """
     import athcodec
     from athcodec.decoding.container import Limits
     from athcodec.errors import FormatError, LevelUnavailable
@@ -359,6 +373,9 @@ def package(data: bytes, item: str, mesh: bytes | None = None, is_small: bool = 
 
 
 def ask_package(decoder, item: str) -> bytes:
+    """Return the bytes that answer an item, from an opened file: positions of a level, the rest pose, the times, the
+    clips or the static data; no bytes for items that only open the file.
+    """
     if item in NO_ANSWER:
         return b""
     if item == "rest":
@@ -379,6 +396,7 @@ def by_document(clip) -> SimpleNamespace:
 
 
 def metadata_text(decoder) -> bytes:
+    """Return the metadata of a file as its stored JSON text, or no bytes if the file has none."""
     from athcodec.decoding import container
 
     _ = decoder.metadata  # refuses what is no JSON object
@@ -440,7 +458,9 @@ console.log(JSON.stringify(answers));
 
 
 def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[bytes | Exception]:
-    """Return the decoder for web pages, in Node. It opens for streaming and returns static data as stored."""
+    """Return the answers of the decoder for web pages, which runs in Node, to pairs of a vector and an item. The
+    decoder opens files for streaming and returns static data as stored; an error is returned in place of an answer.
+    """
     node = shutil.which("node")
     if node is None:
         raise OSError("node: got none on PATH; expected Node.js 18 or newer")
@@ -463,7 +483,9 @@ def web_assembly(jobs: list[tuple[Vector, str]], profile: str = "full") -> list[
 
 
 def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
-    """Return the answer for a complete file: bytes that are missing are errors."""
+    """Return the bytes of an answer of the decoder in Node, or the error that it stands for. A complete file is
+    assumed, so missing bytes mean a file that is truncated.
+    """
     if "bytes" in answer:
         return base64.b64decode(answer["bytes"])
     if "fault" in answer:
@@ -474,8 +496,9 @@ def node_answer(vector: Vector, answer: dict) -> bytes | Exception:
 
 
 def gpu_form(data: bytes, item: str, mesh: bytes | None = None) -> bytes:
-    """Return the passes of docs/gpu.md in float32, whose positions Origin is added to; all else is the package's
-    answer."""
+    """Return the answer to an item about a file. Positions are computed by the passes of docs/gpu.md in float32, with
+    the file's origin added; all other items are answered by the package.
+    """
     from athcodec.gpu import GpuFile
     from athcodec.gpu.evaluate import Passes, Source
 
@@ -510,6 +533,9 @@ OWN_APPROXIMATE = {"gpu": Own(one_by_one(gpu_form), one_by_one(gpu_form), ("stat
 
 
 def main(words: list[str] | None = None) -> int:
+    """Test a decoder against the vectors, and print the failures and a summary. Return the exit status: 0 if there are
+    no failures.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m spec.conformance",
         description="Tests a decoder of .ath files against the vectors of spec/vectors.",

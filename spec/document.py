@@ -44,7 +44,9 @@ def section(title: str) -> str:
 
 
 def table(title: str, first_column: str) -> list[dict[str, str]]:
-    """Return the rows of the first table of a section whose first column has this name."""
+    """Return the rows of a table of FORMAT.md as mappings from the column's name to the cell. It is the first table in
+    the section `title` whose first column is named `first_column`.
+    """
     lines = section(title).splitlines()
     start = next(i for i, line in enumerate(lines) if line.startswith(f"| {first_column} |"))
     rows = []
@@ -88,7 +90,7 @@ def single(x: float) -> float:
 
 
 def is_json_object(text: bytes) -> bool:
-    """Return whether it is a JSON object as of FORMAT.md, "JSON"."""
+    """Return whether UTF-8 bytes are a JSON object by the rules of FORMAT.md, "JSON"."""
 
     def unique(pairs: list) -> dict:
         if len(dict(pairs)) < len(pairs):
@@ -109,6 +111,9 @@ def is_json_object(text: bytes) -> bool:
 
 
 def zstd_frame(data: bytes) -> SimpleNamespace:
+    """Read a zstd frame, and return its window size, its stated content size and its content; the latter two are None
+    if they are not stated or the frame is damaged.
+    """
     frame = SimpleNamespace(window_size=0, content_size=None, content=None)
     if len(data) >= 6 and not data[4] & 0x20:  # without Single_Segment_flag: RFC 8878, 3.1.1.1.2
         least = 1 << (10 + (data[5] >> 3))
@@ -179,7 +184,9 @@ def compiled(text: str) -> types.CodeType:
 
 
 def run(text: str = TEXT) -> types.ModuleType:
-    """Return a module in which all blocks have been executed; line numbers are those of the text."""
+    """Execute all Python blocks of FORMAT.md, or of another text, and return them as one module. Line numbers in errors
+    are those of the text.
+    """
     module = types.ModuleType("FORMAT")
     names = module.__dict__
 
@@ -253,7 +260,7 @@ class File:
         return self.rules.read_static(self.file)[1]
 
     def answer(self, item: str) -> bytes:
-        """Return the answer to an item of conformance.py."""
+        """Return the bytes that answer an item of conformance.py, such as "rest", "time" or the number of a level."""
         if item in ("strict", "open"):
             return b""
         if item == "time":
@@ -274,6 +281,9 @@ def clip_entry(clip) -> bytes:
 
 
 def main(words: list[str] | None = None) -> int:
+    """Write an item of a file to standard output, decoded as FORMAT.md says. Return the exit status: 1 if the file is
+    refused or cannot be read.
+    """
     parser = argparse.ArgumentParser(prog="python -m spec.document", description="Decodes a file as FORMAT.md says.")
     parser.add_argument("file", type=Path)
     parser.add_argument("item", nargs="?", default="open", help="what is written to standard output, raw: a level, ...")

@@ -21,7 +21,7 @@ Part = tuple[int, str]  # A number of bytes, and what they say.
 
 
 def lines(data: bytes) -> Iterator[str]:
-    """Yield the dump of a file, line by line."""
+    """Yield the lines of a dump of a file: the bytes in hexadecimal, each group with what it says."""
     at = 0
     for size, text in parts(data):
         words = textwrap.wrap(text, TEXT_WIDTH)
@@ -35,6 +35,7 @@ def lines(data: bytes) -> Iterator[str]:
 
 
 def parts(data: bytes) -> Iterator[Part]:
+    """Yield the parts of a file in order, as pairs of a number of bytes and a text that says what they mean."""
     file = rules.open_file(data, True)
     header, table = rules.decode_front(data[24 : rules.u32(data, 16) - 4 * rules.u32(data, 20)], rules.u32(data, 20))
     yield 8, "Magic"
@@ -59,6 +60,9 @@ def name(kind: int, level: int | None, segment: int, length: int) -> str:
 
 
 def front(header, table: list) -> str:
+    """Return a sentence on what the coded front of a file says: its counts, its levels, its chunks and the errors of
+    its levels.
+    """
     counts = "place branch frame segment full_level level clip layer vertex".split()
     facts = [f"{word.title()}_Count {getattr(header, word + '_count')}" for word in counts]
     facts += [f"Is_Float64 {header.is_float64}", f"Is_Predicted {header.is_predicted}", f"Max_Error {header.max_error}"]
@@ -71,6 +75,9 @@ def front(header, table: list) -> str:
 
 
 def described(file, chunk: tuple, content: bytes) -> Iterator[Part]:
+    """Yield the parts of one chunk, as pairs of a number of bytes and a text. `chunk` is a tuple of kind, level,
+    segment and length.
+    """
     kind, level, segment, length = chunk
     title = name(*chunk)
     if kind == rules.HIERARCHY:
@@ -95,7 +102,7 @@ def described(file, chunk: tuple, content: bytes) -> Iterator[Part]:
 
 
 def rows(file, level: int, segment: int) -> str:
-    """Return the rows that STEMS of a level adds for the first piece."""
+    """Return as text the rows of integers that the chunk STEMS of a level adds for the first piece in a segment."""
     plan = rules.plans_of(file, level)[0]
     motion = rules.decode_motion(file, plan, segment, level)
     piece = plan.pieces[0]

@@ -50,6 +50,9 @@ class Growing:
         return len(self.parents) - 1
 
     def tube(self, parent: int, joint: np.ndarray, end: np.ndarray, rings: int, radius: float) -> int:
+        """Add a branch that is a tapering tube of `rings` rings from `joint` (3,) to `end` (3,), on the branch
+        `parent`. Return the new branch's number.
+        """
         along = np.linspace(0.0, 1.0, rings)[:, None, None]
         across = np.linalg.svd((end - joint)[None])[2][1:]
         angle = 2 * np.pi * np.arange(SIDES) / SIDES
@@ -73,7 +76,9 @@ class Growing:
 
 
 def tree(seed: int = 3) -> Growing:
-    """Return a trunk and limbs that are tubes, twigs that are lines, leaves, and a stone beside."""
+    """Return a plant of a trunk and limbs that are tubes, twigs that are lines of points, leaves, and a stone beside
+    them.
+    """
     plant = Growing(seed)
     random = plant.random
     trunk = plant.tube(-1, np.zeros(3), np.array([0.1, 0.0, 3.0]), 14, 0.08)
@@ -100,7 +105,10 @@ def tree(seed: int = 3) -> Growing:
 
 
 def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float, gust: float) -> np.ndarray:
-    """Return (frames, vertices, 3): branches turn about where they hang, and carry others along."""
+    """Return positions (frames, vertices, 3) of a plant whose branches turn about their joints and carry the branches
+    on them. `wind` and `gust` are amplitudes, `turns` the number of periods in the clip, and `noise` the noise of each
+    position.
+    """
     time = np.linspace(0.0, 1.0, frames, endpoint=False)
     gusts = plant.random.normal(size=frames) * gust
     turned: list[tuple[np.ndarray, np.ndarray]] = []  # For each branch: matrix and shift of each frame.
@@ -121,7 +129,9 @@ def motion(plant: Growing, frames: int, wind: float, turns: float, noise: float,
 
 
 def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: bool) -> np.ndarray:
-    """Return (frames, 3, 3) about two axes."""
+    """Return rotation matrices (frames, 3, 3) of branch number `b` about two axes. `turns` is the number of periods in
+    the clip, and `flutters` adds a faster motion.
+    """
     a, c = (
         wind * size * np.sin(2 * np.pi * (turns * k * time) + phase * b)
         for size, k, phase in ((0.08, 1, 0.7), (0.3 if flutters else 0.04, 3, 1.9))
@@ -133,7 +143,9 @@ def rotations(b: int, time: np.ndarray, wind: float, turns: float, flutters: boo
 
 
 def clip(name: str) -> Any:
-    """Return a wind in which poses are held, at times of their own, and a loop."""
+    """Return the clip that a vector's name selects: sway in wind with frames that repeat and uneven times, a loop, or
+    several of these.
+    """
     import athcodec
     from athcodec.motion.clip import MotionClip
 
@@ -153,6 +165,9 @@ def clip(name: str) -> Any:
     wind[20:23] = wind[19]
 
     def clip_of(positions: np.ndarray, jitter: float) -> MotionClip:
+        """Return positions (T, V, 3) as a clip of the plant, with its branches, faces and attributes. `jitter` is the
+        largest random shift of the times, in seconds.
+        """
         return MotionClip(
             positions=positions[:, place].astype(np.float32),
             rest=rest[place],
@@ -179,8 +194,9 @@ def plant_colours(plant: Growing) -> np.ndarray:
 
 
 def encoded(name: str) -> bytes:
-    """Return as athcodec writes it; whether that pays or not, one has layers about the mean pose, one refines its rest
-    pose, and one moves about its exact rest pose."""
+    """Return the bytes of a real-size plant's file as athcodec writes it. `name` selects the clip and forces features:
+    layers about the mean pose, a refined rest pose, or motion about the exact rest pose.
+    """
     import athcodec
     from athcodec.encoding.search import start
     from athcodec.encoding.search.search import Search
@@ -202,7 +218,7 @@ def encoded(name: str) -> bytes:
 
 
 def features(data: bytes) -> set[str]:
-    """Return what a file uses of the format."""
+    """Return the names of the features of the format that a file uses."""
     opened = File(data, strict=True)
     file, header = opened.file, opened.header
     of_refinements = file.parts.height + 1  # above it STEMS begin with Ratio

@@ -35,6 +35,7 @@ def classes() -> list[str]:
 
 
 def run_class(name: str, seconds: float) -> dict:
+    """Run one class of tests for about `seconds` and return its record: the counts, figures, commit and machine."""
     tested = commit(CODE)  # Before the run, which may take hours.
     module = importlib.import_module(f"spec.robust.{name}")
     start = time.perf_counter()
@@ -52,6 +53,7 @@ def run_class(name: str, seconds: float) -> dict:
 
 
 def as_markdown(results: dict[str, dict]) -> str:
+    """Return the records of all classes as the text of the document robustness.md."""
     lines = [
         "# Robustness",
         "",
@@ -81,6 +83,9 @@ def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
+    """Run the chosen classes of tests, and store their records and the document. Return the exit status: 1 if there are
+    faults.
+    """
     args = arguments(argv)
     record = args.out / "robustness.json"
     results = json.loads(record.read_text()) if record.exists() else {}

@@ -48,6 +48,9 @@ class Chance(Script):
         self.random, self.empty, self.large = np.random.default_rng(seed), empty, large
 
     def answer(self, asked: str, most: int):
+        """Return the next given value, or else a random value of the kind `asked`: "count", "bit", "corner", "signed"
+        or another number. `most` is the largest value of a count or corner.
+        """
         if self.values:
             return self.values.popleft()
         if asked == "count":
@@ -126,7 +129,9 @@ def scripted_count(original: Callable, coder, model, history, above, rank):
 
 
 def scripted_exact(original: Callable, coder, model, n, expected, before):
-    """Return the script has the number, or (magnitude, negative) of its difference from the predicted one."""
+    """Code an exact floating-point number of `n` bits in place of the rule `original`. The script has the number, or a
+    pair of the magnitude and the sign of its difference from the `expected` one.
+    """
     value = coder.script.answer("exact", 0)
     if not isinstance(value, tuple):
         likely = rules.single(expected) if n == 32 else expected
@@ -138,7 +143,9 @@ def scripted_exact(original: Callable, coder, model, n, expected, before):
 
 
 def scripted_corner(original: Callable, coder, model, bound, corners, first, j, previous):
-    """Code a corner whose vertex the script has. It is coded as the first thing that says it."""
+    """Code the next corner of a face, whose vertex the script has, in place of the rule `original`. It is coded in the
+    first way that can express the vertex.
+    """
     vertex, script = coder.script.answer("corner", bound - 1), coder.script
     seen = copy(model)
     seen.ways = [dict(table) for table in model.ways]
@@ -150,7 +157,9 @@ def scripted_corner(original: Callable, coder, model, bound, corners, first, j, 
 
 
 def corner_decisions(model, bound, corners, first, j, previous, vertex) -> list[int]:
-    """Return up to the number of a vertex that is said by its distance."""
+    """Return the binary decisions that code a corner, up to the point at which its vertex is coded by its distance from
+    another.
+    """
     followed = [rules.follow(model, corners, table, length) for table, length in ((0, 12), (1, 3))]
     expected, bits = rules.repeated(corners, model.followed or followed[0], bound), []
     guesses = [rules.repeated(corners, followed[1], bound), model.next if model.next < bound else None]
@@ -196,7 +205,9 @@ SCRIPTED = {
 
 @contextmanager
 def scripted(script: Script, decisions: bool = False) -> Iterator[list[ScriptedCoder]]:
-    """Return FORMAT.md's code as a writer; the coder that it makes is put into the list. decisions: see `write`."""
+    """Turn FORMAT.md's decoder into a writer while the context lasts, and yield a list that will hold the coder that it
+    makes. With `decisions`, the script has single binary decisions instead of values.
+    """
     made: list[ScriptedCoder] = []
 
     def coder(_: bytes) -> ScriptedCoder:
@@ -290,6 +301,7 @@ class FrontScript:
     """Values of the front stream. It follows the contexts of the chunk table as far as they decide what is read."""
 
     def __init__(self, counts: dict):
+        """Begin the integers that code the front of a file with the fields of its header, by name."""
         self.counts = counts
         self.values = [
             *(counts[f"{name}_count"] - 1 for name in ("place", "branch", "frame", "segment")),
@@ -309,6 +321,7 @@ class FrontScript:
         self.bits, self.before, self.was_motion, self.place = [8] * (rules.OTHER + 1), rules.OTHER, False, (0, 0)
 
     def add_chunk(self, entry: Entry) -> None:
+        """Add the integers that code the table's entry of a chunk: its kind, level, segment and length."""
         known = entry.kind in rules.KINDS and not entry.spelt and entry.number is None
         index = rules.KINDS.index(entry.kind) if known else rules.OTHER
         number = index if entry.number is None else entry.number
@@ -329,7 +342,7 @@ class FrontScript:
         self.place = place
 
     def add_errors(self, errors: Sequence[int]) -> None:
-        """Add stored numbers, three of each level and segment."""
+        """Add the stored errors: three integers for each level and segment."""
         first = min(rules.to_bits(rules.single(self.counts["max_error"]), 32) >> 18, rules.SHORT_FLOATS - 1)
         row, above = 3 * self.counts["segment_count"], [first] * 3
         for start in range(0, len(errors), row):
@@ -341,7 +354,7 @@ class FrontScript:
             above = errors[start : start + 3]
 
     def add_joins(self, joins: Sequence[Join]) -> None:
-        """Add one join of each level and segment; a sloped one of width 0 is said, and not valid."""
+        """Add one join for each level and segment. A sloped join of width 0 can be written, but is not valid."""
         last = 16
         for join in joins if self.counts["segment_count"] > 1 else ():
             is_said = join.width != 0 or join.is_sloped
@@ -372,6 +385,7 @@ class Draft:
     stream: Callable[[bytes], bytes] | None = None  # Change of the front stream.
 
     def file(self) -> bytes:
+        """Return the bytes of the whole file."""
         fields = (
             dict(
                 magic=rules.MAGIC,
@@ -404,6 +418,9 @@ class Draft:
         return front + b"".join(entry.content for entry in self.entries)
 
     def _stream(self, fields: dict) -> bytes:
+        """Return the coded stream of the front, with the header's `fields`, the table of chunks, errors, joins and
+        repeats.
+        """
         script = FrontScript(fields)
         for entry in self.entries:
             script.add_chunk(entry)
@@ -465,6 +482,9 @@ class Stem:
 
 
 def hierarchy_script(stems: list[Stem], branch_source: list | None = None, vertex_source: list | None = None) -> list:
+    """Return the integers that code a hierarchy of stems. `branch_source` and `vertex_source` have the source's numbers
+    of branches and vertices; None means the predicted order.
+    """
     script, lag = [], 0
     for b, stem in enumerate(stems):
         up, ancestor = 0, b - 1
@@ -491,7 +511,9 @@ def hierarchy_script(stems: list[Stem], branch_source: list | None = None, verte
 
 
 def numbers_script(lags_and_numbers: list[tuple[int, int]]) -> list:
-    """Return script of a number of each branch."""
+    """Return the integers that code a number for each branch, given pairs of the branch's lag, which selects the
+    prediction, and the number.
+    """
     if not any(number for _, number in lags_and_numbers):
         return [0]
     script, last = [1], [0] * 16
@@ -503,7 +525,9 @@ def numbers_script(lags_and_numbers: list[tuple[int, int]]) -> list:
 
 
 def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool, branch_source=None) -> list:
-    """Return script of a permutation; None: the predicted one."""
+    """Return the integers that code a permutation, of vertices or of branches; None stands for the predicted
+    permutation.
+    """
     if source is None:
         return [0]
     runs = [(0, len(stems))]
@@ -535,7 +559,9 @@ def permutation_script(source: list | None, stems: list[Stem], of_vertices: bool
 
 
 def grown(stems: list[Stem], seed: int = 0, size: int = 4) -> list[list[float]]:
-    """Return integer positions of stems that are random walks."""
+    """Return positions of stems, as lists of three whole numbers, that are random walks from the place where each stem
+    hangs.
+    """
     random, points, first = np.random.default_rng(seed), [], []
     for stem in stems:
         first.append(len(points))
@@ -613,7 +639,7 @@ def predicted_head(step: float = 0.0625) -> bytes:
 
 
 def basis_stream(rows: list[list[int]]) -> bytes:
-    """Return a learned basis over time of these integers."""
+    """Return the stream that codes a learned basis over time with rows of integers."""
     script = []
     for integers in rows:
         before = slope = 0
@@ -686,6 +712,7 @@ class Plant:
     predicted: bytes | None = None  # Predicted motion, Step and Settings; then AFFINES are there only with a script.
 
     def draft(self) -> Draft:
+        """Return the draft of the plant's file, with its hierarchy, rest pose, times and all segments."""
         vertices = sum(stem.count for stem in self.stems)
         stream = write(
             rules.decode_hierarchy,
@@ -750,6 +777,7 @@ class Plant:
     with_header, upto = map(_of_draft, ("with_header", "upto"))
 
     def _rest(self, branches: list) -> bytes:
+        """Return the content of the chunk REST: the host's mesh, given bytes, or coded points."""
         if self.mesh is not None:
             return host_rest_chunk(self.mesh, self.origin)
         if self.rest is not None:
@@ -763,7 +791,9 @@ class Plant:
         return rest_chunk(write(rules.decode_exact_rest, numbers, branches, self.is_float64), exact=1, **fields)
 
     def _decoded_rest(self, branches: list, chunk: bytes, place_of: list):
-        """Return the rest pose of REST; `rows` is None where it is exact or the host's."""
+        """Return the rest pose that a decoder gets from the chunk REST. Its `rows` is None if the rest pose is exact or
+        the host's mesh.
+        """
         origin, body, self.connectivity = struct.unpack_from("<3f", chunk, 1), chunk[17:], None
         if self.faces is not None and chunk[0] & REST_CONNECTED:
             self.connectivity = mesh_of(self.faces, place_of, self.places)
@@ -781,7 +811,7 @@ class Plant:
         return self._write(rules.decode_shapes, (rules.SHAPES, level, 0), self.plan, self.shapes[0], level)
 
     def _layer(self, branches: list, q: int, rests: list) -> list[Entry]:
-        """Return what all segments share of a refinement."""
+        """Return the chunks of refinement number `q` that all segments share: its rest pose and shapes."""
         level, entries = self.plan.height + 1 + q, []
         if (rules.REFINED_REST, level, 0) in self.scripts:
             entries.append(self._refined_rest(branches, level, self.step / self.ratio**q, rests))
@@ -804,6 +834,7 @@ class Plant:
         return Entry(rules.REFINED_REST, refined_rest_chunk(stream, step), level)
 
     def _segment(self, s: int, frames: int, periodic: bool) -> list[Entry]:
+        """Return the motion chunks of segment number `s`, which has `frames` frames."""
         motion = _no_motion(self.plan, frames, periodic, self.shapes[0])
         entries, last = [], self.plan.height + 1
         for level in range(last + 1):
@@ -839,7 +870,9 @@ class Plant:
         return head
 
     def _refinements(self, s: int, motion, periodic: bool) -> list[Entry]:
-        """Return STEMS of further layers, from the motion of the first."""
+        """Return the chunks STEMS of the layers after the first, in segment `s`, given the motion of the first
+        layer.
+        """
         placed, _, kept = rules.pose(self.plan, motion, self.plan.height + 1)
         entries, layers = [], [rules.Record(plan=self.plan, motion=motion, placed=placed, kept=kept)]
 

@@ -29,6 +29,7 @@ PLACES = {  # Where the version stands: a pattern of the text, with the two numb
 
 
 def write_version(version: tuple[int, int]) -> None:
+    """Write a version, major and minor, into the documents and sources that state it."""
     for path, patterns in PLACES.items():
         text = path.read_text("utf-8")
         for pattern in patterns:
@@ -39,7 +40,9 @@ def write_version(version: tuple[int, int]) -> None:
 
 
 def stamped(data: bytes, old: tuple[int, int], new: tuple[int, int]) -> bytes | None:
-    """Return the file in another version; None if its front is not a valid one of the old version."""
+    """Return a file with the version `new` in place of `old`; None if its front is not a valid one of the version
+    `old`.
+    """
     from spec.document import crc32c
 
     length = struct.unpack_from("<I", data, 16)[0] if len(data) >= 24 else 0
@@ -52,7 +55,7 @@ def stamped(data: bytes, old: tuple[int, int], new: tuple[int, int]) -> bytes | 
 
 
 def stamp_files(old: tuple[int, int]) -> None:
-    """Stamp the files with FORMAT.md in its new version."""
+    """Change the version from `old` to that of FORMAT.md in all files that state it."""
     from spec import conformance, dump, make
     from spec.document import crc32c, rules
 
@@ -85,6 +88,7 @@ def stamp_files(old: tuple[int, int]) -> None:
 
 
 def main(words: list[str]) -> int:
+    """Set the version of the format that the command line states, in all files that have it. Return the exit status."""
     match words:
         case ["--files", major, minor]:  # in a process that reads the new FORMAT.md
             stamp_files((int(major), int(minor)))

@@ -99,6 +99,7 @@ class OntoReport:
     not_compared: str = ""
 
     def __str__(self) -> str:
+        """Return the report as one sentence."""
         unit = f" {self.unit}" if self.unit else ""
         text = (
             f"{counted(self.vertex_count, 'vertex', 'vertices')} on the plant, {counted(self.card_count, 'piece')} of "
@@ -142,6 +143,10 @@ class OntoMesh(ArrayLike):
         assumed: dict[str, str],
         opened: ExitStack,
     ):
+        """Bind a mesh to the plant in the pose `pose` (N, 3). `plant` and `assumed` have the "unit" and "up_axis" of
+        the plant and of the mesh, and `opened` closes the mesh's file. Raise ClipError if most of the mesh is far from
+        the plant.
+        """
         self._view, self._mesh, self._opened = view, mesh, opened
         chains = Chains(view, pose)
         if not chains.diagonal > POINT * view.decoder.file.max_error_bound:
@@ -247,8 +252,9 @@ class OntoMesh(ArrayLike):
 
     @cached_property
     def report(self) -> OntoReport:
-        """How the mesh lies on the plant. Where it has motion of its own, the first look at the report moves all
-        frames to compare them."""
+        """How the mesh lies on the plant, as an OntoReport. If the mesh has motion of its own, the first access moves
+        all frames to compare them.
+        """
         of_vertex = self._points.of_vertex
         distance = self._binding.distance[of_vertex]
         known: JsonObject = {
@@ -263,7 +269,7 @@ class OntoMesh(ArrayLike):
         return OntoReport(**known, **self._errors())
 
     def _errors(self) -> JsonObject:
-        """Return the figures against the mesh's own motion, as far as it has any in the plant's frames."""
+        """Return the errors against the mesh's own motion, by name; empty if it has no motion in the plant's frames."""
         mesh, view = self._mesh, self._view
         if mesh.frame_count == 1 or stands_still(mesh):
             return {}
@@ -278,8 +284,9 @@ class OntoMesh(ArrayLike):
         return {"frame_count": meter.frame_count, "max_error": meter.max_error, "rms_error": meter.rms_error}
 
     def _moved_clip(self) -> MotionClip:
-        """Return the mesh as a clip with the plant's frames and times; its positions are computed when they are asked
-        for."""
+        """Return the mesh as a clip with the plant's frames and times. Its positions are computed when they are
+        read.
+        """
         view, mesh = self._view, self._mesh
         of_plant = {name: view.metadata[name] for name in OF_PLANT if name in view.metadata}
         of_mesh = {name: value for name, value in mesh.metadata.items() if name not in (*OF_PLANT, *OF_MESH)}
@@ -295,7 +302,7 @@ class OntoMesh(ArrayLike):
         )
 
     def _branches(self) -> dict[str, np.ndarray]:
-        """Return the plant's branches as those of the mesh, as far as they move any of it."""
+        """Return the branches of the plant that move any of the mesh, as arrays of a clip of the mesh."""
         branch, along = self._moving.branch_of_points()
         parent = self._view.decoder.file.hierarchy.branch_parent
         is_used = np.bincount(branch, minlength=len(parent)) > 0
@@ -404,7 +411,7 @@ def onto(
 
 
 def _opened_mesh(mesh: Source, opened: ExitStack, options: Keywords) -> MotionClip:
-    """Return a mesh as a clip; a file is closed with `opened`."""
+    """Return a mesh as a clip. A file that is opened for it is closed with `opened`."""
     if isinstance(mesh, (str, os.PathLike)):
         from athcodec.sources import read  # The sources take long to import.
 
@@ -417,7 +424,7 @@ def _opened_mesh(mesh: Source, opened: ExitStack, options: Keywords) -> MotionCl
 
 
 def _warn_of_rest(view: ClipView) -> None:
-    """Warn of a plant whose rest pose, which the mesh is to lie on, is known less exactly than its motion."""
+    """Warn if the plant's rest pose, which the mesh lies on, is stored less exactly than its motion."""
     file = view.decoder.file
     if file.static.rest_error <= COARSE_REST * file.max_error_bound:
         return
@@ -433,11 +440,11 @@ def _warn_of_rest(view: ClipView) -> None:
 def _in_scene_of(
     view: ClipView, mesh: MotionClip, stated: dict[str, str | None]
 ) -> tuple[MotionClip, dict[str, str], dict[str, str]]:
-    """Return a mesh in the unit and axes of a plant, and the unit and the axis of the plant and those that the mesh
-    was taken to have.
+    """Return the mesh in the unit and axes of the plant, then the "unit" and "up_axis" of the plant, and then those
+    that the mesh was taken to have.
 
-    What the caller states goes before what the mesh states. A plant that states none is in metres and y up, where the
-    caller states those of the mesh; else the mesh is taken to be as the plant is.
+    What the caller states takes precedence over what the mesh states. If the plant states none and the caller does, the
+    plant is taken to be in metres and y up; if nobody states any, the mesh is taken to be as the plant is.
     """
     plant, assumed = dict(DEFAULT_SCENE), dict(DEFAULT_SCENE)
     metadata = dict(mesh.metadata)
@@ -461,7 +468,9 @@ def _in_scene_of(
 def _refuse_far_mesh(
     view: ClipView, marks: Marks, rest: np.ndarray, limit: float, plant: dict[str, str], assumed: dict[str, str]
 ) -> None:
-    """Raise ClipError if most vertices are far from the plant; the message names the pose, unit or axis that fits."""
+    """Raise ClipError if most vertices are further than `limit` from the plant. The message names the pose, unit or
+    axis that would fit.
+    """
     fit = Fit(marks, rest, limit)
     if fit.mesh_far <= MOST_FAR and fit.plant_far <= COVERS:
         return

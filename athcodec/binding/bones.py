@@ -119,7 +119,9 @@ def bones_of(chains: Chains, binding: Binding, of_vertex: np.ndarray) -> Bones:
 
 
 def _influences(chains: Chains, binding: Binding, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (P, 4) of each point, the heaviest first, and their weights (P, 4) float32."""
+    """Return the nodes (P, 4) that move each of `count` points, the heaviest first, and their weights (P, 4),
+    float32.
+    """
     rise = binding.share**2 * (3 - 2 * binding.share)
     point = np.tile(binding.point, 2)
     node = np.concatenate([chains.start[binding.element], chains.end[binding.element]])

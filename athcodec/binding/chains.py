@@ -70,6 +70,9 @@ class Chains:
     """
 
     def __init__(self, view: ClipView, rest: np.ndarray):
+        """Divide the plant that a view shows into chains of nodes, one for each branch. `rest` (N, 3) is the pose in
+        which meshes lie on it, in the source's order of vertices.
+        """
         file = view.decoder.file
         self.hierarchy: Hierarchy = file.hierarchy
         self.vertex_rest = np.asarray(rest, np.float64)
@@ -87,8 +90,9 @@ class Chains:
     # ---- structure ----
 
     def _lines(self, has_faces: np.ndarray, has_edges: bool) -> np.ndarray:
-        """Return which branches are rows of points: those without faces, and without edges only if their vertices
-        stand in a row."""
+        """Return which branches are rows of points, (B,) bool: branches without faces, and, unless the plant has edges,
+        only those whose vertices stand in a row.
+        """
         hierarchy = self.hierarchy
         rest = self.vertex_rest[hierarchy.vertex_source]
         is_surface = np.zeros(hierarchy.branch_count, bool)
@@ -102,8 +106,9 @@ class Chains:
         return length <= WINDING * np.linalg.norm(high - low, axis=1)
 
     def _make_nodes(self, links: np.ndarray) -> None:
-        """Group the vertices of each branch into nodes from its base to its tip. links: pairs of vertices (L, 2) that a
-        surface joins."""
+        """Group the vertices of each branch into nodes from base to tip. `links` (L, 2) has the pairs of vertices that
+        a surface joins.
+        """
         hierarchy = self.hierarchy
         first, count = hierarchy.first_vertex.astype(np.int64), hierarchy.stem_count.astype(np.int64)
         place = np.arange(hierarchy.vertex_count) - np.repeat(first, count)
@@ -130,8 +135,9 @@ class Chains:
         self._node_of_vertex = node_of  # By the vertex' number in file order.
 
     def _join_nodes(self) -> None:
-        """Set `before` and `after`, (N,) for each node: the neighbour towards the root and towards the tip, -1 for
-        none. The first node of a branch comes after the node of its parent that it hangs on."""
+        """Set `before` and `after`, (N,) each: the neighbour of each node towards the root and towards the tip, -1 for
+        none. A branch's first node follows the node of its parent that the branch hangs on.
+        """
         hierarchy, nodes = self.hierarchy, np.arange(len(self.rest))
         is_first = np.append(True, np.diff(self.node_branch) != 0)
         attach = hierarchy.attach[self.node_branch]
@@ -142,8 +148,9 @@ class Chains:
         self.after = np.where(np.append(is_first[1:], True), -1, nodes + 1)
 
     def _make_elements(self) -> None:
-        """Set the elements, each the part of a chain between two nodes: `start`, `end`, length, branch and tangents at
-        rest."""
+        """Set the elements of all chains, each of which joins two neighbouring nodes: their `start` and `end` nodes,
+        and their lengths, branches and tangents in the rest pose.
+        """
         hierarchy = self.hierarchy
         is_first = np.append(True, np.diff(self.node_branch) != 0)
         alone = is_first & (self.before < 0) & (self.after < 0)
@@ -174,9 +181,10 @@ class Chains:
         return np.add.reduceat(radius[self._vertices], self._starts) / self._counts
 
     def thinned(self, nodes: np.ndarray, most: int) -> Chains:
-        """Return chains of some of the nodes, ascending, of which slices have `most` vertices each at most.
+        """Return chains of some of the nodes, which are given in ascending order. Slices keep at most `most` vertices
+        each.
 
-        What a node hangs on has to be among them. Such chains give poses, and no places for a mesh.
+        The node that a kept node hangs on must be kept too. The chains give poses, and no places for a mesh.
         """
         some = copy.copy(self)
         for name in ("_generations", "_beside"):
@@ -218,8 +226,9 @@ class Chains:
     # ---- motion ----
 
     def pose(self, frames: np.ndarray) -> Pose:
-        """Return centre, rotation and growth of all nodes in frames (k, V, 3), whose vertices are in the source's
-        order."""
+        """Return the centres, rotations and growth of all nodes in frames (k, V, 3), whose vertices are in the source's
+        order.
+        """
         frames = np.asarray(frames, np.float64)
         centre = self._means(frames)
         turn = np.zeros((*centre.shape[:2], 4))
@@ -234,8 +243,9 @@ class Chains:
         return Pose(centre, turn, size)
 
     def places(self, pose: Pose, element: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the centres (k, P, 3) of places on the chains, and the matrices (k, P, 3, 3) that turn and scale what
-        hangs on them."""
+        """Return the centres (k, P, 3) of P places on the chains in k frames, and the matrices (k, P, 3, 3) that rotate
+        and scale what hangs on them. A place is at the fraction `share` of an element.
+        """
         start, end = self.start, self.end
         chord = np.linalg.norm(pose.centre[:, end] - pose.centre[:, start], axis=2)
         stretch = (chord / np.where(self.length > 0, self.length, np.inf))[..., None]
@@ -252,7 +262,9 @@ class Chains:
         return np.add.reduceat(frames[:, self._vertices], self._starts, axis=1) / self._counts[:, None]
 
     def _tangents(self, centre: np.ndarray) -> np.ndarray:
-        """Return unit tangents (k, M, 3) of parabolas through each node and its neighbours; 0 where nothing tells."""
+        """Return unit tangents (k, M, 3) of parabolas through each node and its two neighbours; 0 where these
+        coincide.
+        """
         before, after = np.maximum(self.before, 0), np.maximum(self.after, 0)
         into = np.where((self.before >= 0)[:, None], centre - centre[:, before], 0.0)
         out = np.where((self.after >= 0)[:, None], centre[:, after] - centre, 0.0)
@@ -265,7 +277,7 @@ class Chains:
 
     @cached_property
     def _generations(self) -> list[np.ndarray]:
-        """Return the nodes of lines in groups: each holds those that are as many nodes away from the root."""
+        """Return the nodes of lines in groups by their distance from the root, counted in nodes."""
         depth = np.zeros(len(self.before), np.int64)
         ancestor = np.append(np.where(self.before < 0, len(depth), self.before), len(depth))
         steps = np.append((self.before >= 0).astype(np.int64), 0)
@@ -287,7 +299,9 @@ class Chains:
             turn[:, nodes] = product(smallest_turn(carried, tangent[:, nodes]), inherited)
 
     def _growth(self, centre: np.ndarray) -> np.ndarray:
-        """Return the scale (k, M) of what hangs on lines: their stretch, as far as it is growth and no error."""
+        """Return the scale (k, M) of what hangs on nodes of lines: how far the stem around the node is stretched beyond
+        what errors of the motion explain.
+        """
         count = len(self.rest)
         lines = self.length > 0
         ends = np.concatenate([self.start[lines], self.end[lines]])
@@ -301,8 +315,9 @@ class Chains:
         return stretch / np.clip(stretch, np.maximum(1 - slack, 1e-30), 1 + slack)
 
     def _fit_surfaces(self, frames: np.ndarray, centre: np.ndarray, turn: np.ndarray, size: np.ndarray) -> None:
-        """Fill `turn` (k, N, 4) and `size` (k, N) for the nodes of surfaces: the rotation and growth that fit their
-        vertices best in each frame (k, V, 3)."""
+        """Fill `turn` (k, N, 4) and `size` (k, N) for nodes of surfaces with the rotations and the growth that fit
+        their vertices best in frames (k, V, 3).
+        """
         nodes = np.flatnonzero(~self.is_line[self.node_branch])
         branch = self.node_branch
         rest, now = self.vertex_rest[self._vertices], frames[:, self._vertices]
@@ -363,7 +378,9 @@ def _branch_in_file_order(hierarchy: Hierarchy) -> np.ndarray:
 
 
 def _links(view: ClipView) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs of vertices that faces and edges join, (L, 2), and which vertices are in a face, (N,) bool."""
+    """Return the pairs of vertices (L, 2) that faces and edges join, and whether each vertex is in a face, (N,)
+    bool.
+    """
     has_faces = np.zeros(view.vertex_count, bool)
     links = [np.empty((0, 2), np.int64)]
     if view.polygons is not None:
@@ -378,8 +395,9 @@ def _links(view: ClipView) -> tuple[np.ndarray, np.ndarray]:
 def _along_surfaces(
     hierarchy: Hierarchy, rest: np.ndarray, links: np.ndarray, surfaces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far each vertex is from the foot of its branch along the surface, (N,), and the length of a branch's
-    longer edges, (B,); all in file order."""
+    """Return the distance (N,) of each vertex from the foot of its branch along the surface, and the length (B,) of the
+    longer edges of each branch; both in file order.
+    """
     count, first = hierarchy.vertex_count, hierarchy.first_vertex
     branch = hierarchy.vertex_branch()
     place = np.empty(count, np.int64)
@@ -444,8 +462,9 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def smallest_turn(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the quaternions (..., 4) that turn unit vectors to unit vectors by the smallest angle; without a rotation
-    where a vector is 0."""
+    """Return the quaternions (..., 4) of the smallest rotations from unit vectors `start` to unit vectors `end`; no
+    rotation where a vector is 0.
+    """
     cosine = (start * end).sum(axis=-1, keepdims=True)
     there = (start**2).sum(axis=-1, keepdims=True) * (end**2).sum(axis=-1, keepdims=True) > 0.5
     axis, real = np.cross(start, end), 1.0 + cosine

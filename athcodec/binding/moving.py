@@ -29,6 +29,9 @@ class MovingPoints:
     """
 
     def __init__(self, chains: Chains, binding: Binding, place: np.ndarray, of_vertex: np.ndarray, offset: np.ndarray):
+        """Prepare to move the points `place` (P, 3) of a mesh by a binding to chains. `of_vertex` (V,) is the point of
+        each vertex, and `offset` (V, 3) the vertex's offset from that point.
+        """
         self._chains, self._of_vertex, self._offset = chains, of_vertex, offset
         key = np.stack([binding.element.astype(np.float64), binding.share], axis=1)
         places, of_row = np.unique(key, axis=0, return_inverse=True)
@@ -46,8 +49,9 @@ class MovingPoints:
         self._count = len(place)
 
     def branch_of_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the branch, in file order, that moves each point most, and how far along it the point hangs, in
-        elements; (P,) each."""
+        """Return two arrays (P,): the branch, in file order, that moves each point most, and how far along the branch
+        the point hangs, in elements.
+        """
         branch, along = np.zeros(self._count, np.int64), np.zeros(self._count)
         largest = np.zeros(self._count)
         for point, place, _, weight in self._tables:
@@ -69,8 +73,9 @@ class MovingPoints:
         return np.concatenate([self._moved(frames[start : start + length]) for start in range(0, len(frames), length)])
 
     def _moved(self, frames: np.ndarray) -> np.ndarray:
-        """Return the vertices (k, V, 3) of the bound mesh in so few frames (k, N, 3) of the plant that memory
-        suffices."""
+        """Return the vertices (k, V, 3) of the bound mesh in frames (k, N, 3) of the plant, few enough to fit into
+        memory.
+        """
         pose = self._chains.pose(frames)
         centre, matrix = self._chains.places(pose, self._element, self._share)
         points = np.zeros((len(frames), self._count, 3))

@@ -42,8 +42,9 @@ class Fit:
         return float((there > self._limit).mean()), float((back > self._limit).mean())
 
     def better_scene(self, plant: dict[str, str], assumed: dict[str, str]) -> dict[str, str]:
-        """Return the "unit" and the "up_axis" of the mesh with which it would lie on the plant, as far as they are not
-        those that it was taken to have; empty for none. `plant` has those of the plant."""
+        """Return the "unit" and "up_axis" with which the mesh would lie on the plant, as far as they differ from those
+        `assumed`; empty if none would. `plant` has those of the plant.
+        """
         best, scene = np.inf, {}
         for unit, factor in _factors(assumed["unit"]):
             for axis, turn in _turns(plant["up_axis"], assumed["up_axis"]):

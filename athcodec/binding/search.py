@@ -68,6 +68,7 @@ class Marks:
     """Points all over the plant, with the branch of each: samples of lines and vertices of surfaces."""
 
     def __init__(self, chains: Chains):
+        """Spread marks evenly over all branches of the chains, in a tree that finds the marks nearest to a point."""
         branch, place = [], []
         lines = np.flatnonzero(chains.is_line[chains.element_branch])
         if len(lines):
@@ -99,6 +100,9 @@ class _Pairs:
     """Points with a branch each, put onto it: the place on the branch, and the distance from it."""
 
     def __init__(self, chains: Chains, points: np.ndarray, branch: np.ndarray):
+        """Find the nearest place on a branch for pairs of a point, (P, 3), and a branch, (P,), and the offset and
+        distance of the point from it.
+        """
         self.element, self.share = np.zeros(len(points), np.int64), np.zeros(len(points))
         order = np.argsort(branch, kind="stable")
         branches, first = np.unique(branch[order], return_index=True)
@@ -117,7 +121,9 @@ class _Pairs:
 
 
 def _onto(chains: Chains, points: np.ndarray, low: int, high: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nearest of the elements low to high - 1, and the place along it, for each point."""
+    """Return for each point the nearest of the elements `low` to `high` - 1, and how far along it the nearest place is,
+    from 0 to 1.
+    """
     start = chains.rest[chains.start[low:high]]
     chord = chains.rest[chains.end[low:high]] - start
     square = (chord**2).sum(axis=1)
@@ -142,6 +148,7 @@ def bind(chains: Chains, mesh: MeshPoints, marks: Marks) -> Binding:
 
 class _Search:
     def __init__(self, chains: Chains, mesh: MeshPoints, marks: Marks):
+        """Begin to bind the points of a mesh to chains: find the branches near each point by the marks."""
         self.chains, self.mesh = chains, mesh
         self.near, self.near_branch = marks.nearest(mesh.place)
         parent = chains.hierarchy.branch_parent
@@ -163,7 +170,8 @@ class _Search:
 
     def _look_at_pieces(self) -> None:
         """Decide for each connected piece of the mesh, by a sample of its points, whether one branch moves it as a
-        whole, or a foot on a branch carries it as a card."""
+        whole, and whether it is a card that a foot on a branch carries.
+        """
         mesh, chains = self.mesh, self.chains
         inside = np.flatnonzero(mesh.piece >= 0)
         # Vertices are in any order within their piece: every n-th one of a tube may lie on one side of it.
@@ -198,8 +206,9 @@ class _Search:
         self.card_count = int(is_card.sum())
 
     def _best_stems(self, sample: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return for each piece the line that it is nearest to as a whole, its mean distance, and the length of the
-        mean offset over that."""
+        """Return three arrays with an entry per piece of the mesh: the line nearest to the piece as a whole, their mean
+        distance, and the length of the mean offset as a fraction of that, which is small for a piece around the line.
+        """
         mesh, count, branches = self.mesh, self.mesh.piece_count, self.chains.hierarchy.branch_count
         piece = np.repeat(mesh.piece[sample], self.near_branch.shape[1])
         key, votes = np.unique(piece * branches + self.near_branch[sample].reshape(-1), return_counts=True)
@@ -243,8 +252,9 @@ class _Search:
         return points, pairs.element[of], pairs.share[of], np.ones(len(points))
 
     def _of_points(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return rows of points that are on the nearest branch each, with weights that change gradually between
-        neighbours."""
+        """Return rows that put points on their nearest branches: point, element, place along the element from 0 to 1,
+        and weight. Weights change gradually between neighbouring points.
+        """
         if not len(points):
             return points, points, np.zeros(0), np.zeros(0)
         branches = self.chains.hierarchy.branch_count
@@ -266,10 +276,10 @@ class _Search:
         return points[weights.row], pairs.element, pairs.share, weights.data
 
     def _spread(self, points: np.ndarray, branch: np.ndarray) -> ScipyObject:
-        """Return weights (points, B) of branches, as a sparse matrix with SHARES of a row at most.
+        """Return weights (points, B) of branches as a sparse matrix with at most SHARES entries per row.
 
-        They are 1 and 0 but around links between points of different branches. There, as far as REACH says, they change
-        over the skin as the places of a membrane do, so that short edges hold no large change.
+        Weights are 1 and 0 except near links between points of different branches. There, as far as REACH says, they
+        change smoothly over the surface, as the height of a membrane does, so that short edges hold no large change.
         """
         sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
         number = np.full(len(self.mesh.place), -1)
@@ -301,8 +311,9 @@ class _Search:
 
 
 def _membrane(near: ScipyObject, weights: ScipyObject, free: np.ndarray, reach: float) -> ScipyObject:
-    """Return weights, a sparse matrix, whose rows `free` are those of a membrane between the others. near: (n, n) how
-    much neighbours pull; reach: how far a membrane goes from its middle at most."""
+    """Return a sparse matrix of weights whose rows `free` lie between the others as a membrane would. `near` (n, n) has
+    how strongly neighbours pull, and `reach` how far a membrane extends from its middle at most.
+    """
     sparse, linalg = scipy_module("sparse"), scipy_module("sparse.linalg")
     pull = np.asarray(near.sum(axis=1)).reshape(-1)
     # Far beyond its reach it holds to what it was, which matters only where nothing else holds it.
@@ -327,7 +338,7 @@ def _membrane(near: ScipyObject, weights: ScipyObject, free: np.ndarray, reach: 
 
 
 def _largest(weights: ScipyObject) -> ScipyObject:
-    """Return the SHARES largest of each row of a sparse matrix, and no small ones, adding up to 1."""
+    """Return a sparse matrix with the SHARES largest entries of each row, without small ones, scaled to add up to 1."""
     entries = weights.tocoo()
     order = np.lexsort((-entries.data, entries.row))
     row, col, data = entries.row[order], entries.col[order], entries.data[order]
@@ -355,7 +366,9 @@ def _flatness(group: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
 
 
 def _modes(group: np.ndarray, label: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the most frequent label of each of `count` groups, and its share of the group's entries."""
+    """Return the most frequent label of each of `count` groups, and the fraction of the group's entries that have it.
+    Entry i has the label `label[i]` and is in group `group[i]`.
+    """
     width = int(label.max()) + 1
     key, votes = np.unique(group * width + label, return_counts=True)
     order = np.lexsort((-votes, key // width))

@@ -32,6 +32,9 @@ class MeshPoints:
     """
 
     def __init__(self, rest: np.ndarray, polygons: tuple[np.ndarray, np.ndarray] | None, edges: np.ndarray | None):
+        """Merge the vertices `rest` (V, 3) that lie at one place into points, and find the links and connected pieces
+        of these. `polygons` has the number of corners of each face, and the vertices of all corners.
+        """
         size = float(np.linalg.norm(np.ptp(rest, axis=0)))
         grid = np.round((rest - rest.min(axis=0)) / (SAME_PLACE * size)) if size > 0 else np.zeros_like(rest)
         places = Places.of_labels(grid)
@@ -50,7 +53,9 @@ class MeshPoints:
         self.links = joined[joined[:, 0] != joined[:, 1]]
 
     def _find_pieces(self, counts: np.ndarray, corners: np.ndarray, piece: np.ndarray) -> None:
-        """Number the connected pieces of the mesh and give each point its piece, from the piece (F,) of each face."""
+        """Number the connected pieces of the mesh and set the piece of each point. `piece` (F,) has a label of the
+        piece of each face.
+        """
         face, number = np.repeat(np.arange(len(counts)), counts), int(piece.max()) + 1
         # A point of several pieces belongs to the largest of them, which is written last.
         faces = np.bincount(piece, minlength=number)

@@ -26,6 +26,7 @@ MACHINES = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64", "arm64": "arm64
 
 
 def main(argv: Sequence[str] | None = None) -> int:
+    """Pack the Blender extension that the command line describes, and return the exit status 0."""
     parser = argparse.ArgumentParser(prog="python -m athcodec.blender.build", description=__doc__.splitlines()[0])
     parser.add_argument("output", type=Path, help="the .zip to write, which Blender installs")
     parser.add_argument("wheels", type=Path, nargs="*", help="wheels of athcodec, and of the others if not by pip")
@@ -41,8 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def check(wheels: Sequence[Path]) -> None:
-    """Raise ValueError where a wheel is not there, where none is athcodec's, or one of those for no platform of
-    Blender."""
+    """Raise ValueError if a wheel does not exist, if none is athcodec's, or if one is for a platform that Blender does
+    not have.
+    """
     for wheel in wheels:
         if not wheel.is_file():
             raise ValueError(f"{wheel}: there is no such wheel; {MAKE}")
@@ -58,7 +60,9 @@ def _of_athcodec(wheels: Sequence[Path]) -> list[Path]:
 
 
 def pack(output: Path, wheels: Sequence[Path]) -> None:
-    """Write the extension with these wheels. Raises ValueError as `check` does, OSError."""
+    """Write the extension with some wheels to `output`. Raise ValueError as `check` does, OSError if it cannot be
+    written.
+    """
     check(wheels)
     built = _of_athcodec(wheels)
     platforms = sorted({platform(wheel) for wheel in built})
@@ -93,7 +97,9 @@ def platform(wheel: Path) -> str:
 
 
 def _fetched(wheels: Sequence[Path], folder: Path) -> list[Path]:
-    """Return wheels of what is needed and not given, for each platform and Python, by pip."""
+    """Download the wheels that are needed beside `wheels` with pip, for each platform and version of Python, and return
+    their paths.
+    """
     missing = [name for name in NEEDED if not any(wheel.name.startswith(f"{name}-") for wheel in wheels)]
     if not missing:
         return []

@@ -88,6 +88,9 @@ class WriteOptions:
     velocities: bool = False
 
     def __post_init__(self) -> None:
+        """Check the options against each other and against their limits. Raise ValueError for a value that is not
+        allowed.
+        """
         set_numbers(self, wholes=("rig", "samples"))
         if self.rig is not None and not 1 <= self.rig <= MOST_RIGGED:
             raise ValueError(f"rig: got {self.rig!r}, expected 1 to {MOST_RIGGED} joints")
@@ -230,8 +233,9 @@ def write(
 
 
 def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: JsonObject) -> None:
-    """Warn the caller of `write` if the motion of a skeleton is far from that of the clip. most: joints that were
-    allowed."""
+    """Warn the caller of `write` if the skeleton's motion is far from the clip's. `most` is the largest number of
+    joints allowed, and `facts` has what the writer reports, with the error among it.
+    """
     diagonal, error = float(np.linalg.norm(np.ptp(motion.rest, axis=0))), facts["max_error"]
     if not error > COARSE_SHARE * diagonal > 0:
         return
@@ -250,7 +254,9 @@ def _object_to_rig(motion: Motion, path: str | PathLike[str], most: int, facts: 
 
 
 def format_to_write(path: str | PathLike[str], format: str | None = None) -> Format:
-    """Return the format of `formats` with a name, or else with the suffix of a path. Raises ClipError, ValueError."""
+    """Return the format named `format`, or without a name the format of the path's suffix. Raise ClipError if the
+    suffix is unknown, ValueError if the name is.
+    """
     if format is not None:
         return format_named(format, formats())
     if Path(path).suffix.lower() == ATH:
@@ -263,8 +269,9 @@ def format_to_write(path: str | PathLike[str], format: str | None = None) -> For
 
 
 def check_ath_name(path: str | PathLike[str]) -> None:
-    """Raise ClipError for a path whose suffix promises another format than that of .ath files; others are left to their
-    users."""
+    """Raise ClipError if the suffix of a path belongs to another format than .ath files. Any unknown suffix is
+    accepted.
+    """
     suffix = Path(path).suffix.lower()
     title = next((kind.title for kind in FORMATS if suffix in kind.suffixes), None)
     promised = kind_by_suffix(suffix) or title
@@ -277,6 +284,7 @@ def check_ath_name(path: str | PathLike[str]) -> None:
 
 
 def _check_clips(motion: Motion, kind: Format) -> None:
+    """Raise ClipError if a motion has several clips and the format holds only one."""
     clip_ranges = getattr(motion, "clip_ranges", ())
     if len(clip_ranges) > 1 and not kind.holds_several:
         names = ", ".join(clip_range.name for clip_range in clip_ranges)

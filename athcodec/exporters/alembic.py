@@ -32,7 +32,9 @@ WRITER = "athcodec.exporters.alembic_archive"
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write a MotionClip or a ClipView as .abc; returns what instances cost. Raises ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .abc. Return what storing copies as instances costs in error. Raise
+    ClipError, OSError.
+    """
     path = os.fspath(path)
     objects = objects_of(motion)
     instanced = fit_copies(motion, objects) if options.instances else {}
@@ -67,7 +69,9 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def _send(process: subprocess.Popen[bytes], head: Any, samples: Iterable[Any], report: Callable[[int], None]) -> bytes:
-    """Return the final answer of the process."""
+    """Send the clip and its samples to the writing process and return the process's final answer. `report` is called
+    with the number of samples sent.
+    """
     assert process.stdin is not None and process.stdout is not None
     try:
         pickle.dump(head, process.stdin, pickle.HIGHEST_PROTOCOL)

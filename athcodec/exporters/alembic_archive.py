@@ -73,7 +73,9 @@ class Placed(Motion, Protocol):
 
 
 def main() -> None:
-    """Take a clip but for its motion, and its instances, as a pickle, and then its frames likewise."""
+    """Read a clip without its motion, and its instances, as a pickle from standard input, and then its frames as
+    pickles. Write them as Alembic to the path on the command line, and print "done" or what went wrong.
+    """
     pipe = sys.stdin.buffer
     motion, instanced = pickle.load(pipe)
     try:
@@ -93,6 +95,9 @@ def _samples(pipe: BinaryIO) -> Iterator[Sample]:
 
 
 def _write(motion: Placed, samples: Iterator[Sample], instanced: dict[int, Copies], name: str) -> None:
+    """Write an Alembic archive to the path `name`. `samples` yields the positions of each frame, with velocities where
+    there are any, and `instanced` has the copies of objects by the objects' numbers.
+    """
     numbers, rate = distinct_frame_numbers(motion), frame_rate_of(motion)
     archive = Abc.CreateArchiveWithInfo(name, rate, "athcodec", "plant motion")
     index = archive.addTimeSampling(_sampling(numbers, rate))
@@ -127,7 +132,9 @@ def _write(motion: Placed, samples: Iterator[Sample], instanced: dict[int, Copie
 
 
 def _sampling(numbers: np.ndarray, rate: float) -> AlembicObject:
-    """Return Alembic's time sampling for frames of these numbers at a rate: uniform if they follow one another."""
+    """Return Alembic's time sampling for frames with the given numbers at `rate` frames per second: uniform if the
+    numbers are consecutive, else with a time for each frame.
+    """
     steps = np.diff(numbers)
     if np.allclose(steps, 1.0, rtol=0, atol=1e-5):
         return AbcCoreAbstract.TimeSampling(1.0 / rate, float(numbers[0]) / rate)
@@ -138,7 +145,7 @@ def _sampling(numbers: np.ndarray, rate: float) -> AlembicObject:
 
 
 def _hide(places: list[AlembicObject], obj: SceneObject, sampling: int) -> None:
-    """Write the visibility of an object, or of each of its copies, to the transforms above them."""
+    """Write in which frames an object, or each of its copies, is visible, to the transforms `places` above it."""
     if obj.shown is None or obj.shown.shape[1] > len(places):
         return
     for place, shown in zip(places, np.broadcast_to(obj.shown, (len(obj.shown), len(places))).T):
@@ -151,8 +158,9 @@ def _hide(places: list[AlembicObject], obj: SceneObject, sampling: int) -> None:
 def _add_instanced(
     root: AlembicObject, name: str, obj: SceneObject, copies: Copies, statics: Statics, sampling: AlembicObject
 ) -> list[AlembicObject]:
-    """Write the shape below the transform of the first copy, and an instance of it below that of each other one.
-    Returns these transforms."""
+    """Write the shape of an object below the transform of its first copy, and an instance of it below the transform of
+    each other copy. Return all these transforms.
+    """
     matrices = np.tile(np.eye(4), (*copies.places.shape[:2], 1, 1))  # Matrices act on row vectors.
     linear = rotation_matrices(copies.turns.astype(np.float64)) * copies.scales[:, :, None, :]
     matrices[..., :3, :3], matrices[..., 3, :3] = linear.swapaxes(2, 3), copies.places
@@ -176,7 +184,7 @@ def _add_instanced(
 
 
 def _bind_materials(motion: Motion, objects: list[SceneObject]) -> None:
-    """Write materials by their names alone: a set of the faces that have one."""
+    """Write materials by their names alone, each as the set of the faces that have it."""
     labels, names = face_materials(motion) or (np.empty(0), [])
     sets = distinct(re.sub(r"[/\0]", "_", name) or "material" for name in names)
     for obj in objects if sets else ():
@@ -205,8 +213,9 @@ def _filled(kind: AlembicObject, values: np.ndarray) -> AlembicObject:
 
 
 def _add(obj: SceneObject, values: list[np.ndarray], arrays: Statics | None) -> None:
-    """Write a sample of the points, and of their velocities where there are any; the first one brings what does not
-    move, the rows of the object."""
+    """Write one sample of an object: `values` has its points, and its velocities if there are any. The first sample
+    also brings the static arrays, of which the object's rows are taken.
+    """
     points, *moving = (_filled(imath.V3fArray, each) for each in values)
     schema = obj.target.getSchema()
 
@@ -240,8 +249,9 @@ def _add(obj: SceneObject, values: list[np.ndarray], arrays: Statics | None) -> 
 
 
 def _mesh_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
-    """Return the first sample of a mesh, with the texture coordinates and normals that `arrays` has; these are removed
-    there."""
+    """Return the first sample of a mesh, with the texture coordinates and normals of `arrays`, which are removed
+    there.
+    """
     further = {}
     for name, row, array, keyword, kind in (
         ("uv", (2,), imath.V2fArray, "iUVs", AbcGeom.OV2fGeomParamSample),
@@ -256,6 +266,7 @@ def _mesh_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Stati
 
 
 def _curve_sample(obj: SceneObject, held: dict[str, AlembicObject], arrays: Statics) -> AlembicObject:
+    """Return the first sample of an object of curves, with their type, basis and wrap, and the widths of `arrays`."""
     is_cubic = obj.details.get("type") == "cubic"
     kind = AbcGeom.CurveType.kCubic if is_cubic else AbcGeom.CurveType.kLinear
     bases = {name: each for each, name in BASES.items()}
@@ -285,8 +296,9 @@ def _widths(held: dict[str, AlembicObject], arrays: Statics, name: str) -> JsonO
 
 
 def _divide(motion: Motion, objects: list[SceneObject]) -> tuple[Statics, Statics]:
-    """Return static arrays that Alembic has types and places for, and the others; each with its domain. Of copies it
-    has those that all copies share."""
+    """Return two mappings of static arrays, each with its domain: those that Alembic has a type and place for, and the
+    others. An array of copies is kept only if all copies share its values.
+    """
     fitting: Statics = {}
     left: Statics = {}
     for name, values in motion.attributes.items():

@@ -28,7 +28,9 @@ class Cells:
 
 
 def cells_of(motion: Motion) -> Cells:
-    """Return the cells that a motion's attributes, faces and edges are."""
+    """Return the cells of a finite-element mesh that a motion's attributes state, or else those that its faces and
+    edges make.
+    """
     kinds: list[np.ndarray] = []
     counts: list[np.ndarray] = []
     nodes: list[np.ndarray] = []
@@ -74,7 +76,9 @@ def arrays_in(motion: Motion, per_point: Collection[str], per_cell: Collection[s
 
 
 def cell_and_point_data(motion: Motion, cells: Cells) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Return (per point, per cell): the attributes with a row of numbers for each, at most nine."""
+    """Return two mappings from an attribute's name to its values: one row per point, and one row per cell. Rows have at
+    most nine numbers.
+    """
     per_point, per_cell = {}, {}
     for name, values in motion.attributes.items():
         fits = values.ndim in (1, 2) and values.dtype.kind in "fiu" and values.dtype.itemsize in (1, 2, 4, 8)

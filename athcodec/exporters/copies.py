@@ -33,8 +33,10 @@ class Copies:
 
 
 def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None = None) -> dict[int, Copies]:
-    """Return the objects that are copies, of the same materials, and that transforms keep within `allowed`, or within
-    what the level is off, by their place in the list."""
+    """Return the transforms that place the copies of an object's shape, by the object's number. Only objects are
+    included whose copies have the same materials and stay within `allowed` of the motion, in scene units; by default
+    within the level's error.
+    """
     allowed = allowed_error(motion) if allowed is None else allowed
     materials = face_materials(motion)
     fits = {
@@ -51,7 +53,9 @@ def fit_copies(motion: Motion, objects: list[SceneObject], allowed: float | None
 
 
 def cost_of(instanced: dict[int, Copies]) -> JsonObject:
-    """Return the sentence about a writer's instances."""
+    """Return what a writer reports about instances: their number, and the largest error that they cause. The result is
+    empty if there are none.
+    """
     if not instanced:
         return {}
     error = max(copies.max_error for copies in instanced.values())
@@ -79,6 +83,9 @@ class _Fit:
     """The copies of one object, fitted as the frames come."""
 
     def __init__(self, motion: Motion, obj: SceneObject):
+        """Take the first copy of an object, at rest, as the shape of all copies, and fit transforms that place the
+        copies of the rest pose.
+        """
         self._rows, count = obj.vertices, obj.count // obj.copies
         rest = np.asarray(motion.rest, np.float64)[obj.vertices]
         part = Parts.over(np.arange(count), np.zeros(1, np.int64), np.array([count]), rest[:count])

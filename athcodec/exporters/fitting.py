@@ -64,7 +64,9 @@ class Parts:
 
     @classmethod
     def over(cls, order: np.ndarray, first: np.ndarray, count: np.ndarray, rest: np.ndarray) -> Parts:
-        """Return parts of the rest pose (N, 3), each a run of `order`, with their middles, axes and extents."""
+        """Return parts of the rest pose (N, 3), with their middles, axes and extents. Part k holds the vertices
+        `order[first[k]:first[k] + count[k]]`.
+        """
         rows = np.concatenate([order[a : a + n] for a, n in zip(first, count)])
         starts, points = np.cumsum(count) - count, rest[rows]
         middle = np.add.reduceat(points, starts) / count[:, None]
@@ -117,7 +119,9 @@ class Placed:
         return rotation * scale[:, None, :], (turn, scale)
 
     def nearest(self, cross: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rotations (k, 3, 3) and scales along three axes (k, 3) that fit cross-covariances (k, 3, 3) best."""
+        """Return the rotations (k, 3, 3) and the scales along three axes (k, 3) that best fit k cross-covariances (k,
+        3, 3) of vertices and their shapes.
+        """
         scale = self._scale  # The scale of the frame before is a close first guess.
         safe = np.where(self._flat, 1.0, self._spread)
         for _ in range(ROUNDS):
@@ -157,8 +161,11 @@ def fit(
     report: Progress,
     chosen: np.ndarray | None = None,
 ) -> Moving | None:
-    """Return the parts of a motion, cut until none is further off than `allowed`; None where that takes more than
-    `most`. chosen (N,) bool: parts without any of these vertices, of which there is one at least, are left out."""
+    """Return parts of a motion with a transform per frame, cut until no vertex is further off than `allowed`, in scene
+    units. Return None if that takes more than `most` parts.
+
+    `chosen` (N,), bool, names vertices of which there is at least one; parts without any of them are left out.
+    """
     rest = np.asarray(motion.rest, np.float64)
     order, first, count = _ranges(motion)
     if chosen is not None:
@@ -187,7 +194,9 @@ def fit(
 
 
 def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return an order of the vertices, and ranges of it that are the parts to begin with."""
+    """Return the parts to begin with: an order of the vertices, and the first position and the number of vertices of
+    each part in that order.
+    """
     if isinstance(motion, ClipView):
         parts = motion.affines(0)
         return (
@@ -204,7 +213,10 @@ def _ranges(motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Cut ranges of vertices into shorter ones: the error of what bends grows with the square of its length."""
+    """Cut ranges of vertices into shorter ones and return the first positions and the numbers of vertices of the new
+    ranges. `excess` is each range's error over the allowed error, which grows with the square of the length of what
+    bends; None cuts into single vertices.
+    """
     wanted = count if excess is None else np.ceil(np.sqrt(np.minimum(excess, 1e12)))
     pieces = np.clip(wanted, 2, count).astype(np.int64)
     number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -217,8 +229,10 @@ def _cut(first: np.ndarray, count: np.ndarray, excess: np.ndarray | None) -> tup
 def _fitted(
     motion: Motion, parts: Parts, solver: Placed | Mapped, rest: np.ndarray, step: int = 1
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Return places (T, K, 3) and values of all frames, or of one in `step`, the others being empty; and the largest
-    distance that each part leaves (K,)."""
+    """Fit a transform to every part in every `step`-th frame; the other frames stay unset. Return the places (T, K, 3)
+    of K parts, a list of the solver's values such as rotations and scales, each (T, K, width), and the largest error
+    (K,) of each part.
+    """
     rows = np.concatenate([parts.order[a : a + n] for a, n in zip(parts.first, parts.count)])
     starts, part = np.cumsum(parts.count) - parts.count, np.repeat(np.arange(len(parts)), parts.count)
     local = np.einsum("nij,ni->nj", parts.axes[part], rest[rows] - parts.middle[part])

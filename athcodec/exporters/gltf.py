@@ -66,9 +66,10 @@ BYTES_PER_JOINT_KEY, BYTES_PER_JOINT, BYTES_PER_TARGET = 40, 900, 180
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write a MotionClip or a ClipView as GLB to `path`; returns what asset.extras.athcodec says of it.
+    """Write a MotionClip or a ClipView as GLB to `path`. Return the facts that the file has in asset.extras.athcodec,
+    such as its error.
 
-    Raises ClipError where it has more joints, frames or bytes than glTF can sensibly hold.
+    Raise ClipError if the motion has more joints, frames or bytes than glTF can sensibly hold.
     """
     try:
         facts = _write(motion, path, options, report)
@@ -81,6 +82,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
+    """Write the GLB as `write_clip` does, and return its facts."""
     looks = looks_of(motion, objects_of(motion))
     meshes = meshes_of(motion, looks, Path(fspath(path)).stem)
     has_copies = options.instances and options.rig is None
@@ -116,7 +118,9 @@ def _write(motion: Motion, path: FilePath, options: WriteOptions, report: Progre
 def _writer(
     motion: Motion, options: WriteOptions, surface: Surface, meshes: list[GltfMesh | GltfCopies], report: Progress
 ) -> _Joined | _Morphed:
-    """Return what moves the meshes, as the options ask."""
+    """Return the object that moves the meshes, by joints or by morph targets, as the options ask or as makes the
+    smaller file.
+    """
     if options.rig is not None:
         return _Joined(motion, fit_rig(motion, options.rig, report))
     shapes = [shape for shape in meshes if isinstance(shape, GltfMesh)]
@@ -142,7 +146,9 @@ def _writer(
 
 
 def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarray], extras: JsonMapping) -> None:
-    """Write the rest pose alone, with attributes by their semantic (N, width) besides those of the clip."""
+    """Write the rest pose alone as GLB. `more` has further attributes (N, width) by their semantic, besides those of
+    the clip.
+    """
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), name, more)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
     glb = Glb(clock(motion) | {"athcodec": dict(extras) | left_out})
@@ -157,12 +163,12 @@ def write_rest(motion: Motion, path: str, name: str, more: Mapping[str, np.ndarr
 
 
 def write_bound(motion: Motion, path: FilePath, bones: Any, facts: JsonMapping) -> JsonObject:
-    """Write the rest pose with a skin, whose bones (binding.bones.Bones) stand in it and have no keys; returns what is
-    not written, as `write_clip` does.
+    """Write the rest pose with a skin, whose bones (binding.bones.Bones) stand in the rest pose and have no keys.
+    Return what was not written, as `write_clip` does.
 
-    What ATHBones needs to turn them is in the extras of the node above them, as "ATH_bones": for each bone its vertex
-    in the .ath file, and the bones before and after it along its stem; the bones that are the first of their stems; and
-    the slices of surfaces (binding.bones.Bones, slices).
+    The extras of the node above the bones have, as "ATH_bones", what ATHBones needs to turn them: for each bone its
+    vertex in the .ath file, and the bones before and after it along its stem; the first bones of stems; and the slices
+    of stems that are surfaces (binding.bones.Bones, slices).
     """
     meshes = meshes_of(motion, looks_of(motion, objects_of(motion)), Path(fspath(path)).stem)
     left_out = {"left_out": meshes.left_out} if meshes.left_out else {}
@@ -197,7 +203,9 @@ def _offset_count(shape: GltfMesh) -> int:
 
 
 def _smaller(motion: Motion, offset_count: int, joints: Joints | None) -> str:
-    """Return whether "morphs" or "joints" make the smaller file, as far as joints keep the error that is allowed."""
+    """Return "morphs" or "joints", whichever makes the smaller file; joints only if their error is allowed.
+    `offset_count` is the number of vertices that each morph target moves.
+    """
     morphs = motion.frame_count * (12 * offset_count + 4 * motion.frame_count + BYTES_PER_TARGET)
     fits = joints is not None and joints.max_error <= allowed_error(motion)
     if joints is None or not fits and _morphs_fit(motion, offset_count):
@@ -230,8 +238,9 @@ def _add_animation(glb: Glb, take: Take, samplers: list[JsonObject], channels: l
 def _animate(
     glb: Glb, takes: list[Take], movers: Movers | None, more: list[tuple[list[JsonObject], list[JsonObject]]]
 ) -> None:
-    """Add an animation for each take, of samplers and channels in `more`, and of the movers that are anywhere else than
-    at rest in any of them; one key where such a one stands still in one."""
+    """Add an animation for each take. `more` has the samplers and channels that the take has already; channels are
+    added for all movers that leave their rest pose in any take. A mover that stands still in a take gets a single key.
+    """
     if movers is None:
         movers = Movers([], (np.zeros((0, 3)),) * 3, (np.zeros((takes[-1].stop, 0, 3)),) * 3)
     has_others = bool(more[0][1])
@@ -260,7 +269,9 @@ class _Joined:
     def add(
         self, glb: Glb, root: int, transform: JsonObject, shapes: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
-        """Add the meshes, their joints and the animations of these. Returns no further data."""
+        """Add the meshes, their joints and the animations of these to the GLB, below the node `root`. Return an empty
+        iterator, because no further data follow.
+        """
         joints, movers = self._joints, []
         if joints is not None:
             movers.append(Movers(self._add_skin(glb, root, joints), joints.rest, joints.poses))
@@ -283,7 +294,7 @@ class _Joined:
             self._add_mesh(glb, shape, self._joints)
 
     def _add_skin(self, glb: Glb, root: int, joints: Joints) -> list[int]:
-        """Add the joints as nodes below `root`, and the skin; return the nodes."""
+        """Add the joints as nodes below the node `root`, and the skin. Return the numbers of the joints' nodes."""
         nodes: list[int] = []
         for i, (place, turn) in enumerate(zip(*joints.rest[:2])):
             above = root if joints.parent is None or joints.parent[i] < 0 else nodes[joints.parent[i]]
@@ -300,7 +311,9 @@ class _Joined:
 
 
 def _influences(joints: Joints, source: np.ndarray, dtype: type[np.unsignedinteger]) -> tuple[np.ndarray, np.ndarray]:
-    """Return (n, 4) joints and their weights."""
+    """Return the joints and the weights, (n, 4) each, of n written vertices. `source` (n,) is the clip's vertex that
+    each written vertex is.
+    """
     vertex_joints = np.zeros((len(source), 4), dtype)
     if joints.weights is None:
         weights = np.zeros(vertex_joints.shape, np.uint8)
@@ -328,8 +341,10 @@ def _add_channels(
     samplers: list[JsonObject],
     channels: list[JsonObject],
 ) -> None:
-    """Append samplers and channels. tracks: for each of PATHS the poses, (n, J, width), and as (J,) bool which nodes
-    have a channel and which of those move. A node that moves gets a key per frame, one that is still a single key."""
+    """Append samplers and channels that move nodes. For each of PATHS, `tracks` has the poses (n, J, width) and two
+    bool arrays (J,): which nodes have a channel, and which of them move. A node that moves gets a key per frame, any
+    other a single key.
+    """
     inputs: dict[int, int] = {}  # accessors of times, by their number
     for path, (values, is_used, moving) in zip(PATHS, tracks):
         for chosen_nodes, count in ((moving, len(values)), (is_used & ~moving, 1)):
@@ -359,7 +374,9 @@ class _Morphed:
     def add(
         self, glb: Glb, root: int, transform: JsonObject, parts: list[GltfMesh | GltfCopies], report: Progress
     ) -> Iterator[bytes]:
-        """Add the meshes with a morph target for each frame; return the data of the targets, part by part."""
+        """Add the meshes with a morph target for each frame to the GLB, below the node `root`. Yield the bytes of the
+        targets, which follow the rest of the file.
+        """
         shapes, meshes, channels, movers = [], [], [], []
         for shape in parts:
             if isinstance(shape, GltfCopies):
@@ -381,7 +398,9 @@ class _Morphed:
         return self._targets(glb, shapes, bounds, least, report)
 
     def _add_targets(self, glb: Glb, shapes: list[GltfMesh], meshes: list[int], view: int) -> list[list[JsonObject]]:
-        """Return the accessors of positions, by frame and mesh, whose bounds are not known yet."""
+        """Add the accessors of the morph targets and return those of positions, whose bounds are not known yet, as a
+        list per frame with one item per mesh.
+        """
         accessors: list[list[JsonObject]] = []
         place = 0
         for _ in range(self._motion.frame_count):
@@ -401,8 +420,9 @@ class _Morphed:
     def _targets(
         self, glb: Glb, shapes: list[GltfMesh], accessors: list[list[JsonObject]], least: float, report: Progress
     ) -> Iterator[bytes]:
-        """Yield the bytes of the morph targets frame by frame: offsets from the rest pose, and normals. least: a length
-        below which errors do not count."""
+        """Yield the bytes of the morph targets frame by frame: offsets of positions from the rest pose, and of normals.
+        `least` is the smallest error that is reported, in scene units.
+        """
         rest = np.asarray(self._motion.rest).astype(np.float32)
         normals = MovingNormals(self._surface, rest)
         largest = least**2

@@ -52,6 +52,7 @@ class Glb:
     """A file that is being made: `json` is its structure, arrays are added to its binary chunk."""
 
     def __init__(self, extras: JsonMapping):
+        """Begin a GLB with an empty scene; `extras` are stored in its asset."""
         self.json: JsonObject = {
             "asset": {"version": "2.0", "generator": f"athcodec {__version__}", "extras": dict(extras)},
             "scene": 0,
@@ -65,7 +66,9 @@ class Glb:
         self._length = 0
 
     def node(self, parent: int | None = None, **values: Any) -> int:
-        """Return a node below another, or of the scene."""
+        """Add a node below the node `parent`, or to the scene without one, and return its number. `values` are the
+        node's members.
+        """
         self.json["nodes"].append(values)
         index = len(self.json["nodes"]) - 1
         above = (
@@ -91,7 +94,9 @@ class Glb:
         return len(self.json["accessors"]) - 1
 
     def array(self, values: np.ndarray, bounds: bool = False, normalized: bool = False, **view: Any) -> int:
-        """Return an accessor of its own for (count, width) values; those of vertices are padded to whole words."""
+        """Store values (count, width) with an accessor of their own and return the accessor's number. Values of
+        vertices are padded to whole words of four bytes.
+        """
         values = np.ascontiguousarray(values.reshape(len(values), -1))
         more: JsonObject = {"normalized": True} if normalized else {}
         if bounds:
@@ -120,8 +125,9 @@ class Glb:
         self._length += len(padding)
 
     def write(self, out: BinaryIO, later: Iterable[bytes] = ()) -> None:
-        """Write the whole file. `later` are the bytes of the views that were made last, of whole words; accessors'
-        bounds may still be filled in place of UNKNOWN_BOUND while they come."""
+        """Write the whole file. `later` yields the bytes of the views that were made last, in whole words. While it
+        does, bounds of accessors that are UNKNOWN_BOUND may still be filled in.
+        """
         self.json["buffers"] = [{"byteLength": self._length}]
         room = len(self._text())
         room += -room % 4
@@ -175,7 +181,9 @@ class GltfMeshes:
 
 
 def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.ndarray] | None = None) -> GltfMeshes:
-    """Return the objects of a clip; `more`: further attributes by semantic, (N, width)."""
+    """Return the objects of a clip as meshes of glTF, with what was left out. `more` has further attributes (N, width)
+    by their semantic.
+    """
     faces = motion.polygons
     triangles = _triangles(*faces) if faces is not None else np.zeros((0, 3), np.int64)  # places among the corners
     corner_vertex = np.asarray(faces[1], np.int64) if faces is not None else np.zeros(0, np.int64)
@@ -223,7 +231,9 @@ def meshes_of(motion: Motion, looks: Looks, name: str, more: Mapping[str, np.nda
 def add_mesh(
     glb: Glb, mesh: GltfMesh, rest: np.ndarray, attributes: Mapping[str, np.ndarray] | None = None, **primitive: Any
 ) -> int:
-    """Add a mesh to the file, in its rest pose (N, 3)."""
+    """Add a mesh in its rest pose (N, 3) to the file and return its number. `attributes` has further arrays by their
+    semantic, and `primitive` further members of each primitive.
+    """
     semantic = {"POSITION": glb.array(rest[mesh.source].astype(np.float32), bounds=True, target=VERTICES)}
     for key, values in (mesh.attributes | dict(attributes or {})).items():
         is_ratio = key == COLOUR or key.startswith("WEIGHTS_")
@@ -269,7 +279,7 @@ def material_of(look: Look, has_colours: bool) -> JsonObject:
 
 
 def root_transform(motion: Motion) -> JsonObject:
-    """Return translation, rotation and scale of the node that takes the clip's axes and unit to those of glTF."""
+    """Return the translation, rotation and scale of the node that turns the clip's axes and unit into those of glTF."""
     metadata = motion.metadata
     metres = metres_of(metadata) or 1.0
     axis = str(metadata.get("up_axis", "y")).lower()
@@ -311,7 +321,9 @@ def takes(motion: Motion) -> list[Take]:
 
 
 def _take(motion: Motion, clip_range: ClipRange, start: int, stop: int) -> Take:
-    """Return the animation for a range of frames: its times in seconds from 0, and whether it is a loop."""
+    """Return the animation of the frames `start` to `stop` - 1: its name, its times in seconds from 0, and whether it
+    is a loop.
+    """
     times = np.asarray(motion.time[start:stop], np.float64)
     is_loop = clip_range.loop and len(times) > 1
     extras = {"loop": True} if clip_range.loop else {}
@@ -355,7 +367,9 @@ def _triangles(counts: np.ndarray, indices: np.ndarray) -> np.ndarray:
 
 
 def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[JsonObject, JsonObject, list[str]]:
-    """Return by semantic (rows, width) values per vertex, and per corner; and the names of the rest."""
+    """Return the clip's attributes in three parts: values (rows, width) per vertex by semantic, values per corner by
+    semantic, and the names of attributes that glTF has no place for.
+    """
     domains = motion.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
     arrays = dict(motion.attributes)
@@ -379,7 +393,9 @@ def _sorted_attributes(motion: Motion, corner_count: int) -> tuple[JsonObject, J
 
 
 def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
-    """Return the semantic of glTF for an array and its values in a type of glTF; None if glTF has none that fits."""
+    """Return glTF's semantic for the array named `name`, and the values in a type of glTF; None if glTF has no semantic
+    that fits.
+    """
     values = array.reshape(len(array), -1)
     semantic, widths = SEMANTICS.get(name, ("", ()))
     if semantic and values.shape[1] in widths:
@@ -393,7 +409,9 @@ def _semantic(name: str, array: np.ndarray) -> tuple[str, np.ndarray] | None:
 
 
 def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
-    """Return as glTF defines them: colours from 0 to 1, normals of length 1; None where they are not."""
+    """Return values as glTF defines them for a semantic: colours from 0 to 1, normals of length 1. Return None if the
+    values are not such.
+    """
     if semantic == COLOUR and values.dtype in (np.uint8, np.uint16):
         return values
     if values.dtype.kind != "f" or not np.isfinite(values).all():
@@ -407,8 +425,9 @@ def _standard(semantic: str, values: np.ndarray) -> np.ndarray | None:
 
 
 def _as_component(values: np.ndarray) -> np.ndarray | None:
-    """Return values in a type that attributes may have and that holds all values; float64 is rounded. None where there
-    is none."""
+    """Return values in the smallest type of glTF that holds all of them; float64 is rounded to float32. Return None if
+    no type holds them.
+    """
     if values.dtype.kind == "f":
         with np.errstate(over="ignore"):
             rounded = values.astype(np.float32)
@@ -427,7 +446,10 @@ def _as_component(values: np.ndarray) -> np.ndarray | None:
 def _split(
     corner_vertex: np.ndarray, per_corner: Mapping[str, np.ndarray], vertex_count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertex that each written one is, (n,): all of the clip's first; and the written one of each corner."""
+    """Return two arrays: the clip's vertex that each written vertex is, (n,), which begins with all vertices of the
+    clip, and the written vertex of each corner. A vertex is written again for each different set of values that its
+    corners have.
+    """
     if not per_corner or not len(corner_vertex):
         return np.arange(vertex_count), corner_vertex
     rows = [corner_vertex.astype("<i8").view(np.uint8).reshape(-1, 8)]
@@ -454,7 +476,9 @@ def _from_corners(values: np.ndarray, corner_place: np.ndarray, count: int) -> n
 
 
 def _objects(motion: Motion, name: str, triangles: np.ndarray, edges: np.ndarray) -> list[tuple[str, int, int]]:
-    """Return (name, first vertex, one past the last); one of all where objects do not hold together."""
+    """Return triples of a name, a first vertex and the vertex after the last, one for each object. If faces or edges
+    join several objects, there is one object of all vertices.
+    """
     counts, names = motion.attributes.get("part_vertex_counts"), motion.metadata.get("part_names")
     whole = [(names[0] if isinstance(names, list) and len(names) == 1 else name, 0, motion.vertex_count)]
     if counts is None or not isinstance(names, list) or len(names) != len(counts) or np.min(counts, initial=1) < 1:

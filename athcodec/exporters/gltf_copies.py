@@ -37,7 +37,7 @@ class Movers:
 
     @classmethod
     def all_of(cls, movers: list[Movers]) -> Movers | None:
-        """Return the arrays of several movers as one; None if there are none."""
+        """Return the nodes and poses of several movers as one; None if the list is empty."""
         if not movers:
             return None
         return cls(
@@ -62,7 +62,9 @@ class GltfCopies:
     names: list[str] | None = None
 
     def add(self, glb: Glb, parent: int | None, transform: JsonObject) -> list[Movers]:
-        """Return the mesh and its nodes, below one with a transform; those that move."""
+        """Add the shape as a mesh and a node for each copy, below a node with `transform`. Return the nodes that move,
+        with their poses; an empty list if all copies stand still.
+        """
         mesh = add_mesh(glb, self.shape, self.copies.shape)
         poses = self.copies.places, self.copies.turns, self.copies.scales
         is_still = all((pose == pose[:1]).all() for pose in poses)
@@ -80,6 +82,9 @@ class GltfCopies:
         return [] if is_still else [Movers(nodes, self.copies.rest, poses)]
 
     def _add_instancing(self, glb: Glb, parent: int | None, mesh: int, transform: JsonObject) -> None:
+        """Add one node that shows the mesh once for each copy, by EXT_mesh_gpu_instancing, for copies that stand
+        still.
+        """
         poses = self.copies.places[0], self.copies.turns[0], self.copies.scales[0]
         parts = {path.upper(): glb.array(pose) for path, pose in zip(PATHS, poses)}
         parts |= {key: glb.array(values) for key, values in self.copy_attributes.items()}
@@ -91,9 +96,10 @@ class GltfCopies:
 
 
 def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh | GltfCopies], dict[str, list[str]]]:
-    """Return the meshes, those that are copies of one shape as such: where transforms keep them within what the level
-    is off, and they have one set of texture coordinates and colours; and lost_copies. Attributes that copies lose all
-    lose."""
+    """Return the meshes, with those that are copies of one shape stored as such, and the names of objects whose copies
+    are written as one mesh instead, by the reason. Copies need transforms within the level's error, and one set of
+    texture coordinates and colours. An attribute that copies lose is dropped from all meshes.
+    """
     runs, allowed = list(_runs(objects_of(motion))), allowed_error(motion)
     if sum(len(run) for run in runs) != len(meshes):
         return list(meshes), {}
@@ -116,7 +122,9 @@ def with_copies(motion: Motion, meshes: list[GltfMesh]) -> tuple[list[GltfMesh |
 
 
 def _runs(objects: list[SceneObject]) -> Iterator[list[SceneObject]]:
-    """Yield objects side by side that have as many vertices in the same faces; each other one alone."""
+    """Yield lists of consecutive objects that have equally many vertices in the same faces; any other object is a list
+    of its own.
+    """
     run: list[SceneObject] = []
     for obj in objects:
         if run and not _is_alike(run[0], obj):
@@ -138,7 +146,9 @@ def _is_alike(one: SceneObject, other: SceneObject) -> bool:
 
 
 def _together(run: list[SceneObject]) -> SceneObject:
-    """Return one object in place of a run of objects that are alike, as that many copies of the first."""
+    """Return one object in place of a run of objects that are alike: copies of the first object, as many as there are
+    objects.
+    """
     first, last = run[0], run[-1]
     if len(run) == 1:
         return first
@@ -156,7 +166,7 @@ def _together(run: list[SceneObject]) -> SceneObject:
 
 
 def _joined(shapes: list[GltfMesh]) -> GltfMesh:
-    """Return one mesh of several, which are drawn alike."""
+    """Return one mesh in place of several that are drawn alike."""
     if len(shapes) == 1:
         return shapes[0]
     starts = np.cumsum([0] + [len(shape.source) for shape in shapes])
@@ -198,8 +208,9 @@ def _hold(motion: Motion, copies: Copies, allowed: float) -> None:
 
 
 def _as_copies(shape: GltfMesh, obj: SceneObject, copies: Copies) -> GltfCopies | None:
-    """Return the meshes as copies of one; None if copies have materials, texture coordinates or colours of their
-    own."""
+    """Return a mesh as copies of one shape. Return None if its copies differ in materials, texture coordinates or
+    colours.
+    """
     copy, local = np.divmod(shape.source - obj.first, obj.count // obj.copies)
     if (np.bincount(copy) * obj.copies != len(copy)).any():
         return None

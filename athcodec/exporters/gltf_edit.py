@@ -23,8 +23,9 @@ Reference = tuple[str, JsonValue, JsonValue]
 
 
 def _references(gltf: JsonObject) -> Iterator[Reference]:
-    """Yield every index of the file's arrays into each other, but those of meshes, animations and what these do not
-    need."""
+    """Yield every index by which entries of the file's arrays refer to each other, except from meshes, animations and
+    what these alone need.
+    """
     for scene in gltf.get("scenes", ()):
         yield from _each("nodes", scene, "nodes")
     for node in gltf.get("nodes", ()):
@@ -84,7 +85,9 @@ def used_numbers(gltf: JsonObject) -> dict[str, set[int]]:
 
 
 def prune(gltf: JsonObject, before: dict[str, set[int]], needless: set[int]) -> None:
-    """Remove these nodes, and what was referred to before and is no more."""
+    """Remove the nodes `needless` from the JSON, and every entry that was referred to `before` and is not any more.
+    `before` has the numbers of such entries by the name of their array.
+    """
     _remove(gltf, "skins", before["skins"] - used_numbers(gltf)["skins"])
     for holder, key in [(scene, "nodes") for scene in gltf.get("scenes", ())] + [
         (node, "children") for node in gltf["nodes"]
@@ -99,7 +102,9 @@ def prune(gltf: JsonObject, before: dict[str, set[int]], needless: set[int]) -> 
 
 
 def _remove(gltf: JsonObject, kind: str, dead: set[int]) -> None:
-    """Remove entries of an array to which nothing that remains refers; the others get new numbers."""
+    """Remove the entries numbered `dead` of the array `kind`, to which nothing refers any more. The other entries get
+    new numbers, and references follow.
+    """
     if not dead:
         return
     place = np.cumsum([index not in dead for index in range(len(gltf[kind]))]) - 1
@@ -133,7 +138,9 @@ class Binary:
         self._old = self._old[:start] + data + self._old[start + len(data) :]
 
     def attribute(self, values: np.ndarray, bounds: bool = False) -> int:
-        """Return an accessor of (count, width) values of vertices, each padded to whole words."""
+        """Store values (count, width) of vertices, each padded to whole words of four bytes, and return the number of
+        their accessor. `bounds` also states their least and largest values.
+        """
         width, item = values.shape[1], values.itemsize * values.shape[1]
         padded = np.zeros((len(values), item + -item % 4), np.uint8)
         padded[:, :item] = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), item)
@@ -158,7 +165,9 @@ class Binary:
         return index
 
     def packed(self, gltf: JsonObject) -> bytes:
-        """Return the bytes without those that only views had which are gone; the views' offsets become those in it."""
+        """Return the file's binary data without the bytes that only removed views had. The offsets of the remaining
+        views are changed to match.
+        """
         data = bytes(self._old).ljust(self._start, b"\0") + bytes(self._added)
         needless = np.zeros(len(data) + 1, bool)
         for holder in _byte_ranges(self._views_before):
@@ -187,6 +196,7 @@ def _byte_ranges(views: list[JsonObject]) -> Iterator[JsonObject]:
 
 
 def glb_bytes(gltf: JsonObject, data: bytes) -> bytes:
+    """Return a GLB of the JSON `gltf` and the binary `data`. Raise ClipError if it would have 4 GiB or more."""
     gltf.setdefault("buffers", [{}])[0]["byteLength"] = len(data)
     data = data + bytes(-len(data) % 4)
     text = json.dumps(gltf, separators=(",", ":"), allow_nan=False, ensure_ascii=False).encode()

@@ -65,6 +65,9 @@ class Into:
     """
 
     def __init__(self, path: FilePath, options: ReadOptions, keep_animation: bool = False, name: str | None = None):
+        """Read the moving meshes of the GLB at `path` as one clip, `clip`. `keep_animation` leaves the file's own
+        animation in place, and `name` is the name of the motion. Raise ClipError if the GLB cannot take a motion.
+        """
         self.path, self._keep, self._name = os.fspath(path), keep_animation, name
         self.lost: dict[str, list[str]] = {}
         with naming(path, *BROKEN):
@@ -85,6 +88,9 @@ class Into:
             raise
 
     def _check(self) -> None:
+        """Raise ClipError if the file is no GLB with all its bytes inside, or has a motion of the wanted name
+        already.
+        """
         with open(self.path, "rb") as file:
             if file.read(4) != MAGIC:
                 raise ClipError(
@@ -107,7 +113,9 @@ class Into:
         self.close()
 
     def write(self, path: FilePath, encoded: FilePath) -> None:
-        """Write the file with the .ath file `encoded` of `clip` in it, once. Raises ClipError, OSError."""
+        """Write the GLB with the .ath file `encoded`, of the clip `clip`, in it. This can be called once. Raise
+        ClipError, OSError.
+        """
         with naming(self.path, *BROKEN):
             self._check_unchanged()
             used = used_numbers(self._json)
@@ -130,7 +138,9 @@ class Into:
             raise ClipError("got another file than when it was opened, expected the same")
 
     def _motion(self, view: int, ath: bytes, animations: list[JsonObject]) -> JsonObject:
-        """Return clips begin when their animations' first keys do, and keep what these say in extras."""
+        """Return the entry of ATH_motion for the bytes `ath`, stored in the view numbered `view`. Each clip states when
+        it begins, which is the first key of its animation, and the extras of that animation.
+        """
         extras = {animation.get("name"): animation.get("extras") for animation in animations}
         clips = []
         with AthFile(io.BytesIO(ath)) as file:
@@ -144,6 +154,9 @@ class Into:
     # ---- meshes and nodes ----
 
     def _replace_motion(self, binary: Binary) -> None:
+        """Remove what moved the meshes before, unless it is to be kept, and let ATH_motion move their primitives
+        instead.
+        """
         gltf, moving = self._json, {node.index for node in self._nodes}
         bound = {}
         for index in sorted(moving):
@@ -173,6 +186,9 @@ class Into:
         _drop_channels(gltf, moving, meshes, self._needless)
 
     def _replace_part(self, part: GltfNode, mesh: JsonObject | None, binary: Binary) -> None:
+        """Let ATH_motion move the primitives of one mesh, with attributes that fit the motion's space. `mesh` is the
+        copy of the mesh, if other nodes show the original.
+        """
         primitives = part.primitives
         if mesh is not None:
             originals = self._json["meshes"][part.mesh]["primitives"]
@@ -215,7 +231,9 @@ class Into:
     def _dress(
         self, part: GltfNode, siblings: list[JsonObject], drawn: list[tuple[JsonObject, np.ndarray]], binary: Binary
     ) -> None:
-        """Give primitives without a material one, and normals where they have none; `siblings` are all of the mesh."""
+        """Give a material to primitives that have none, and normals where they lack them. `drawn` has each primitive
+        with its triangles, and `siblings` all primitives of the mesh, to which further ones are added.
+        """
         if all("material" in primitive for primitive, _ in drawn):
             return
         faces = np.concatenate([rows for _, rows in drawn])
@@ -251,7 +269,7 @@ class Into:
         return materials.index(material)
 
     def _attributes(self, part: GltfNode, binary: Binary) -> dict[str, int]:
-        """Return the attributes of a part that change, as new accessors."""
+        """Store the attributes of a part that change, and return the numbers of the new accessors by their semantic."""
         accessors = {}
         rest = self.clip.source_rest[self._vertices(part)]
         positions = part.attributes["POSITION"]
@@ -272,7 +290,7 @@ class Into:
         return np.arange(part.first, part.first + part.count) if self._vertex is None else self._vertex[part.vertices]
 
     def _move_mesh(self, index: int) -> None:
-        """Move the mesh of a node to a new node, in the motion's space."""
+        """Move the mesh of the node numbered `index` to a new node of the scene, in the motion's space."""
         gltf, node = self._json, self._json["nodes"][index]
         matrix = self._placement.space
         if not self._placement.is_always_shown(index):
@@ -301,9 +319,10 @@ def _named(clip: MotionClip) -> MotionClip:
 
 
 def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None:
-    """Write the GLB `path` with morph targets, a frame each, in place of the motions of ATH_motion that `views` show.
+    """Write the GLB `path` to `out` with a morph target per frame in place of the motions of ATH_motion that `views`
+    show.
 
-    Raises ClipError where these are more than glTF can sensibly hold, OSError.
+    Raise ClipError if there are more targets than glTF can sensibly hold, OSError if a file cannot be read or written.
     """
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         gltf, used, binary, needless = file.json, used_numbers(file.json), Binary(file), set[int]()
@@ -326,8 +345,9 @@ def write_back(path: FilePath, views: Sequence[ClipView], out: FilePath) -> None
 
 
 def _remove_motions(gltf: JsonObject, numbers: set[int]) -> None:
-    """Remove motions of the file, and with the last of them the extension; primitives that others move name these
-    anew."""
+    """Remove the motions `numbers` from the file, and the extension with the last motion. Primitives that remaining
+    motions move get the new numbers.
+    """
     extension = gltf["extensions"][EXTENSION]
     kept = [number for number in range(len(extension["motions"])) if number not in numbers]
     if not kept:
@@ -344,9 +364,10 @@ def _remove_motions(gltf: JsonObject, numbers: set[int]) -> None:
 
 
 def put_motion(path: FilePath, ath: bytes, out: FilePath, number: int) -> int:
-    """Write the GLB `path` with these bytes in place of those of a motion of it, which are as many or more; its size.
+    """Write the GLB `path` to `out` with the bytes `ath` in place of those of its motion `number`, which must be as
+    many or more. Return the size of the new file.
 
-    Raises ClipError where it is no GLB that holds the motion inside, OSError.
+    Raise ClipError if `path` is no GLB that holds the motion inside, OSError if a file cannot be read or written.
     """
     with naming(path, *BROKEN), closing(GltfFile(path)) as file:
         motion = entries(extension_of(file.json) or {}, "motions")[number]
@@ -367,8 +388,9 @@ def _has_normals(primitive: JsonObject) -> bool:
 
 
 def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion: ClipView) -> None:
-    """Add a morph target per frame for each primitive that moves, and as many without effect for the others of its
-    mesh."""
+    """Add a morph target per frame to each primitive that moves, and as many targets without effect to the other
+    primitives of its mesh.
+    """
     gltf, rest = file.json, np.asarray(motion.rest).astype(np.float32)
     counts, corners = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     normals, at_rest = MovingNormals(Surface(counts, corners, rest), rest), {}
@@ -402,8 +424,10 @@ def _add_targets(file: GltfFile, binary: Binary, places: list[GltfPlace], motion
 def _morph_nodes(
     gltf: JsonObject, binary: Binary, places: list[GltfPlace], motion: ClipView, stated: dict[str, JsonObject]
 ) -> set[int]:
-    """Animate the weights of nodes that show meshes which move, by each clip, in the animation of its name; what moved
-    them before goes. Returns the nodes that nothing needs any more."""
+    """Animate the weights of the nodes whose meshes move, with one animation per clip, and remove what moved these
+    meshes before. `stated` has what the file says of each clip, by name. Return the numbers of nodes that are no longer
+    needed.
+    """
     moved = {id(primitive) for primitive, _ in places}
     moving = {
         index
@@ -425,6 +449,9 @@ def _morph_nodes(
 
 
 def _animate(gltf: JsonObject, name: str, extras: JsonObject, sampler: dict[str, int], nodes: list[int]) -> None:
+    """Add a sampler, and channels by which it sets the weights of `nodes`, to the animation `name`. If there is no such
+    animation, it is made with `extras`.
+    """
     every = gltf.setdefault("animations", [])
     animation = next((one for one in every if one.get("name") == name), None)
     if animation is None:
@@ -444,8 +471,9 @@ def _pop_extension(holder: JsonObject) -> None:
 
 
 def _twins(clip: MotionClip) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the first of the vertices that share their places in all frames, and which of these each vertex is; None
-    where twins are few."""
+    """Find vertices that coincide in all frames. Return the first vertex of each set, and the number of its set for
+    each vertex; None instead of the latter if few vertices coincide.
+    """
     everyone = np.arange(clip.vertex_count)
     kind = _kinds(np.zeros(clip.vertex_count, np.int64), clip.source_rest)
     for _, block in clip.blocks():
@@ -476,8 +504,9 @@ def _kinds(kind: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> MotionClip:
-    """Return the clip with one vertex for each that coincides with others. first: the kept vertices; vertex: the new
-    number of each vertex."""
+    """Return the clip with one vertex in place of each set of coinciding vertices. `first` lists the vertices to keep,
+    and `vertex` has the new number of each vertex.
+    """
     source = clip.positions
     skin = clip.skin and clip.skin.__class__(clip.skin.joint_parent, clip.skin.vertex_joint[first], clip.skin.names)
     return clip.replace(
@@ -495,7 +524,9 @@ def _without_twins(clip: MotionClip, first: np.ndarray, vertex: np.ndarray) -> M
 
 
 def _drop_channels(gltf: JsonObject, moving: set[int], meshes: set[int], needless: set[int]) -> None:
-    """Remove the channels of the weights of these nodes and meshes, and all channels of needless nodes."""
+    """Remove animation channels: those of the weights of the nodes `moving` and of `meshes`, and all channels of the
+    nodes `needless`.
+    """
 
     def stays(target: Target | str) -> bool:
         if isinstance(target, str):
@@ -535,8 +566,9 @@ def _knows_references(gltf: JsonObject) -> bool:
 
 
 def _needless_nodes(gltf: JsonObject, freed: set[int]) -> set[int]:
-    """Return the nodes that moved vertices, those above and those below them, which show nothing, no skin uses, and
-    nothing that stays is below."""
+    """Return the nodes that can be removed once vertices move by themselves: of the nodes `freed`, their ancestors and
+    descendants, those that show nothing, that no skin uses, and that have no node below that stays.
+    """
     nodes = gltf["nodes"]
     parent = {child: index for index, node in enumerate(nodes) for child in node.get("children", ())}
     related = set(freed)

@@ -51,8 +51,9 @@ class Joints:
 def fit_joints(
     motion: Motion, allowed: float, most: int, report: Progress, chosen: np.ndarray | None = None
 ) -> Joints | None:
-    """Return joints that are at most about `allowed` off; None where that takes more than `most`. chosen (N,) bool: the
-    vertices that they are to move, all by default."""
+    """Return joints that move vertices to within about `allowed` of the motion, in scene units; None if that takes more
+    than `most` joints. `chosen` (N,), bool, tells which vertices they move, by default all.
+    """
     fitted = (1 - 4 * SLACK) * allowed  # `hold` takes up to 3 of these SLACKs, rounding some of the fourth.
     moving = fit(motion, Placed, fitted, most, lambda done: report(0.7 * done), chosen)
     if moving is None:
@@ -77,6 +78,9 @@ def _singles(pose: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def _measured(motion: Motion, joints: Joints, chosen: np.ndarray | None, report: Progress) -> float:
+    """Return the largest distance between the motion and the vertices that the joints move, in all frames. `chosen`
+    (N,), bool, limits it to some vertices.
+    """
     rows = slice(None) if chosen is None else chosen
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     largest = 0.0
@@ -89,8 +93,10 @@ def _measured(motion: Motion, joints: Joints, chosen: np.ndarray | None, report:
 
 
 def hold(poses: Sequence[np.ndarray], still: Sequence[np.ndarray], extent: np.ndarray, slack: float) -> None:
-    """Make constant, as in the first frame or better as at rest, what moves no vertex by `slack`: of translations,
-    rotations and scales (T, K, width), those at rest (K, width), and how far vertices go along the axes (K, 3)."""
+    """Make poses constant where no vertex moves further than `slack`: equal to the rest pose if that is close enough,
+    else to the first frame. `poses` has the translations, rotations and scales (T, K, width) of K joints, `still` those
+    at rest (K, width), and `extent` (K, 3) how far vertices reach along each joint's axes.
+    """
     scaled = extent * np.abs(poses[2]).max(axis=0)
     around = np.sqrt((scaled**2).sum(axis=1, keepdims=True) - scaled**2)  # from each axis
     moves: tuple[Callable[[np.ndarray, np.ndarray], np.ndarray], ...] = (

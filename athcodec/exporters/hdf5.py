@@ -71,6 +71,10 @@ class Hdf5Writer:
         metadata: JsonMapping | None = None,
         gzip: bool = False,
     ) -> None:
+        """Create the file under a temporary name and write all arrays but the positions. `time` (T,) is in seconds,
+        `rest` (N, 3) the rest pose, `dtype` the type of positions, and `gzip` compresses arrays. Raise ClipError,
+        OSError.
+        """
         dtype, rest = np.dtype(dtype), np.asarray(rest)
         check_float_dtype("positions", dtype)
         check_float_dtype("rest", rest.dtype)
@@ -116,7 +120,7 @@ class Hdf5Writer:
             self.abort()
 
     def add(self, frames: np.ndarray) -> None:
-        """Append frames.
+        """Append consecutive frames of positions to the file.
 
         Parameters
         ----------
@@ -125,9 +129,9 @@ class Hdf5Writer:
         Raises
         ------
         ClipError
-            Where their shape is another or there are too many.
+            If the frames have another shape, or there are more than the file has times for.
         OSError
-            Where they cannot be written.
+            If the frames cannot be written.
         """
         frames = np.asarray(frames)
         if frames.ndim != 3 or frames.shape[1:] != (self._vertex_count, 3):
@@ -140,12 +144,12 @@ class Hdf5Writer:
         self._written = stop
 
     def close(self) -> None:
-        """Complete the file and give it its name; a second time does nothing.
+        """Complete the file and rename it to its final name. If the file is closed already, do nothing.
 
         Raises
         ------
         ClipError
-            Where frames are missing.
+            If fewer frames were added than the file has times for.
         OSError
             Where the file cannot be written.
         """
@@ -163,7 +167,7 @@ class Hdf5Writer:
             raise
 
     def abort(self) -> None:
-        """Remove what has been written; does nothing once the file is closed."""
+        """Remove the file as far as it has been written. If it is complete already, do nothing."""
         pending, self._pending = self._pending, None
         if pending is None:
             return
@@ -174,6 +178,7 @@ class Hdf5Writer:
             pending.discard()
 
     def _create_positions(self, dtype: np.dtype) -> h5py.Dataset:
+        """Create and return the dataset of positions (T, N, 3), in compressed chunks if the file is compressed."""
         shape = (self._frame_count, self._vertex_count, 3)
         options = self._compression()
         if options:
@@ -198,10 +203,11 @@ class Hdf5Writer:
 
 
 def write_clip(clip: Any, path: FilePath, options: WriteOptions, report: Progress) -> None:
-    """Write `clip` to `path`, block by block; see Hdf5Writer.
+    """Write a clip to `path`, block by block, as Hdf5Writer does.
 
-    `clip` is a MotionClip, a ClipView, or anything with time, vertex_branch, branch_parent, rest, dtype and blocks()
-    like them; stem_index, edges, faces, attributes, metadata, clip_ranges and source_rest where it has them.
+    `clip` is a MotionClip, a ClipView, or any object with time, vertex_branch, branch_parent, rest, dtype and blocks()
+    like theirs. The attributes stem_index, edges, faces, attributes, metadata, clip_ranges and source_rest are written
+    if it has them.
     """
     optional = ("vertex_branch", "branch_parent", "stem_index", "edges", "faces", "attributes")
     writer = Hdf5Writer(
@@ -244,6 +250,9 @@ class Sink:
         return len(data)
 
     def readinto(self, buffer: Any) -> int:
+        """Fill a buffer with the next bytes of the file. After an error, which is kept, or at the end, the rest is
+        filled with zeros; always return the buffer's length.
+        """
         view, done = memoryview(buffer).cast("B"), 0
         while done < len(view) and self._error is None:
             with self._noting():
@@ -287,8 +296,8 @@ def _further(attributes: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarra
 
 
 def _attribute(value: JsonValue) -> JsonValue:
-    """Return `value` as HDF5 can hold it: what is neither a scalar, a text nor an array of one kind becomes JSON
-    text.
+    """Return a value in a form that HDF5 attributes can hold. Anything but a scalar, a text or an array of one type
+    becomes JSON text.
     """
     if value is None:
         return h5py.Empty("f4")

@@ -75,8 +75,10 @@ def looks_of_mesh(surface: Surface, name: str) -> Looks:
 
 
 def _looks(surface: Surface, labels: np.ndarray, names: list[str], objects: list[tuple[str, slice, bool]]) -> Looks:
-    """Return the looks. labels (F,): the names of the faces' materials, -1 for none; objects: the name of each, its
-    faces, and whether it states that these are seen from both sides."""
+    """Return the materials with their colours. `labels` (F,) has the number in `names` of each face's material, -1 for
+    none. `objects` has the name of each object, its faces, and whether it states that its faces are seen from both
+    sides.
+    """
     kinds = np.where(surface.is_open, KINDS.index(LEAVES), KINDS.index(STEMS))
     states_sides = np.zeros(len(labels), bool)
     for object_name, rows, is_stated in objects:
@@ -123,8 +125,9 @@ def _named(motion: Motion) -> tuple[np.ndarray, list[str]]:
 
 
 def _surfaces(motion: Motion) -> tuple[np.ndarray, list[str]] | None:
-    """Return stems and leaves as texture coordinates tell them apart, of which those of leaves have a first one above
-    1."""
+    """Return a label (F,) for each face and the names of the labels, if texture coordinates tell stems and leaves
+    apart: those of leaves have a first number above 1. Return None if they do not.
+    """
     stated, uv = motion.metadata.get("surfaces"), motion.attributes.get("uv")
     names = stated.split(", ") if isinstance(stated, str) else []
     is_known = len(names) == 2 and names[0] in STEM_SURFACES and names[1] in LEAF_SURFACES

@@ -20,8 +20,9 @@ from athcodec.untyped import JsonObject
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write the cache and its mesh. Raises ClipError where there is another mesh beside it or times are closer than
-    float32 tells apart, OSError where nothing can be written."""
+    """Write the point cache, and beside it the mesh that it moves. Raise ClipError if another mesh is there already, or
+    if times are closer than float32 tells apart, OSError if nothing can be written.
+    """
     check_counts(motion)
     times = np.asarray(motion.time) + start_frame_of(motion.metadata) / frame_rate_of(motion)
     stored = times.astype(">f4")

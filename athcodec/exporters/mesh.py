@@ -48,7 +48,9 @@ def has_mesh(motion: Motion) -> bool:
 
 
 def part_spans(motion: Motion) -> list[tuple[str, int, int]]:
-    """Return (name, first vertex, stop) of the objects; one of all vertices where the clip does not say."""
+    """Return triples of a name, a first vertex and the vertex after the last, one for each object of the clip. A clip
+    that names no objects is one object.
+    """
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     if (
         not isinstance(names, list)
@@ -73,7 +75,9 @@ def _polygons(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _corner_uv(motion: Motion) -> tuple[np.ndarray | None, bool]:
-    """Return texture coordinates of two numbers, and whether they are per corner; None if there are none."""
+    """Return texture coordinates (rows, 2), and whether they have a row per corner (else per vertex); None in place of
+    coordinates if the clip has none.
+    """
     uv = motion.attributes.get("uv")
     if uv is None or uv.ndim != 2 or uv.shape[1] != 2 or uv.dtype.kind != "f":
         return None, False
@@ -113,6 +117,9 @@ class ObjWriter:
         self._colors = motion.attributes["colors"] if _has_obj_colors(motion) else None
 
     def write(self, file: BinaryIO, points: np.ndarray) -> None:
+        """Write one frame as OBJ: the points (N, 3), with colours if the clip has them, and then all lines that do not
+        change.
+        """
         form = COORDINATE_FORMATS[points.dtype.itemsize]
         if self._colors is not None:
             form = form[:-1] + " %.9g %.9g %.9g\n"
@@ -125,7 +132,7 @@ class ObjWriter:
 
 
 def _obj_tail(motion: Motion) -> list[str]:
-    """Return all lines behind those of v."""
+    """Return the lines of an OBJ file that follow the vertices and are the same in all frames."""
     uv, per_corner = _corner_uv(motion)
     lines = [] if uv is None else [f"vt {u:.9g} {v:.9g}\n" for u, v in uv.tolist()]
     faces = _obj_faces(motion, uv is not None, per_corner)
@@ -162,7 +169,9 @@ def _parts_of(stops: np.ndarray, vertices: np.ndarray | None) -> np.ndarray | No
 
 
 def _obj_faces(motion: Motion, has_uv: bool, per_corner: bool) -> list[str]:
-    """Return a line per face, behind the lines of the group and the material that it is the first of."""
+    """Return a line for each face of an OBJ file, with the lines of its group and material where these begin.
+    `per_corner` tells whether texture coordinates are per corner or per vertex.
+    """
     counts, corners = _polygons(motion)
     vertices = (np.asarray(corners, np.int64) + 1).tolist()
     words = [
@@ -192,6 +201,9 @@ class PlyWriter:
     suffix, arrays = ".ply", staticmethod(ply_arrays)
 
     def __init__(self, motion: Motion):
+        """Prepare what all frames of a PLY file share: its header, the columns of its vertices, its faces and its
+        edges.
+        """
         columns = _ply_columns(motion)
         coordinate = "<f4" if motion.dtype.itemsize == 4 else "<f8"
         fields = [(axis, coordinate) for axis in "xyz"]
@@ -224,7 +236,7 @@ class PlyWriter:
 
 
 def _ply_columns(motion: Motion) -> dict[str, np.ndarray]:
-    """Return the numbers that every vertex has beside its position, one column each."""
+    """Return the numbers that each vertex has beside its position, (N,) each, by the name of the PLY property."""
     columns: dict[str, np.ndarray] = {}
     for name, values in motion.attributes.items():
         if domain_of(motion, name) != "vertex" or len(values) != motion.vertex_count or name == "normals":
@@ -255,6 +267,9 @@ def _ply_scene(motion: Motion) -> JsonObject:
 
 
 def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
+    """Return the header lines and the bytes of the faces of a PLY file, with texture coordinates if these are per
+    corner. Both are empty if there are no faces.
+    """
     counts, corners = _polygons(motion)
     if not len(counts):
         return [], b""
@@ -275,7 +290,9 @@ def _ply_faces(motion: Motion) -> tuple[list[str], bytes]:
 
 
 def _ply_rows(corners: np.ndarray, uv: np.ndarray | None, size: int, number: str) -> bytes:
-    """Return faces of `size` corners each."""
+    """Return the bytes of faces that all have `size` corners. `uv` has the texture coordinates of the corners, and
+    `number` the type of the count in front of each face.
+    """
     fields: list[tuple[str, str, tuple[int, ...]]] = [("count", number, ()), ("corners", "<i4", (size,))]
     if uv is not None:
         fields += [("numbers", number, ()), ("uv", "<f4", (2 * size,))]

@@ -25,8 +25,9 @@ from athcodec.sources.npz import METADATA
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> None:
-    """Write the archive. Raises ClipError for an attribute's name that is taken or leads elsewhere, OSError where
-    nothing can be written."""
+    """Write the archive. Raise ClipError if the name of an attribute is taken or leads to another folder, OSError if
+    nothing can be written.
+    """
     arrays = _arrays(motion)
     packing = zipfile.ZIP_DEFLATED if options.gzip else zipfile.ZIP_STORED
     with new_file(path) as file, zipfile.ZipFile(file, "w") as archive:
@@ -44,6 +45,7 @@ def _member(archive: zipfile.ZipFile, name: str, packing: int) -> Any:
 
 
 def _write_positions(motion: Motion, member: Any, report: Progress) -> None:
+    """Write the positions (T, N, 3), block by block, as an array in NumPy's format to an open member of the archive."""
     shape, dtype = (motion.frame_count, motion.vertex_count, 3), motion.dtype.newbyteorder("<")
     np.lib.format.write_array_header_1_0(
         member, {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
@@ -54,6 +56,9 @@ def _write_positions(motion: Motion, member: Any, report: Progress) -> None:
 
 
 def _arrays(motion: Motion) -> dict[str, np.ndarray]:
+    """Return all arrays of the archive but the positions, by name. Raise ClipError if the name of an attribute is taken
+    or leads to another folder.
+    """
     clashing = (RESERVED_NAMES | {METADATA}).intersection(motion.attributes)
     if clashing:
         raise ClipError(f"attributes: got the name {min(clashing)!r}, expected one that the schema does not use")

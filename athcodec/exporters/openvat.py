@@ -30,10 +30,10 @@ HIGHEST = 16384
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says of it. options.half: 16
-    bits in place of float.
+    """Write a MotionClip or a ClipView to the new folder `path`, and return the contents of its JSON file.
+    `options.half` selects 16-bit textures in place of float32.
 
-    Raises ClipError where the texture would be larger than engines take, FileExistsError where `path` exists.
+    Raise ClipError if the texture would be larger than engines accept, FileExistsError if `path` exists.
     """
     size = _size(motion.vertex_count, motion.frame_count)
     name = Path(fspath(path)).stem or "clip"
@@ -64,8 +64,9 @@ def _texels(motion: Motion, width: int) -> tuple[np.ndarray, np.ndarray]:
 def _texture(
     motion: Motion, size: tuple[int, int], half: bool, report: Progress
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return the pixels, the least and the largest offset, and the largest distance of what they show from the
-    motion."""
+    """Return four results: the pixels of the texture, the smallest and the largest offset on each axis, and the largest
+    distance between the motion and what the pixels show. `size` is the texture's width and height.
+    """
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     low, high = _offset_bounds(motion, rest, lambda done: report(0.4 * done))
     pixels = np.zeros((size[1], size[0], 3), np.uint16 if half else np.float32)
@@ -83,7 +84,9 @@ def _texture(
 
 
 def _size(vertices: int, frames: int) -> tuple[int, int]:
-    """Return width and height, powers of two of the smallest area, of those the squarest. Raises ClipError."""
+    """Return the width and height of a texture for all vertices and frames: powers of two of the smallest area, as
+    square as possible. Raise ClipError if it would be too large.
+    """
     sizes = []
     for width in (1 << i for i in range(NARROWEST.bit_length() - 1, WIDEST.bit_length())):
         rows = -(-vertices // width) * frames

@@ -53,8 +53,9 @@ def check_counts(motion: Motion) -> None:
 
 
 def _start_and_step(motion: Motion) -> tuple[float, float]:
-    """Return the number of the first frame, and the frames from one sample to the next. Raises ClipError for uneven
-    times."""
+    """Return the number of the first frame, and the number of frames from one sample to the next. Raise ClipError if
+    the steps in time are uneven.
+    """
     numbers = frame_numbers(motion)
     if len(numbers) < 2:
         return float(numbers[0]), 1.0
@@ -69,8 +70,9 @@ def _start_and_step(motion: Motion) -> tuple[float, float]:
 
 
 def write_cache(motion: Motion, path: FilePath, header: bytes, dtype: str, report: Progress) -> JsonObject:
-    """Write the header and the positions as `dtype`, and the mesh where the clip has one and none is there; return what
-    they have no place for."""
+    """Write `header` and the positions in the type `dtype`, and beside them the mesh, if the clip has one and none is
+    there yet. Return what point caches have no place for.
+    """
     mesh_name = _mesh_to_write(motion, Path(check_target(path)))
     with new_files(path) as folder:
         if mesh_name:
@@ -89,7 +91,9 @@ def _write_frames(motion: Motion, file: BinaryIO, dtype: str, report: Progress) 
 
 
 def _mesh_to_write(motion: Motion, target: Path) -> str:
-    """Return the name of the mesh file, or "" where none is needed. Raises ClipError where there is another."""
+    """Return the name of the mesh file to write beside the cache, or "" if none is needed. Raise ClipError if another
+    mesh has that name.
+    """
     if not has_mesh(motion):
         return ""
     mesh_path = target.with_suffix(".obj")

@@ -24,9 +24,10 @@ class SinglesMotion(Motion, Protocol):
 
 
 def in_singles(motion: Motion, can_move: bool) -> SinglesMotion:
-    """Return a float64 motion about `origin` (3,), which is 0 unless the format can hold it and float32 needs it.
+    """Return the motion in float64, relative to its new attribute `origin` (3,). The origin is 0 unless `can_move` is
+    true and the positions are too far from 0 for float32.
 
-    Its `rounding` is the largest distance by which float32 moves a vertex in the blocks that were read so far.
+    The attribute `rounding` is the largest distance by which float32 moves a vertex in the blocks read so far.
     """
     rest = np.asarray(motion.rest, np.float64)
     place = (rest.min(axis=0) + rest.max(axis=0)) / 2 if can_move and is_far(rest) else np.zeros(3)

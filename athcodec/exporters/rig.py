@@ -63,8 +63,10 @@ class _Parts:
         return int(np.maximum(self.chain, 1).sum())
 
     def finer(self, hierarchy: Hierarchy, off: np.ndarray, allowed: float, most: int) -> _Parts:
-        """Return the worst of them cut in two, or of longer chains: a run of subtrees between two of them, a subtree
-        into its stem and what hangs on that. off (K,): how far off each is. The same where nothing is to be done."""
+        """Return the parts with the worst ones cut in two or given longer chains of joints, `most` joints in all. A run
+        of subtrees is cut in the middle, and a single subtree into its stem and what hangs on the stem. `off` (K,) is
+        the error of each part; if all are within `allowed`, the same parts are returned.
+        """
         rows: list[list[tuple[int, int, int]]] = [
             [part] for part in zip(self.branch.tolist(), self.stop.tolist(), self.chain.tolist())
         ]
@@ -81,8 +83,10 @@ class _Parts:
 def _cut(
     hierarchy: Hierarchy, branch: int, stop: int, chain: int, excess: float, left: int
 ) -> list[tuple[int, int, int]]:
-    """Return a part of the hierarchy, branches `branch` to `stop` - 1, cut into parts that get a joint each, with at
-    most `left` further joints."""
+    """Cut one part, the branches `branch` to `stop` - 1, and return the new parts as triples (first branch, branch
+    after the last, joints of the chain; 0: no chain). `excess` is the part's error over the allowed error, and at most
+    `left` joints may be added.
+    """
     if chain:
         room = min(LONGEST_CHAIN, int(hierarchy.stem_count[branch]), chain + left)
         return [(branch, stop, max(min(int(np.ceil(chain * min(np.sqrt(excess), 2.0))), room), chain))]
@@ -98,8 +102,9 @@ def _cut(
 
 
 def fit_rig(motion: Motion, most: int = RIG_JOINTS, report: Progress = lambda done: None) -> Joints:
-    """Return the joints of a motion, `most` at most beside the root. A clip without branches gets those that are
-    found."""
+    """Return the joints of a motion, at most `most` beside the root. If the clip names no branches, branches are
+    found.
+    """
     hierarchy = hierarchy_to_rig(motion)
     order = hierarchy.vertex_source
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)[order]
@@ -128,8 +133,9 @@ def hierarchy_to_rig(motion: Motion) -> Hierarchy:
 
 
 def _along(points: np.ndarray) -> np.ndarray:
-    """Return (n,) from 0 to 1: how far points that run from base to tip, as rings of a tube do, lie along its centre
-    line."""
+    """Return how far each point lies along the centre line of its stem, (n,) from 0 at the base to 1 at the tip. Points
+    run from base to tip, as the rings of a tube do.
+    """
     bins = min(BINS, len(points))
     of = np.arange(len(points)) * bins // len(points)
     count = np.bincount(of, minlength=bins)
@@ -147,6 +153,9 @@ class _Bones:
     place in its chain, and their `weight` (N, 2)."""
 
     def __init__(self, hierarchy: Hierarchy, parts: _Parts, rest: np.ndarray):
+        """Give each vertex of the rest pose (N, 3) its one or two joints, with weights that change linearly along the
+        stem.
+        """
         self.rest, chains = rest, np.maximum(parts.chain, 1)
         self.branch = hierarchy.branch_source[parts.branch]  # in the source's numbering, for names
         self.first_vertex = hierarchy.first_vertex[parts.branch].astype(np.int64)
@@ -181,7 +190,9 @@ class _Bones:
 
     @property
     def joints(self) -> np.ndarray:
-        """(J, 3) where joints lie: the middle of the vertices where the share of each begins."""
+        """Return the places (J, 3) of the joints in the rest pose: each is the middle of the vertices where the joint's
+        part of its stem begins.
+        """
         key = np.abs(self._place - (self.number / self.chain[self.part])[self.bone.T]).T
         key = np.where(self.weight > 0, key, np.inf)
         out = np.zeros((self.count, 3))
@@ -204,8 +215,9 @@ class _Bones:
         return parent
 
     def fitted(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return rotations (T, J, 3, 3) and translations (T, J, 3) for frames (T, N, 3); and the largest distance that
-        they leave at each vertex, (N,)."""
+        """Fit the joints to frames (T, N, 3). Return their rotations (T, J, 3, 3) and translations (T, J, 3), and the
+        largest distance (N,) that they leave at each vertex.
+        """
         turn = np.tile(np.eye(3), (len(frames), self.count, 1, 1))
         shift = np.zeros((len(frames), self.count, 3))
         for side in range(2):
@@ -223,8 +235,10 @@ class _Bones:
         return placed * self.weight[:, side, None]
 
     def _fit(self, side: int, target: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> None:
-        """Set the best rotations and translations of joints of even or odd place, whose weighted places are to be
-        `target`, (T, N, 3)."""
+        """Set the best rotations (T, J, 3, 3) and translations (T, J, 3), in place, of the joints with an even (`side`
+        0) or odd (`side` 1) number in their chain. `target` (T, N, 3) has the places, multiplied by their weights, that
+        vertices should reach by these joints.
+        """
         rows, starts, bones = self._sides[side]
         if not len(rows):
             return
@@ -244,8 +258,9 @@ class _Bones:
 
 
 def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -> Joints:
-    """Return the joints in all frames, each in the space of the one above, and how far off they are as they are
-    written."""
+    """Return the joints with their pose in every frame, relative to their parents, and their error as they are written.
+    `order` has the vertices in the source's order.
+    """
     places, parents = bones.joints, np.append(-1, bones.parents() + 1)
     rest = np.concatenate([np.zeros((1, 3)), places])
     turns = np.zeros((motion.frame_count, len(rest), 4), np.float32)
@@ -292,7 +307,9 @@ def _posed(motion: Motion, bones: _Bones, order: np.ndarray, report: Progress) -
 def _off(
     bones: _Bones, parents: np.ndarray, places: np.ndarray, turns: np.ndarray, shifts: np.ndarray, target: np.ndarray
 ) -> float:
-    """Return the largest distance of vertices that joints move, as an engine has them, from where they are to be."""
+    """Return the largest distance between vertices as an engine moves them by joints and their places `target` (T, N,
+    3). `turns` and `shifts` are the joints' quaternions and translations relative to their parents.
+    """
     local, at = rotation_matrices(turns.astype(np.float64)), shifts.astype(np.float64)
     for joint in range(1, len(parents)):  # Parents precede their children.
         above = parents[joint]
@@ -308,6 +325,9 @@ def _off(
 
 
 def _names(bones: _Bones) -> tuple[str, ...]:
+    """Return the names of the root and of all joints: "branch" with the number of the branch, and with a number behind
+    it where a branch has several joints.
+    """
     branches = bones.branch[bones.part]
     joined = np.append(np.diff(branches) == 0, False) | (bones.number > 0)
     plain = [f"branch{branch}" for branch in branches.tolist()]

@@ -24,10 +24,11 @@ Sample = tuple[int, *tuple[np.ndarray, ...]]  # The number of a frame, its posit
 
 
 def with_samples(motion: Motion, samples: int) -> Motion:
-    """Return a motion of one clip with so many samples for every frame interval, the first of which is the frame.
+    """Return the motion of one clip with `samples` samples for each interval between frames; the first sample of an
+    interval is the frame itself.
 
-    A loop has samples in the interval from its last frame to its first one too. Objects that appear or vanish in an
-    interval stand still in it, because they have no place at its other end.
+    If the clip is a loop, the interval from its last frame to its first one has samples, too. Objects that appear or
+    vanish in an interval stand still in it, because they have no place at its other end.
     """
     if samples == 1 or motion.frame_count == 1:
         return motion
@@ -72,6 +73,9 @@ def with_samples(motion: Motion, samples: int) -> Motion:
             return between(frame, here, motion.block(after, after + 1)[0], some)
 
         def blocks(self, *_: object) -> Iterator[tuple[int, np.ndarray]]:
+            """Yield the number of the first sample and the positions (k, N, 3) of consecutive samples, interval by
+            interval.
+            """
             first: np.ndarray | None = None
             before: np.ndarray | None = None
             for start, block in motion.blocks():
@@ -107,7 +111,9 @@ class _Presence:
         self._vertex_count = vertex_count
 
     def joined(self, frame: int, other: int) -> np.ndarray | None:
-        """Return (N,) bool, or None if it is so for all vertices."""
+        """Return which vertices are present at both frames or absent at both, (N,) bool; None if that holds for all
+        vertices.
+        """
         changed = [(obj, shown) for obj, shown in self._hidden if (shown[frame] != shown[other]).any()]
         if not changed:
             return None
@@ -136,7 +142,9 @@ def samples_of(motion: Motion, objects: Sequence[SceneObject], has_velocities: b
 def _with_velocities(
     motion: Motion, objects: Sequence[SceneObject], frames: Iterator[tuple[int, np.ndarray]]
 ) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-    """Yield frames with their velocities, each when the next one has come."""
+    """Yield each frame's number, positions (N, 3) and velocities (N, 3). A frame is yielded when the next one has been
+    read.
+    """
     presence, steps, last = _Presence(objects, motion.vertex_count), _steps(motion), motion.frame_count - 1
 
     def slope(frame: int, before: np.ndarray, here: np.ndarray) -> np.ndarray:
@@ -159,10 +167,12 @@ def _with_velocities(
 def velocities_of_copies(
     motion: Motion, shown: np.ndarray | None, places: np.ndarray, turns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the velocities of k copies that places (T, k, 3) and quaternions (T, k, 4) move.
+    """Return the velocities of k copies that are moved by places (T, k, 3) and quaternions (T, k, 4), as two float32
+    arrays (T, k, 3).
 
-    They are those of the places, in lengths per second, and of the turns, in degrees per second about an axis of that
-    direction; (T, k, 3) float32 each, and differences as those of `samples_of`. `shown` is that of a SceneObject.
+    The first array has the velocities of the places, in scene units per second. The second has those of the rotations:
+    vectors along the axis, as long as the degrees per second. `shown` tells in which frames each copy is visible, as in
+    SceneObject.
     """
     places, turns = places.astype(np.float64), turns.astype(np.float64)
     steps = _steps(motion)[:, None, None]
@@ -193,7 +203,9 @@ def _velocity(arriving: np.ndarray, leaving: np.ndarray, before: np.ndarray, aft
 
 
 def _turned(before: np.ndarray, here: np.ndarray) -> np.ndarray:
-    """Return the rotations from quaternions x y z w to others as axes as long as their degrees, the shorter way."""
+    """Return the rotations from some quaternions (x, y, z, w) to others as vectors (..., 3) along the axis, as long as
+    the angle in degrees. The shorter way round is taken.
+    """
     axis, real = here[..., :3], here[..., 3:]
     other, other_real = -before[..., :3], before[..., 3:]
     across = real * other + other_real * axis + np.cross(axis, other)

@@ -51,7 +51,7 @@ class SceneObject:
 
 
 def objects_of(motion: Motion) -> list[SceneObject]:
-    """Return the objects of a motion, in the order of their vertices; one of all where it does not say."""
+    """Return the objects of a motion in the order of their vertices; a motion that names none is one object."""
     names, counts, kinds, details = _division(motion)
     face_counts, face_indices = motion.polygons or (np.empty(0, np.int64), np.empty(0, np.int64))
     face_indices = np.asarray(face_indices, np.int64)
@@ -98,7 +98,9 @@ def lost_arrays(motion: Motion, kept: Collection[str]) -> dict[str, dict[str, li
 
 
 def not_written(motion: Motion, kept: Sequence[str]) -> dict[str, list[str]]:
-    """Return the names of objects with presence, faces of two sides, or subdivision, that a format does not keep."""
+    """Return the names of the objects whose presence over time, two-sided faces or subdivision a format does not keep,
+    by the name of the property. `kept` has the properties that the format keeps.
+    """
     metadata, is_one_clip = getattr(motion, "metadata", None) or {}, len(getattr(motion, "clip_ranges", ())) < 2
     clips = metadata.get(CLIPS) if not is_one_clip else None
     every = [metadata, *(clips.values() if isinstance(clips, dict) else ())]
@@ -119,8 +121,9 @@ def is_double_sided(details: JsonValue) -> bool:
 
 
 def stated_names(motion: Motion) -> JsonObject:
-    """Return the JSON that formats without a place for it keep: the objects, with their kinds and numbers of vertices
-    and copies, and the names of materials. sources.scene_objects.scene_fields reads it back."""
+    """Return the JSON for formats that have no place for objects: their names, kinds, and numbers of vertices and
+    copies, and the names of materials. `sources.scene_objects.scene_fields` reads it back.
+    """
     stated: JsonObject = {}
     names, counts = motion.metadata.get("part_names"), motion.attributes.get("part_vertex_counts")
     if isinstance(names, list) and counts is not None and counts.shape == (len(names),):
@@ -147,7 +150,7 @@ def _copies(motion: Motion, object_count: int) -> list[int]:
 
 
 def _repeats(obj: SceneObject, copies: int) -> bool:
-    """Return whether vertices, faces and curves are those of the first copy again and again."""
+    """Return whether the vertices, faces and curves of an object repeat those of its first part `copies` times."""
     counts, indices = obj.faces
     if obj.count % copies or len(counts) % copies or len(indices) % copies or len(obj.curves) % copies:
         return False
@@ -159,7 +162,9 @@ def _repeats(obj: SceneObject, copies: int) -> bool:
 
 
 def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return (F,) the object of each face, ascending; everything belongs to object 0 where faces lie across objects."""
+    """Return the number (F,) of the object that each face belongs to, ascending. All faces belong to object 0 if a face
+    lies across several objects. `ends` has the vertex after the last of each object.
+    """
     counts = np.diff(corners)
     of_corner = np.searchsorted(ends, indices, "right")
     faces = np.repeat(np.arange(len(counts)), counts)
@@ -171,8 +176,9 @@ def _owners(corners: np.ndarray, indices: np.ndarray, ends: np.ndarray) -> np.nd
 
 
 def _division(motion: Motion) -> tuple[list[str], np.ndarray, list[str], list[dict[str, str]]]:
-    """Return names, vertices, kinds and further details of the objects: what the clip says where that fits, else
-    one."""
+    """Return four lists about the objects of a motion: names, numbers of vertices, kinds and further details. If what
+    the clip states does not fit its vertices, there is one object.
+    """
     metadata, counts = motion.metadata, motion.attributes.get("part_vertex_counts")
     names, kinds = metadata.get("part_names"), metadata.get("part_kinds")
     count = motion.vertex_count
@@ -205,6 +211,9 @@ def _fits(motion: Motion, counts: np.ndarray) -> bool:
 
 
 def _kind(motion: Motion, counts: np.ndarray, index: int) -> str:
+    """Return "mesh", "curves" or "points" for the object number `index`, by the faces and edges of its vertices.
+    `counts` has the number of vertices of each object.
+    """
     stop = int(counts[: index + 1].sum())
     start = stop - int(counts[index])
     polygons = motion.polygons
@@ -219,9 +228,9 @@ def _kind(motion: Motion, counts: np.ndarray, index: int) -> str:
 
 
 def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
-    """Return vertices per curve where runs of vertices that are neighbours in the numbering and joined by edges make
-    curves of two and more, else None. Further edges, where a branch begins at its parent, are not seen in the
-    curves."""
+    """Return the number of vertices of each curve, if edges join the vertices `start` to `stop` - 1 to curves of
+    consecutive vertices; else None. Edges from a branch to its parent are not part of a curve.
+    """
     links = np.asarray(edges, np.int64)
     links = links[(links >= start).all(axis=1) & (links < stop).all(axis=1)]
     neighbours = links[np.abs(np.diff(links, axis=1)[:, 0]) == 1]
@@ -232,7 +241,9 @@ def _chains(edges: np.ndarray, start: int, stop: int) -> np.ndarray | None:
 
 
 def _curve_counts(motion: Motion, ends: np.ndarray, kinds: list[str]) -> Iterator[np.ndarray]:
-    """Yield the vertices per curve of each object, empty for an object without curves."""
+    """Yield for each object the numbers of vertices of its curves; an empty array for an object without curves. `ends`
+    has the vertex after the last of each object.
+    """
     stated = motion.attributes.get("curve_vertex_counts")
     totals = [
         int(end - start) if kind == "curves" else 0 for end, start, kind in zip(ends, np.append(0, ends[:-1]), kinds)
@@ -268,7 +279,9 @@ def material_runs(labels: np.ndarray, names: list[str]) -> list[tuple[int, np.nd
 
 
 def domain_of(motion: Motion, name: str, values: np.ndarray, domains: dict[str, str]) -> str:
-    """Return what the clip says if the rows fit it, else what they fit."""
+    """Return what each row of an array belongs to: "vertex", "corner", "face", "branch", "constant" or "other". The
+    domain that the clip states is taken if the number of rows fits it, else a domain whose number of rows fits.
+    """
     polygons = motion.polygons or ((), ())
     rows = {
         "vertex": motion.vertex_count,
@@ -291,7 +304,9 @@ def rows_of(values: np.ndarray, domain: str, obj: SceneObject) -> np.ndarray:
 
 
 def own_arrays(motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> Iterator[tuple[ArrayDescriptor, np.ndarray]]:
-    """Return what scene formats cannot hold: rest, branches, edges and the arrays in `left`, each as (bytes,) uint8."""
+    """Yield the arrays that scene formats cannot hold, which are the rest pose, branches, edges and the arrays in
+    `left`: each with its descriptor, and as bytes in a uint8 array.
+    """
     arrays = {"rest": (getattr(motion, "source_rest", motion.rest), "vertex")}
     for name, domain in (("vertex_branch", "vertex"), ("branch_parent", ""), ("stem_index", "vertex"), ("edges", "")):
         arrays[name] = getattr(motion, name, None), domain
@@ -303,7 +318,7 @@ def own_arrays(motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> Itera
 
 
 def distinct(names: Iterable[str]) -> list[str]:
-    """Return the names, each made different from those before it by a number behind it."""
+    """Return names in the same order, with a number added to each name that occurred before."""
     names_used: dict[str, None] = {}
     for wanted in names:
         name, number = wanted, 1

@@ -32,8 +32,9 @@ DIGITS = 4
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write all files; returns their names. Raises ClipError where there are others of the same numbering, OSError
-    where nothing can be written."""
+    """Write one file per frame, and return their names. Raise ClipError if files of the same numbering exist already,
+    OSError if nothing can be written.
+    """
     suffix = Path(path).suffix.lower()
     if suffix not in WRITERS:
         raise ClipError(f"{fspath(path)}: got the suffix {suffix!r}, expected one of {', '.join(WRITERS)}")
@@ -54,7 +55,9 @@ def write_frames(motion: Motion, writer: Any, paths: Sequence[str], report: Prog
 
 
 def file_names(motion: Motion, path: FilePath) -> list[str]:
-    """Return the name of each frame's file beside `path`. Raises ClipError where files with other numbers are there."""
+    """Return the name of each frame's file, numbered after the name of `path`. Raise ClipError if files with other
+    numbers exist beside them.
+    """
     path = Path(check_target(path))
     numbering = _numbering(path)
     if numbering is None:

@@ -32,7 +32,9 @@ class Surface:
 
     @cached_property
     def is_open(self) -> np.ndarray:
-        """(F,) bool: whether the piece of a face encloses nothing, or its faces do not all show the same side."""
+        """Whether each face can be seen from behind, (F,) bool: its connected piece encloses no volume, or the faces of
+        the piece do not all show the same side.
+        """
         piece, sides = self._pieces, self._rims
         piece_of_side = piece[self._face[sides]]
         start, end = self._ends(self._places, sides)
@@ -122,7 +124,7 @@ class Surface:
 
     @cached_property
     def _groups(self) -> np.ndarray:
-        """(N,): the first of the vertices that have one normal, as a smooth seam runs through them."""
+        """For each vertex, (N,), the first of the vertices that share its normal, because a smooth seam joins them."""
         one, other, _ = self._seams
         vectors = self._face_vectors(self._rest)
         vectors /= np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -155,8 +157,9 @@ class MovingNormals:
         return (moved - normals).astype(np.float32)
 
     def _frames(self, positions: np.ndarray) -> np.ndarray:
-        """Return (N, 3, 3): of each vertex its normal, the direction of an edge across that, and what is across
-        both."""
+        """Return three axes for each vertex, (N, 3, 3): its normal, the direction of one of its edges at right angles
+        to that, and the direction at right angles to both.
+        """
         points = np.asarray(positions, np.float64)
         normals = self._surface.normals(points)
         along = points[self._surface.neighbours] - points
@@ -167,7 +170,9 @@ class MovingNormals:
 
 
 def first_joined(pairs: np.ndarray, count: int) -> np.ndarray:
-    """Return of each of `count` things the first of those that pairs (P, 2) join it to."""
+    """Return for each of `count` things the lowest number among those that `pairs` (P, 2) join it to, directly or
+    through others.
+    """
     label = np.arange(count)
     while len(pairs):
         ends = label[pairs]
@@ -180,8 +185,10 @@ def first_joined(pairs: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shared(start: np.ndarray, end: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return pairs of the sides (n,) of faces, from start to end, that are an edge of no other, and the sides that are
-    left; sides without length are no edges."""
+    """Return two arrays of sides of faces that are the same edge, pair by pair, and a third of the sides that remain.
+    Side number `sides[i]` runs from vertex `start[i]` to `end[i]`; an edge is shared by exactly two sides, and sides of
+    no length are not edges.
+    """
     count = int(max(start.max(initial=0), end.max(initial=0))) + 1
     edge, uses = np.unique(
         np.minimum(start, end) * count + np.maximum(start, end), return_inverse=True, return_counts=True

@@ -25,8 +25,9 @@ def facts_of(motion: Motion) -> JsonObject:
 
 
 def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
-    """Write (height, width, channels) float16 or float32 by the names of channels, "RGB" or "RGBA", compressed without
-    loss. Raises OSError."""
+    """Write images (height, width, channels), float16 or float32, as one EXR file, compressed without loss. `channels`
+    has each image by the names of its channels, "RGB" or "RGBA". Raise OSError.
+    """
     import OpenEXR  # only where it is needed: PNG does without
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
@@ -38,7 +39,7 @@ def write_exr(path: str, channels: dict[str, np.ndarray]) -> None:
 
 
 def write_png(path: str, pixels: np.ndarray) -> None:
-    """Write (height, width, 3) uint16 without loss."""
+    """Write an image (height, width, 3) of uint16 as a PNG file, without loss."""
     height, width, _ = pixels.shape
     rows = np.ascontiguousarray(pixels.astype(">u2")).view(np.uint8).reshape(height, -1)
     lines = np.empty((height, rows.shape[1] + 1), np.uint8)

@@ -28,7 +28,9 @@ def frame_numbers(motion: Motion) -> np.ndarray:
 
 
 def distinct_frame_numbers(motion: Motion) -> np.ndarray:
-    """Return the times for formats that find a frame by its number. Raises ClipError where two have the same."""
+    """Return the number of each frame in the tool that made the clip, for formats that find frames by these. Raise
+    ClipError if two frames have the same number.
+    """
     numbers = frame_numbers(motion)
     same = np.flatnonzero(np.diff(numbers) <= 0)
     if same.size:

@@ -91,8 +91,9 @@ INTERPOLATION = {"vertex": "vertex", "corner": "faceVarying", "face": "uniform",
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or, binary, .usd; returns what instances cost. Raises
-    ClipError, OSError."""
+    """Write a MotionClip or a ClipView as .usdc, .usda, .usdz or .usd, which is binary. Return what storing copies as
+    instances costs in error. Raise ClipError, OSError.
+    """
     path = os.fspath(path)
     with new_files(path) as folder, _saying(path):
         name = Path(path).name
@@ -107,7 +108,7 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 @contextmanager
 def _saying(path: str) -> Iterator[None]:
-    """Turn USD's errors into OSErrors of one line: only the writing of the file can fail here."""
+    """Turn errors that USD raises in the context into an OSError of one line that names `path`."""
     with Tf.DiagnosticTrap() as trap:
         try:
             yield
@@ -118,7 +119,7 @@ def _saying(path: str) -> Iterator[None]:
 
 
 def _convert(binary: str, target: str, suffix: str) -> None:
-    """Convert the binary file that was written to the wanted kind; only that remains."""
+    """Convert the written binary file to the kind of the suffix, at `target`, and remove the binary file."""
     if suffix == ".usda":
         text = f"{binary}.usda"
         _must(Sdf.Layer.FindOrOpen(binary).Export(text), binary)
@@ -140,6 +141,7 @@ def _must(done: object, name: str) -> None:
 
 
 def _write(motion: Motion, name: str, options: WriteOptions, report: Progress) -> JsonObject:
+    """Write the stage to the file `name`, and return what storing copies as instances, or a rig, costs in error."""
     codes, rate = _time_codes(motion), frame_rate_of(motion)
     stage = Usd.Stage.CreateNew(name)
     joints = None if options.rig is None else fit_rig(motion, options.rig, lambda done: report(0.9 * done))
@@ -194,6 +196,7 @@ def _write_rigged(
 
 
 def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
+    """Set the points, normals and extents of all objects to the rest pose."""
     rest = np.asarray(motion.rest, np.float32)
     normals = looks.surface.unit_normals(motion.rest)
     for obj in objects:
@@ -207,7 +210,9 @@ def _set_rest(motion: Motion, objects: list[SceneObject], looks: Looks) -> None:
 def _write_assembly(
     stage: Usd.Stage, motion: Motion, joints: Joints, objects: list[SceneObject], looks: Looks, report: Progress
 ) -> JsonObject:
-    """Write the stage laid out as Nanite Assemblies are (usd_nanite.py), and return facts about it."""
+    """Write the stage in the layout of Unreal's Nanite Assemblies (usd_nanite.py), and return facts about it, such as
+    its error.
+    """
     parts = nanite.parts_of(motion, objects, joints)
     UsdSkel.Root.Define(stage, nanite.BASE)
     names = distinct(("base", *(_identifier(obj.name) for obj in objects)))[1:]
@@ -238,6 +243,9 @@ def _write_assembly(
 
 
 def _describe_stage(stage: Usd.Stage, motion: Motion, codes: np.ndarray, rate: float) -> None:
+    """Set the stage's frame rate, its first and last time codes, its unit and its up axis, and keep the remaining
+    metadata as JSON.
+    """
     metadata = motion.metadata
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
@@ -269,7 +277,7 @@ def _identifier(name: str) -> str:
 
 
 def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBased:
-    """Define a mesh, curves or points at a path for an object, without its positions."""
+    """Define a mesh, curves or points prim at the path `place` for an object, without its positions, and return it."""
     if obj.kind == "mesh":
         schema = mesh = UsdGeom.Mesh.Define(stage, place)
         mesh.CreateSubdivisionSchemeAttr(obj.details.get(SCHEME, UsdGeom.Tokens.none))
@@ -292,8 +300,9 @@ def _define(stage: Usd.Stage, place: str, obj: SceneObject) -> UsdGeom.PointBase
 
 
 def _show(obj: SceneObject, motion: Motion, looks: Looks) -> None:
-    """Set the colour of an object, or of each of its faces where these differ, and both sides of open faces. Vertices
-    that have colours keep these, which are written with the clip's other arrays."""
+    """Set the colour of an object, or of each face if these differ, and that open faces are seen from both sides.
+    Colours of vertices are written with the clip's other arrays.
+    """
     colours, of_face = [line_look(obj.name).colour], np.zeros(0, np.int64)
     if obj.kind == "mesh":
         labels = looks.labels[obj.face_rows].reshape(obj.copies, -1)[0]
@@ -329,7 +338,7 @@ def _mark_guess(attribute: Usd.Attribute) -> None:
 
 
 def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject], names_used: Iterable[str]) -> None:
-    """Define the materials by their names, without contents, and bind the faces that have them."""
+    """Define the materials by name, without contents, and bind them to the faces that have them."""
     labels_and_names = face_materials(motion)
     if labels_and_names is None or not labels_and_names[1]:
         return
@@ -355,7 +364,9 @@ def _bind_materials(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]
 
 
 def _define_instanced(stage: Usd.Stage, place: str, obj: SceneObject, copies: Copies) -> None:
-    """Define a PointInstancer, and below it the shape of one copy, which becomes the object's target."""
+    """Define a PointInstancer at the path `place`, and below it the shape of one copy, which becomes the object's
+    target.
+    """
     instancer = UsdGeom.PointInstancer.Define(stage, place)
     one, name = one_copy(obj), place.rpartition("/")[2]
     obj.target = _define(stage, f"{place}/{name}", one)
@@ -371,7 +382,7 @@ def _vec3(points: Any) -> Vt.Vec3fArray:
 
 
 def _write_places(stage: Usd.Stage, instanced: list[tuple[SceneObject, Copies]], codes: np.ndarray) -> None:
-    """Write where the copies are in each frame. USD's older programs know rotations in half precision only."""
+    """Write the positions, rotations and scales of all copies in each frame. `codes` (T,) has the time codes."""
     for obj, copies in instanced:
         instancer = obj.instancer
         turned: list[tuple[Usd.Attribute, UsdObject, type[np.floating]]] = [
@@ -396,8 +407,7 @@ def _write_velocities_of_places(motion: Motion, instanced: list[tuple[SceneObjec
 
 
 def _write_presence(objects: list[SceneObject], codes: np.ndarray) -> None:
-    """Write the visibility of objects, and the copies that an instancer hides, from the frames on in which they
-    change."""
+    """Write when objects are visible, and which copies an instancer hides, at the frames in which this changes."""
     for obj in objects:
         if obj.shown is None or obj.shown.shape[1] > 1 and obj.copies == 1:
             continue
@@ -418,7 +428,9 @@ def _int_array(values: np.ndarray) -> Vt.IntArray:
 
 
 def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject]) -> dict[str, tuple[np.ndarray, str]]:
-    """Write those that belong to vertices, corners and faces; returns the others, with their domains."""
+    """Write the arrays that belong to vertices, corners and faces. Return the other arrays, each with its domain, by
+    name.
+    """
     left = {}
     domains = motion.metadata.get("domains", {})
     for name, values in motion.attributes.items():
@@ -431,8 +443,9 @@ def _static_arrays(stage: Usd.Stage, motion: Motion, objects: list[SceneObject])
 
 
 def _write_array(name: str, values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """Write an array as a primvar of the objects that its rows belong to; return whether USD has a type and place for
-    it."""
+    """Write an array as a primvar of the objects that its rows belong to. Return whether USD has a type and a place for
+    it.
+    """
     if name == "radius" and domain in ("vertex", "constant") and values.ndim == 1 and values.dtype == np.float32:
         return _write_radius(values, domain, objects)
     kind = WIDER.get(values.dtype.char)
@@ -464,7 +477,7 @@ def _write_array(name: str, values: np.ndarray, domain: str, objects: list[Scene
 def _all_placed(
     values: np.ndarray, domain: str, objects: list[SceneObject]
 ) -> list[tuple[UsdObject, np.ndarray]] | None:
-    """Return what `_placed_rows` gives for each object; None where one has no place for its rows."""
+    """Return the results of `_placed_rows` for all objects; None if USD has no place for the rows of one of them."""
     placed = []
     for obj in objects:
         rows = _placed_rows(rows_of(values, domain, obj), domain, obj)
@@ -475,8 +488,9 @@ def _all_placed(
 
 
 def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[UsdObject, np.ndarray] | None:
-    """Return the schema that takes the rows of an object, and those that it takes: of copies those of one, where all
-    have the same, or one for each, where it has the same throughout. None where neither is so."""
+    """Return the schema that an object's rows are written to, and the rows. Copies share the rows of one copy if all
+    have the same, or have a row each if it is the same throughout a copy. Return None in all other cases.
+    """
     if obj.copies == 1 or domain == "constant":
         return obj.target, rows
     shared = rows_of_one(rows, obj)
@@ -489,7 +503,9 @@ def _placed_rows(rows: np.ndarray, domain: str, obj: SceneObject) -> tuple[UsdOb
 
 
 def _write_radius(values: np.ndarray, domain: str, objects: list[SceneObject]) -> bool:
-    """Return as widths of curves and points; of meshes as a primvar."""
+    """Write a radius: for curves and points as widths, for meshes as a primvar. Return whether USD has a place for
+    it.
+    """
     placed = _all_placed(values, domain, objects)
     if placed is None or any(target is not obj.target for (target, _), obj in zip(placed, objects)):
         return False
@@ -521,7 +537,7 @@ def _vt(values: np.ndarray, type_name: Sdf.ValueTypeName, dtype: str) -> UsdObje
 
 
 def _own_arrays(root: Usd.Prim, motion: Motion, left: dict[str, tuple[np.ndarray, str]]) -> None:
-    """Return the data that has no place in the prims, byte for byte."""
+    """Write the data that has no place in the prims, byte for byte, as attributes of the prim `root`."""
     for descriptor, raw in own_arrays(motion, left):
         attribute = root.CreateAttribute(
             f"{OWN}:{_identifier(descriptor.name)}", Sdf.ValueTypeNames.UCharArray, True, Sdf.VariabilityUniform
@@ -542,6 +558,9 @@ def _write_frames(
     report: Progress,
     has_velocities: bool,
 ) -> None:
+    """Write points, extents, and velocities if `has_velocities` is true, of all objects in all frames. `codes` (T,) has
+    the time codes.
+    """
     layer, unsaved = stage.GetRootLayer(), 0
     extents = [(obj, _whole(obj).CreateExtentAttr().GetPath()) for obj in objects]
     moved = [obj for obj in objects if obj.copies == 1]

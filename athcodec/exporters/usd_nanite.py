@@ -42,7 +42,9 @@ class Part:
 
 
 def parts_of(motion: Motion, objects: list[SceneObject], joints: Joints) -> dict[int, Part]:
-    """Return the objects that are copies of one shape at rest, by their number. ClipError where no base is left."""
+    """Return the objects that are copies of one shape at rest, as parts of the assembly, by their number. Raise
+    ClipError if no mesh is left as its base.
+    """
     rest = np.asarray(motion.rest)
     still = MotionClip(rest[None], np.zeros(1), rest=rest)
     parts = {
@@ -81,7 +83,9 @@ def _apply(prim: Usd.Prim, schema: str) -> None:
 
 
 def define_part(stage: Usd.Stage, place: str, name: str) -> str:
-    """Return the instancer's prototype, without its mesh; returns where that goes."""
+    """Define the instancer of a part and its prototype, without the mesh, at the path `place`. Return the path at which
+    the prototype's mesh belongs.
+    """
     UsdGeom.PointInstancer.Define(stage, place)
     prototype = f"{place}/Prototypes/{name}"
     UsdSkel.Root.Define(stage, prototype)
@@ -93,7 +97,9 @@ def define_part(stage: Usd.Stage, place: str, name: str) -> str:
 
 
 def place_part(stage: Usd.Stage, place: str, name: str, obj: SceneObject, part: Part, joints: Joints) -> None:
-    """Place the instances at rest, and name what they hang on; `obj.target` is the prototype's mesh."""
+    """Place the instances of a part at rest and name the joints that they hang on. `obj.target` is the mesh of the
+    prototype.
+    """
     instancer, prototype = UsdGeom.PointInstancer(stage.GetPrimAtPath(place)), f"{place}/Prototypes/{name}"
     copies, count = part.copies, len(part.joint)
     instancer.CreatePrototypesRel().SetTargets([prototype])
@@ -115,6 +121,7 @@ def place_part(stage: Usd.Stage, place: str, name: str, obj: SceneObject, part: 
 
 
 def _bind_instances(prim: Usd.Prim, names: list[str]) -> None:
+    """Bind each instance of a prim fully to one joint; `names` has the joint of each instance."""
     _apply(prim, BINDING_SCHEMA)
     for name, kind, values in (
         ("bindJoints", Sdf.ValueTypeNames.TokenArray, names),
@@ -128,8 +135,9 @@ def _bind_instances(prim: Usd.Prim, names: list[str]) -> None:
 
 
 def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, parts: dict[int, Part]) -> float:
-    """Return how far instances that move as their joints do are off, at most; or the rest of the rig, if that is
-    more."""
+    """Return the largest distance of any vertex from the motion, when instances move as their joints do and the base as
+    the rig does.
+    """
     largest = joints.max_error
     for number, part in parts.items():
         turns = rotation_matrices(part.copies.turns[0].astype(np.float64)) * part.copies.scales[0][:, None, :]
@@ -144,7 +152,7 @@ def largest_error(motion: Motion, objects: list[SceneObject], joints: Joints, pa
 
 
 def _world(joints: Joints, frame: int) -> np.ndarray:
-    """Return (J, 4, 4) what each joint does to vertices at rest."""
+    """Return the matrices (J, 4, 4) by which the joints move vertices from the rest pose to a frame."""
     matrices = np.tile(np.eye(4), (len(joints.bind), 1, 1))
     matrices[:, :3, :3] = rotation_matrices(joints.poses[1][frame].astype(np.float64))
     matrices[:, :3, 3] = joints.poses[0][frame]
@@ -156,7 +164,9 @@ def _world(joints: Joints, frame: int) -> np.ndarray:
 
 
 def wind_of(motion: Motion, joints: Joints) -> str:
-    """Return the JSON of Dynamic Wind: joints in groups by the order of their branches, the trunk's group 0."""
+    """Return the JSON of Unreal's Dynamic Wind: the joints in groups by the generation of their branches, with the
+    trunk's in group 0.
+    """
     hierarchy = hierarchy_to_rig(motion)
     order = np.empty(len(joints.vertex_joint), np.int64)
     order[hierarchy.vertex_source] = np.repeat(hierarchy.branch_depth, hierarchy.stem_count)

@@ -19,8 +19,9 @@ SKELETON = "skeleton"
 def write_rig(
     stage: Usd.Stage, place: str, motion: Motion, joints: Joints, objects: list[SceneObject], codes: np.ndarray
 ) -> None:
-    """Add below the prim at `place` the skeleton, its animations, and what binds the objects' targets to it. codes: of
-    all frames, (T,), which begin again with each clip."""
+    """Add a skeleton and its animations below the prim at `place`, and bind the objects' targets to it. `codes` (T,)
+    has the time codes of all frames, which begin anew with each clip.
+    """
     skeleton = UsdSkel.Skeleton.Define(stage, f"{place}/{SKELETON}")
     paths = _paths(joints)
     skeleton.CreateJointsAttr(paths)
@@ -59,6 +60,7 @@ def _animate(animation: UsdSkel.Animation, paths: list[str], poses: list[np.ndar
 
 
 def _bind(obj: SceneObject, joints: Joints, skeleton: str) -> None:
+    """Bind an object to the skeleton at the path `skeleton`, with the joints and weights of its vertices."""
     binding = UsdSkel.BindingAPI.Apply(obj.target.GetPrim())
     assert joints.weights is not None  # A rig has parents and weights.
     bones, weights = joints.vertex_joint[obj.vertices], joints.weights[obj.vertices]

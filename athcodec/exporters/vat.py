@@ -32,11 +32,11 @@ FLOAT16_MAX = 65504.0
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write a MotionClip or a ClipView to the new folder `path`; returns what the JSON says. options.half: half
-    precision in place of float.
+    """Write a MotionClip or a ClipView to the new folder `path`, and return the contents of its JSON file.
+    `options.half` selects half precision in place of float32.
 
-    Raises ClipError where there are more nodes than a texture takes, or motion that half precision cannot hold,
-    FileExistsError where `path` exists.
+    Raise ClipError if there are more nodes than a texture holds or if half precision cannot hold the motion,
+    FileExistsError if `path` exists.
     """
     moving = fit(motion, Mapped, allowed_error(motion), MOST_NODES, lambda done: report(0.6 * done))
     if moving is None:
@@ -50,6 +50,9 @@ def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Pr
 
 
 def _write(motion: Motion, moving: Moving, rows: np.ndarray, folder: str, name: str, report: Progress) -> JsonObject:
+    """Write the textures, the pivots and the JSON file to `folder`, and return the contents of the JSON file. `rows` is
+    the result of `_rows`.
+    """
     pivots, vertex_node = moving.parts.middle.astype(np.float32), moving.parts.vertex_part()
     grid = _Grid(len(pivots), motion.frame_count)
     textures = []
@@ -83,7 +86,9 @@ def _write(motion: Motion, moving: Moving, rows: np.ndarray, folder: str, name: 
 
 
 def _rows(moving: Moving, dtype: type) -> np.ndarray:
-    """Return (T, K, 3, 4): what the map of a node adds to the rest pose, seen from the node's middle."""
+    """Return the matrices (T, K, 3, 4) that K nodes add to the rest pose, in frames of T, relative to the middle of the
+    node.
+    """
     rows = np.empty((*moving.places.shape, 4), dtype)
     linear = moving.values[0].reshape(*moving.places.shape, 3) - np.eye(3)
     offset = moving.places - moving.parts.middle.astype(np.float32)
@@ -130,7 +135,9 @@ class _Grid:
 def _measured(
     motion: Motion, rows: np.ndarray, pivots: np.ndarray, vertex_node: np.ndarray, report: Progress
 ) -> tuple[float, list[float], list[float]]:
-    """Return the largest distance from the motion of what a shader makes of the texels, and the box of all it shows."""
+    """Return three results: the largest distance between the motion and what a shader makes of the textures, and the
+    lowest and highest corner (x, y, z) of the box around all of it.
+    """
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)
     away = np.concatenate([rest - pivots[vertex_node], np.ones((len(rest), 1))], axis=1)
     largest, low, high = 0.0, np.full(3, np.inf), np.full(3, -np.inf)

@@ -36,8 +36,9 @@ _PIECE = '<Piece NumberOfPoints="{}" NumberOfCells="{}">\n<Points>\n'
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write all files; returns the name of the index, or of the only one. Raises ClipError where there are others of
-    the same numbering, OSError where nothing can be written."""
+    """Write a file per frame, and an index if there are several. Return the name of the index or of the only file.
+    Raise ClipError if files of the same numbering exist already, OSError if nothing can be written.
+    """
     target = Path(check_target(path))
     names = file_names(motion, target.with_suffix(".vtu"))
     index = "" if names == [target.name] else f"{_stem(target)}.pvd"
@@ -60,6 +61,7 @@ def _stem(target: Path) -> str:
 
 
 def _index(motion: Motion, names: list[str]) -> str:
+    """Return the text of the .pvd file that lists the files `names` with their times."""
     lines = [
         f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>\n'
         for time, name in zip(np.asarray(motion.time).tolist(), names, strict=True)
@@ -75,6 +77,7 @@ class _VtuWriter:
     """VTU files of one clip; write(file, points) for each. What does not move is put together once."""
 
     def __init__(self, motion: Motion, packed: bool):
+        """Prepare what all frames share: cells, attributes and headers. If `packed` is true, data are compressed."""
         cells = cells_of(motion)
         self._packed = packed
         compressor = ' compressor="vtkZLibDataCompressor"' if packed else ""
@@ -118,6 +121,7 @@ class _VtuWriter:
         return opened.encode() + self._encoded(raw) + b"</DataArray>\n"
 
     def _encoded(self, raw: bytes) -> bytes:
+        """Return bytes as the base64 text of a VTU file, compressed or not, with their length in front."""
         if not self._packed:
             return base64.b64encode(np.uint64(len(raw)).tobytes() + raw)
         if not raw:

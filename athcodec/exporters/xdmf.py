@@ -50,7 +50,7 @@ SERIES = "motion"
 
 
 def write_clip(motion: Motion, path: FilePath, options: WriteOptions, report: Progress) -> JsonObject:
-    """Write both files. Raises OSError where nothing can be written."""
+    """Write the .xdmf file and its HDF5 file. Raise OSError if nothing can be written."""
     name = Path(check_target(path)).name
     with new_files(path) as folder, open(os.path.join(folder, f"{name}.h5"), "w+b", buffering=0) as file:
         sink = Sink(file.fileno(), fspath(path))
@@ -69,7 +69,7 @@ class _Writer:
         self._packing = {"compression": "gzip", "shuffle": True} if gzip else {}
 
     def write(self, report: Progress) -> ElementTree.Element:
-        """Return the XML, once all numbers are in the HDF5 file."""
+        """Write all numbers to the HDF5 file and return the XML that refers to them."""
         motion, root = self._motion, ElementTree.Element("Xdmf", Version="3.0")
         domain = ElementTree.SubElement(root, "Domain")
         for key in ("fps", "start_frame", "unit", "up_axis"):
@@ -97,6 +97,9 @@ class _Writer:
         moved: np.ndarray,
         static: tuple[list[ElementTree.Element], list[ElementTree.Element]],
     ) -> None:
+        """Fill the XML element `grid` of one frame: its time, the displacements `moved` (N, 3) and what is `static`,
+        the elements of the mesh and of the attributes. Frames after the first refer to the mesh of the first.
+        """
         mesh, attributes = static
         if frame == 0:
             grid.extend(mesh)
@@ -107,6 +110,7 @@ class _Writer:
         grid.extend(attributes)
 
     def _static_elements(self) -> tuple[list[ElementTree.Element], list[ElementTree.Element]]:
+        """Return the XML elements that do not change with time, in two lists: topology and geometry, and attributes."""
         motion = self._motion
         cells = cells_of(motion)
         geometry = ElementTree.Element("Geometry", GeometryType="XYZ")
@@ -122,6 +126,7 @@ class _Writer:
         return [self._topology(cells), geometry], attributes
 
     def _topology(self, cells: Cells) -> ElementTree.Element:
+        """Return the XML element of the cells, as one type of cell if all are alike, else as a mixed topology."""
         kinds = np.unique(cells.types)
         name = VTK_NAMES[int(kinds[0])]
         if len(kinds) == 1 and name in _UNIFORM:
@@ -145,6 +150,7 @@ class _Writer:
         return element
 
     def _item(self, values: np.ndarray, place: str) -> ElementTree.Element:
+        """Store values in the HDF5 file at `place`, and return the XML element that refers to them."""
         self._data.create_dataset(place, data=values, **(self._packing if values.size else {}))
         kind = {"f": "Float", "i": "Int", "u": "UInt"}[values.dtype.kind]
         item = ElementTree.Element(
@@ -159,8 +165,9 @@ class _Writer:
 
 
 def _mixed(cells: Cells) -> np.ndarray:
-    """Return the stream of a topology of several types: number of the type, number of nodes where that varies,
-    nodes."""
+    """Return the numbers of a mixed topology: for each cell the number of its type, its number of nodes if that varies
+    for the type, and its nodes.
+    """
     parts, start = [], 0
     counted = {VTK_NUMBERS[name] for name in ("line", "vertex", "polygon")}
     for kind, stop in zip(cells.types.tolist(), cells.stops.tolist()):

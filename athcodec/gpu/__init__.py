@@ -49,6 +49,7 @@ class GpuFile:
     """
 
     def __init__(self, data: bytes, host_mesh: np.ndarray | None = None):
+        """Open a file of `data`. `host_mesh` (N, 3) is the rest pose of a file that does not store one."""
         limits = core_file.Limits.of(Limits())
         _, memory, _ = core_file.front(data, limits)
         self.core, self._bytes = core_file.File(data, memory, limits), as_bytes(data)
@@ -77,8 +78,9 @@ class GpuFile:
         return block
 
     def recorded(self, segment: int, level: int, room: Room) -> np.ndarray | None:
-        """Return the words of a segment's block at a level; None if it needs more than `room`, which is then set to
-        what it needs."""
+        """Return the words of a segment's block for the GPU at a level. If the block needs more than `room`, set `room`
+        to what it needs and return None.
+        """
         memory = core_file.aligned(lib.ath_gpu_record_size(self._file, level, byref(room)))
         self._prepare(segment, level, room, memory)
         at = lib.ath_gpu_recorded(memory.ctypes.data, byref(room))
@@ -94,8 +96,9 @@ class GpuFile:
     def _prepare(
         self, segment: int, level: int, room: Room | None = None, memory: np.ndarray | None = None
     ) -> core_file.Segment:
-        """Prepare a segment at a level and return it. room, memory: where its block for the card is recorded as
-        well."""
+        """Decode a segment at a level and return it. With `room` and `memory`, the segment's block for the GPU is
+        recorded there as well.
+        """
         self.core.refine(level)
         into = core_file.Segment(self.core.segment_size(level))
         place = self._work.pointer, len(self._work.memory), self._file, segment, level

@@ -71,7 +71,7 @@ class Source:
     # ---- pass 1: time ----
 
     def _over_time(self) -> np.ndarray:
-        """Return the value of each row on three axes in each frame, (rows, 3, frames) float32."""
+        """Return the value of each row of integers in each frame on three axes, (rows, 3, frames), float32."""
         rows = section(self.words, self.head["rows"], ROW, self.head["row_count"])
         out = np.zeros((len(rows), 3, len(self.frames)), np.float32)
         for i, row in enumerate(rows):
@@ -108,7 +108,9 @@ class Source:
         return tracks[ROTATION].T @ turn.T
 
     def modes(self, b: int, body: np.void) -> np.ndarray:
-        """Return the amplitude of each mode of body number `b` on three axes, (modes, 3, frames)."""
+        """Return the amplitudes (modes, 3, frames) of all modes of body number `b` on three axes. `body` is its record
+        in the block.
+        """
         move, tracks = self._move(b)
         modes = {slot: track for slot, track in tracks.items() if slot < SHIFT}
         if move["shape_count"] > 0:
@@ -119,7 +121,9 @@ class Source:
         return out
 
     def _unshaped(self, body: np.void, move: np.void, rows: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-        """Return modes that shapes are made of, in place of the rows of shapes."""
+        """Return the amplitudes of modes, (3, frames) by the mode's number. The first rows of a body can be amplitudes
+        of shapes, which are sums of modes; these are replaced by the modes.
+        """
         modes, count = int(body["shape_modes"]), int(move["shape_count"])
         shapes = section(self.words, self.head["shapes"] + move["shapes"], "<f4", 3 * modes * count)
         shapes = shapes.reshape(count, modes, 3)
@@ -135,7 +139,7 @@ class Source:
     # ---- joins, corrections ----
 
     def join(self, bodies: np.ndarray, positions: np.ndarray, matrices: np.ndarray) -> None:
-        """Add to the terms what is left of the jumps at the segment's seam."""
+        """Add to positions and matrices, in place, what remains in each frame of the jump at the segment's seam."""
         frames = self.head["join_frames"]
         joined = self.frames < frames
         if not joined.any():
@@ -155,7 +159,7 @@ class Source:
         matrices[joined, :, :, 3] += added[:, :, 9:]
 
     def correct(self, positions: np.ndarray) -> None:
-        """Add corrections to positions."""
+        """Add the corrections of vertices to positions, in place."""
         count = self.head["corrected_count"]
         if not count:
             return
@@ -195,6 +199,9 @@ class Passes:
     """
 
     def __init__(self, level: np.ndarray, *sources: Source):
+        """Compute the positions and matrices of a level from its words and from the segments `sources`, which are
+        blended by their weights.
+        """
         self._level, self._sources, self._of_level = level, sources, head(level, LEVEL)
         self._vertices = section(level, self._of_level["vertices"], VERTEX, self._of_level["vertex_count"])
         self._bodies = section(level, self._of_level["bodies"], BODY, self._of_level["body_count"])
@@ -216,6 +223,9 @@ class Passes:
     # ---- pass 2: hierarchy ----
 
     def _place(self, b: int) -> None:
+        """Compute the rotation, place and vertices, or the matrix, of body number `b` from those of the body that it
+        hangs on.
+        """
         body, sources = self._bodies[b], self._sources
         point, rotation = self._hung(body)
         point = point + total([source.shift(b) for source in sources])
@@ -239,7 +249,9 @@ class Passes:
         return rest - body["rest_point"]
 
     def _hung(self, body: np.void) -> tuple[np.ndarray, np.ndarray]:
-        """Return where a body hangs, before it is moved and turned itself."""
+        """Return the place (frames, 3) at which a body hangs and the rotation (frames, 3, 3) there, before the body's
+        own motion.
+        """
         count = self._count
         if body["parent"] < 0:
             return np.tile(body["rest_point"], (count, 1)), np.tile(np.eye(3, dtype=np.float32), (count, 1, 1))
@@ -262,7 +274,9 @@ class Passes:
     # ---- pass 3: vertices ----
 
     def vertices(self) -> np.ndarray:
-        """Return (frames, vertices, 3) float32 in file order, relative to the origin."""
+        """Return the positions (frames, vertices, 3) of all vertices in the file's order, float32, relative to the
+        file's origin.
+        """
         binding = self._vertices["binding"]
         moved, index = (binding & MOVED) != 0, (binding & ~np.uint32(MOVED)).astype(int)
         out = np.empty((self._count, len(binding), 3), np.float32)
@@ -284,7 +298,9 @@ def rotations(omega: np.ndarray) -> np.ndarray:
 
 
 def squared(half: np.ndarray) -> np.ndarray:
-    """Return rotations of the quaternions normalize(1, half) squared."""
+    """Return the rotation matrices (..., 3, 3) of the squares of the quaternions (1, x, y, z), normalised; `half` (...,
+    3) has x, y and z.
+    """
     n2 = (half * half).sum(-1, keepdims=True)
     scale = 1 / (1 + n2)
     w = ((1 - n2) * scale)[..., 0]
@@ -306,8 +322,9 @@ def unit(v: np.ndarray) -> np.ndarray:
 
 
 def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return rotations by the least angle from one vector of length 1 to others; beyond a right angle by less and
-    less."""
+    """Return the rotation matrices of the smallest rotations from unit vectors `u` to unit vectors `v`. Beyond a right
+    angle the rotation shrinks, so that opposite vectors need none.
+    """
     cosine, axis = (u * v).sum(-1), np.cross(u, v)
     w, sine2 = 1 + np.maximum(cosine, 0), (axis * axis).sum(-1)
     h = 2 / (w * w + sine2)
@@ -319,7 +336,9 @@ def between(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
-    """Return the rotations nearest to what took the offsets of a sheet to where they are, with a hundredth of none."""
+    """Return the rotations (frames, 3, 3) that best take the offsets of a sheet's vertices to their places in each
+    frame, drawn towards no rotation with a weight of a hundredth.
+    """
     identity = np.eye(3, dtype=np.float32)
     H = np.einsum("tvi,vj->tij", placed, offsets) + np.float32(0.01) * (offsets * offsets).sum() * identity
     norm2 = (H * H).sum((1, 2), keepdims=True)
@@ -330,7 +349,9 @@ def fitted(offsets: np.ndarray, placed: np.ndarray) -> np.ndarray:
 
 
 def turned_towards(H: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Return a step of Newton's method to the rotations nearest to H."""
+    """Return the rotations after one step of Newton's method from `R` towards those nearest to the matrices `H`, both
+    (frames, 3, 3).
+    """
     C = H @ np.swapaxes(R, 1, 2)
     axial = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], -1)
     spare = np.maximum(1 - np.trace(C, axis1=1, axis2=2), 0) + np.float32(1e-6)

@@ -14,11 +14,10 @@ _SHIFT = 15  # bits of a float32 that a bin leaves away: 256 bins for each power
 
 
 def paired(reference: np.ndarray, decoded: np.ndarray, values: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the frames of two (k, N, 3) blocks in float64, as many at once as have SLICE_VALUES numbers.
+    """Yield pairs of frames of a reference and a decoded block (k, N, 3), in float64, as many frames at once as
+    SLICE_VALUES numbers allow. `values` is how many numbers a meter needs for each frame.
 
-    values: see Meter.
-
-    Raises ValueError where their shapes differ.
+    Raise ValueError if the shapes differ.
     """
     reference, decoded = np.asarray(reference), np.asarray(decoded)
     if reference.shape != decoded.shape or reference.ndim != 3 or reference.shape[2] != 3:

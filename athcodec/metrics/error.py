@@ -37,6 +37,9 @@ class ErrorMeter(Meter):
     """
 
     def __init__(self, rest: np.ndarray | None = None, weights: np.ndarray | None = None) -> None:
+        """Begin to measure. `rest` (N, 3) is the rest pose, needed for the motion-normalised error, and `weights` (N,)
+        multiply the errors of vertices in the largest weighted error.
+        """
         self.max_error = self.max_weighted_error = 0.0
         self.worst_frame = 0
         self.worst_vertex = 0
@@ -49,7 +52,7 @@ class ErrorMeter(Meter):
         self._high = np.full(3, -inf)
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
-        """Add the errors of decoded frames (k, N, 3) against those of the reference."""
+        """Add the errors of decoded frames (k, N, 3) against the same frames of the reference, in float64."""
         difference = reference - decoded
         scale = _scale(difference)
         square = ((difference / scale) ** 2).sum(axis=2)

@@ -61,6 +61,10 @@ class MotionMeter(Meter):
         edges: np.ndarray | None = None,
         file_bound: float | None = None,
     ) -> None:
+        """Begin to measure motion against `clip`. `bound` is the error bound in scene units; with `weights` (N,) a
+        vertex has the part of it that is its weight over the largest one. `file_bound` is the bound of the whole file,
+        `starts` has the first frames of segments, and `edges` (E, 2) the edges measured, by default those of the clip.
+        """
         bound = real("bound", bound)
         self._file_bound = bound if file_bound is None else real("file_bound", file_bound)
         self.bounds = bound if weights is None else bound * weights / weights.max()
@@ -74,10 +78,10 @@ class MotionMeter(Meter):
             meter._add(reference, decoded)
 
     def figures(self) -> JsonObject:
-        """Return the measurements, by names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
+        """Return the measurements by the names that JSON uses: "smoothness" and "shape" are dictionaries of their own.
 
-        Second differences of the error are in bounds, angles in degrees. What a clip has no seams, edges or faces for
-        is None.
+        Second differences of the error are in error bounds, angles in degrees. A measurement is None if the clip has no
+        seams, edges or faces for it.
         """
         error, smoothness = self.error, self.smoothness
         jerks = smoothness.jerks(self._file_bound)
@@ -100,7 +104,7 @@ class MotionMeter(Meter):
         }
 
     def _shape(self) -> JsonObject:
-        """Return the figures about the shape of edges and faces, by name."""
+        """Return the measurements of how edges stretch and faces turn, by name."""
         shape = self.shape
         edges = {
             "edges": shape.edge_count,
@@ -128,7 +132,7 @@ def level_meters(decoder: Decoder, clip: MotionClip) -> list[MotionMeter]:
     ----------
     decoder : Decoder
     clip : MotionClip
-        Its source.
+        The source that the file was encoded from.
 
     Returns
     -------

@@ -45,6 +45,9 @@ class ShapeMeter(Meter):
     """
 
     def __init__(self, edges: np.ndarray | None = None, polygons: Polygons | None = None) -> None:
+        """Begin to measure edges (E, 2), pairs of vertices, and `polygons`: the number of corners of each face, and the
+        vertices of all corners.
+        """
         self.stretch, self.angle, self.excess_turn = Spread(), Spread(), Spread()
         self.left_out_edges = self.left_out_faces = 0
         self._edges = np.asarray(np.empty((0, 2)) if edges is None else edges, np.int64)
@@ -92,7 +95,9 @@ class ShapeMeter(Meter):
         self._add_turns(is_face, normal, shown_normal)
 
     def _add_turns(self, is_face: np.ndarray, normal: np.ndarray, shown: np.ndarray) -> None:
-        """Add how far the normals turn from frame to frame, from the last frame added on."""
+        """Add the angles by which the normals of faces turn from frame to frame, from the last frame added before.
+        `is_face` tells which faces have an area.
+        """
         frames = is_face, normal, shown
         if self._last is not None:
             is_face, normal, shown = (np.concatenate([last, new]) for last, new in zip(self._last, frames))
@@ -111,8 +116,8 @@ class ShapeMeter(Meter):
 
 
 def edges_of(clip: MotionClip) -> np.ndarray | None:
-    """Return the edges of a clip to measure: the sides of its faces, each once; without faces its edges; without these
-    the links between neighbours on a stem.
+    """Return the edges of a clip to measure: each side of its faces once; if it has no faces, its edges; if it has
+    neither, the links between neighbours on a stem.
 
     Parameters
     ----------
@@ -155,8 +160,9 @@ def _by_size(counts: np.ndarray, indices: np.ndarray) -> list[np.ndarray]:
 
 
 def _area_vectors(frames: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (k, F, 3) vectors along the normals, as long as the areas, of (F, size) faces; and (k, F) how far a face
-    reaches from its first corner."""
+    """Return the area vectors (k, F, 3) of faces (F, size) in k frames, along the normals and as long as the areas, and
+    the distance (k, F) from a face's first corner to its furthest.
+    """
     first, *others = (frames.take(corners, axis=1) for corners in faces.T)
     spokes = [corner - first for corner in others]
     vector = np.zeros_like(spokes[0])

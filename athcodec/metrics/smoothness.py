@@ -47,6 +47,9 @@ class SmoothnessMeter(Meter):
     def __init__(
         self, frame_count: int, bound: float | np.ndarray = 1.0, starts: Sequence[int] = (), loop: bool = False
     ) -> None:
+        """Begin to measure `frame_count` frames. `bound` is the error bound, or one for each vertex, `starts` has the
+        first frames of segments, and `loop` tells whether the first frame follows the last.
+        """
         frame_count = whole("frame_count", frame_count)
         self.seams = [start for start in (whole("starts", start) for start in starts) if start > 0] + [0] * loop
         self.source_acceleration, self.acceleration, self.error_acceleration, self.share = np.full(
@@ -61,6 +64,9 @@ class SmoothnessMeter(Meter):
         self._first = self._last = np.empty((2, 0, 0, 3))
 
     def _add(self, reference: np.ndarray, decoded: np.ndarray) -> None:
+        """Add source and decoded frames (k, N, 3), which follow those added before. The frames around each are needed,
+        so two are kept for the next call. Raise ValueError if there are too many frames.
+        """
         both = np.stack([reference, decoded])
         if self._added + both.shape[1] > len(self.acceleration):
             raise ValueError(f"frames: got more than {len(self.acceleration)}, expected so many")
@@ -77,7 +83,9 @@ class SmoothnessMeter(Meter):
             self._measure(self._added - 1, around)
 
     def _measure(self, first: int, frames: np.ndarray) -> None:
-        """Measure at all of the (2, k, N, 3) frames but the first and the last, from frame number `first` on."""
+        """Measure all frames but the first and the last of a block (2, k, N, 3): source and decoded positions. `first`
+        is the number of the first frame that is measured.
+        """
         if frames.shape[1] < 3:
             return
         source, decoded = second_differences(frames, axis=1)
@@ -157,8 +165,8 @@ def tick_ratio(acceleration: np.ndarray, seams: Sequence[int]) -> float | None:
     Returns
     -------
     float or None
-        None where no seam has a second difference near it; of a motion that stands still at the median frame infinite,
-        or 0 where it does near seams too.
+        None if no seam has a second difference near it. If the motion stands still at the median frame, infinite, or 0
+        if it stands still near seams, too.
     """
     near = (np.asarray(seams, int)[:, None] + np.arange(-NEAR_SEAM, NEAR_SEAM)).ravel()
     loops = 0 in seams

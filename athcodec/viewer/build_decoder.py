@@ -111,7 +111,7 @@ def check_compiler() -> None:
 
 
 def compile_decoder(template: str) -> bytes:
-    """Return the decoder as a WebAssembly module."""
+    """Compile the C decoder with the exports that the template uses, and return the WebAssembly module."""
     check_compiler()
     wanted = [f"-Wl,--export={name}" for name in ["__heap_base", *exports(template)]]
     # functions of one kind beside each other compress better
@@ -150,7 +150,9 @@ def _lean(text: str) -> str:
 
 
 def unpack(module: str) -> tuple[str, bytes]:
-    """Return (text without payload, WebAssembly) of a module's text; ("", b"") where it is none."""
+    """Return the text of a module without its payload, and the WebAssembly in the payload; ("", b"") if the text is no
+    such module.
+    """
     match = PAYLOAD.search(module)
     if match is None:
         return "", b""
@@ -166,6 +168,9 @@ def differences(built: str, committed: str) -> list[str]:
 
 
 def main() -> int:
+    """Build ath_decoder.mjs, or with `--check` only compare it with the file. Return the exit status: 1 if the build
+    fails or the file differs.
+    """
     parser = argparse.ArgumentParser(description="Builds athcodec/viewer/ath_decoder.mjs from the C decoder.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if the module differs")
     arguments = parser.parse_args()

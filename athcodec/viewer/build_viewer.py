@@ -36,7 +36,7 @@ class BuildError(Exception):
 
 
 def modules() -> Path:
-    """Return a folder with the packages of package-lock.json, installed where it is not there yet."""
+    """Return the folder with the packages of package-lock.json, which are installed first if they are not there yet."""
     lock = (VIEWER / "package-lock.json").read_bytes()
     cache = Path(os.environ.get(CACHE_VARIABLE) or DEFAULT_CACHE).expanduser() / hashlib.sha256(lock).hexdigest()[:16]
     folder = cache / "node_modules"
@@ -80,6 +80,9 @@ def own_bytes(folder: Path) -> int:
 
 
 def main() -> int:
+    """Build the viewer's folder, or with `--check` only compare it with the folder that exists. Return the exit status:
+    1 if the build fails or a file differs.
+    """
     parser = argparse.ArgumentParser(description="Builds athcodec/viewer/web from its sources.")
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file differs")
     arguments = parser.parse_args()

@@ -122,8 +122,9 @@ def save_picture(
 
 
 def still(path: FilePath, size: tuple[int, int] = SIZE) -> bytes:
-    """Return a plant as WebP, late in its clip, when it has grown where it grows; raises as
-    `save_picture`."""
+    """Return a picture of a plant, late in its clip, when a growing plant has grown, as the bytes of a WebP file. Raise
+    what `save_picture` raises.
+    """
     image = _packages()
     with open_ath(path) as decoder:
         time = _STILL_AT * decoder.clip.duration
@@ -143,7 +144,7 @@ def can_draw() -> bool:
 
 
 def _packages() -> PlaywrightObject:
-    """Return Pillow's module of images if all packages that a picture needs are installed."""
+    """Return Pillow's module of images. Raise MissingExtra if a package that pictures need is missing."""
     try:
         import playwright.sync_api  # noqa: F401
         from PIL import Image
@@ -158,7 +159,7 @@ def _packages() -> PlaywrightObject:
 
 @contextmanager
 def chromium(flags: Sequence[str] = FLAGS) -> Iterator[PlaywrightObject]:
-    """Start a browser, Playwright's. Raises MissingExtra."""
+    """Start a browser of Playwright and yield it. Raise MissingExtra if it is not installed."""
     _packages()
     from playwright.sync_api import sync_playwright
 
@@ -180,7 +181,9 @@ def _drawn(
     clip: str | None = None,
     host_mesh: HostMesh | None = None,
 ) -> Iterator[bytes]:
-    """Yield each picture as PNG, with all of the scenery, also without a graphics processor."""
+    """Yield each picture as the bytes of a PNG file, with all scenery, also on machines without a graphics
+    processor.
+    """
     with open_ath(path, clip=clip, host_mesh=host_mesh) as decoder:
         playing = decoder.clip
         steps = max(playing.frame_count - 1, 1)

@@ -160,8 +160,9 @@ def self_contained(
     floor: Sequence[tuple[bytes, float]] = (),
     still: str = "",
 ) -> str:
-    """Return the page with everything inside: styles, modules as data URLs, the worker and the file as text. still: an
-    SVG element, for browsers that run no scripts."""
+    """Return an HTML page with everything inside: styles, modules as data URLs, the worker, and the .ath file `data` as
+    text. `still` is an SVG element for browsers that run no scripts.
+    """
     text = PAGE.read_text("utf-8")
     modules = ["three", "viewer", "later", *(["model"] if _is_glb(data) else [])]
     inside = json.dumps({"imports": {name: _data_url(_module(f"{name}.js")) for name in modules}})
@@ -260,6 +261,7 @@ def serve(
     from aiohttp import web
 
     async def run() -> None:
+        """Start the server, call `ready` with the page's address, and serve until interrupted."""
         place = f"file/{secrets.token_urlsafe(12)}/{file_name(path)}"
         beside = {} if mesh is None else {f"{place}.mesh": mesh}
         beside |= {f"{place}.floor{i}": data for i, (data, _) in enumerate(grown)}
@@ -300,12 +302,16 @@ def _refuse_other_urls(path: FilePath) -> None:
 def application(
     path: FilePath, place: str, beside: Mapping[str, bytes] | None = None, still: str | None = None
 ) -> web.Application:
-    """Return the aiohttp application: the page, compressed for browsers that take it so, and the file at `place`, which
-    only the page's address tells; at other such places what goes with it, such as the host's mesh. still: an SVG of the
-    plant, for browsers that run no scripts."""
+    """Return the aiohttp application: the page, and the .ath file at the secret path `place`, which only the page's
+    address contains. `beside` has further files by their paths, such as the host's mesh, and `still` is an SVG of the
+    plant for browsers that run no scripts.
+    """
     from aiohttp import ClientSession, web
 
     def part(data: bytes, name: str) -> Answer:
+        """Return a handler that answers with `data`, compressed for browsers that accept gzip. `name` tells the type of
+        the content.
+        """
         packed = gzip.compress(data, mtime=0)
 
         async def answer(request: web.Request) -> web.StreamResponse:
@@ -327,6 +333,7 @@ def application(
         return web.FileResponse(path, headers={"Content-Type": "application/octet-stream", "Cache-Control": "no-cache"})
 
     async def remote(request: web.Request) -> web.StreamResponse:
+        """Pass a request for the .ath file on to its URL, with the requested range, and the response back."""
         asked = {name: request.headers[name] for name in ("Range",) if name in request.headers}
         async with request.app[session].get(os.fspath(path), headers=asked) as answer:
             passed = {name: answer.headers[name] for name in PASSED_ON if name in answer.headers}

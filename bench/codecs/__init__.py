@@ -43,7 +43,9 @@ class Source:
         return hierarchy_of(self.clip)
 
     def part(self, vertices: int) -> Source:
-        """Return a clip of about so many vertices: some runs of branches, evenly spaced, with all that carries them."""
+        """Return a smaller clip of about `vertices` vertices: evenly spaced runs of branches, with all branches that
+        they hang on.
+        """
         hierarchy, count = self.hierarchy, self.positions.shape[1]
         run = max(1, vertices // RUNS)
         is_taken = (np.cumsum(hierarchy.stem_count) // run) % -(-count // vertices) == 0
@@ -110,7 +112,10 @@ def largest_error(positions: np.ndarray, decoded: np.ndarray) -> float:
 
 
 def check(codec: Codec, source: Source, bound: float) -> tuple[bytes, np.ndarray]:
-    """Return encodes and decodes. Raises BoundBroken if the error exceeds the bound, or the shape or type differs."""
+    """Encode a clip with a codec, decode it again, and return the encoded bytes and the decoded positions (T, N, 3).
+    Raise BoundBroken if a vertex is further off than `bound`, in scene units, or if the decoded array has another shape
+    or type.
+    """
     data = codec.encode(source, bound)
     decoded = codec.decode(data)
     if decoded.shape != source.positions.shape or decoded.dtype != np.float32:

@@ -43,6 +43,9 @@ class SkeletalTracks(Baseline):
         self.tiers = tiers  # Tiers that are read.
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        """Return the values that the search tries for each setting: quantisation step, vertices per bone, whether
+        neighbouring bones are blended, and which pose the bones are fitted to.
+        """
         return {
             "step": Ladder.geometric(0.25, 16, 2.0),
             "bone": Ladder((6, 12, 24, 48, 96, 192, 384), 2),
@@ -52,6 +55,9 @@ class SkeletalTracks(Baseline):
         }
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        """Write the clip as rotations and offsets of bones, and return the order in which the decoder gets the
+        vertices. `bound` is the error bound in scene units; `settings` has a value for each key of `grid`.
+        """
         order = vertex_order(source, "hierarchy")
         write_order(writer, order)
         positions = ordered(source, order)
@@ -82,6 +88,7 @@ class SkeletalTracks(Baseline):
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        """Read what `write` has written. Return the decoded positions (N, 3, T) and the order of their vertices."""
         order, frames = read_order(reader), reader.count()
         pose = read_pose(reader, order)
         bones, blend, step = Bones(order.hierarchy, reader.count(), pose), reader.count(), reader.single()
@@ -112,7 +119,9 @@ class _Track:
         self.codes = np.zeros((len(self.error), segments, SEGMENT, 3), np.int64)
 
     def write(self, some: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-        """Code numbers (M, T, 3) of some bones; returns what a reader gets."""
+        """Quantise and store three numbers per frame, `numbers` (M, T, 3), of the M bones that `some` lists. Return the
+        values (M, T, 3) that a decoder gets.
+        """
         padded = np.pad(numbers, ((0, 0), (0, -self.frames % SEGMENT), (0, 0)), "edge")
         padded = padded.reshape(len(some), -1, SEGMENT, 3) / self.unit[some, None, None, None]
         self.low[some] = np.floor(padded.min(axis=2))
@@ -168,6 +177,9 @@ class _Track:
         return bits
 
     def set_bits(self, tier: int, bits: np.ndarray, at: int) -> int:
+        """Set the integers of the even (`tier` 0) or odd (`tier` 1) frames from an array of single bits, which is read
+        from index `at` on. Return the index of the first bit that was not used.
+        """
         rates, begin = self._layout(tier)
         codes = np.zeros(len(rates), np.int64)
         for bit in range(rates.max(initial=0)):
@@ -182,6 +194,9 @@ class Bones:
     """Runs of at most `size` vertices along the branches, each but those of roots on a parent with a lower number."""
 
     def __init__(self, hierarchy: Hierarchy, size: int, pose: np.ndarray):
+        """Cut every branch of a hierarchy into bones of about `size` vertices each. `pose` (N, 3) has the positions
+        that the bones' rotations are measured from.
+        """
         branch = hierarchy.vertex_branch()
         self.place = np.arange(len(branch)) - hierarchy.first_vertex[branch]
         count = np.maximum(1, np.rint(hierarchy.stem_count / size).astype(int))  # bones of a branch
@@ -208,7 +223,9 @@ class Bones:
         yield from np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def fitted(self, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return turns (bones, T, 3, 3) and shifts (bones, T, 3) of the pose, and hinges (bones, 3) in it."""
+        """Fit rigid bones to positions (N, 3, T). Return their rotations (bones, T, 3, 3) and translations (bones, T,
+        3) from the reference pose, and the hinges (bones, 3): the points of that pose about which each bone turns.
+        """
         centre, turns = self.parts.rigid_maps(self.parts.fit_rigid(positions))
         shifts = np.moveaxis(centre, 1, 2) - (turns @ self.parts.centre[:, None, :, None])[..., 0]
         hinges = self.parts.centre.copy()
@@ -225,8 +242,13 @@ class Bones:
         return turns, shifts, hinges
 
     def follow(self, hinges: np.ndarray, frames: int, tracks: Follow) -> tuple[np.ndarray, np.ndarray]:
-        """Return turns and shifts, parents first. tracks(bones, turns of the parents, where these take the hinges)
-        gives vectors of quaternions and offsets, (2, M, T, 3)."""
+        """Chain the bones from the root outwards and return their absolute rotations (bones, T, 3, 3) and translations
+        (bones, T, 3).
+
+        For each generation, `tracks(bones, turns, places)` is called with the numbers of M bones, the rotations of
+        their parents, and the positions to which these move the hinges. It returns (2, M, T, 3): the vector parts of
+        relative quaternions, and offsets from those positions.
+        """
         turns, shifts = np.empty((self.count, frames, 3, 3)), np.empty((self.count, frames, 3))
         for some in self.generations():
             below = self.parent[some]
@@ -239,7 +261,9 @@ class Bones:
         return turns, shifts
 
     def skin(self, turns: np.ndarray, shifts: np.ndarray, blend: bool) -> np.ndarray:
-        """Return (N, 3, T) vertices under the maps of their own bone and of the nearest other one of the branch."""
+        """Return the vertices (N, 3, T) that bones with rotations (bones, T, 3, 3) and translations (bones, T, 3) move.
+        With `blend`, a vertex mixes its own bone with the nearest other bone of its branch.
+        """
         along = (self.place - self._first_place()[self.of_vertex] + 0.5) / self.length - 0.5
         other = np.clip(self.of_vertex + np.where(along < 0, -1, 1), 0, self.count - 1)
         weight = np.abs(along) * blend * (self.branch[other] == self.branch[self.of_vertex])
@@ -264,7 +288,9 @@ def _moved(turns: np.ndarray, shifts: np.ndarray | float, points: np.ndarray) ->
 
 
 def _turns(vector: np.ndarray) -> np.ndarray:
-    """Return (..., 3, 3) of the vector parts of unit quaternions with positive scalars."""
+    """Return the rotation matrices (..., 3, 3) of unit quaternions, given their vector parts (..., 3); the scalar part
+    is positive.
+    """
     square = (vector**2).sum(axis=-1, keepdims=True)
     vector = vector / np.sqrt(np.maximum(square, 1.0))
     w = np.sqrt(np.maximum(1 - square, 0.0))[..., None]

@@ -105,8 +105,9 @@ class Search:
                 break
 
     def _round(self, best: tuple[int, ...], first: bool) -> tuple[int, ...]:
-        """Return the best point after each axis of the grid was searched once, from `best` on. first: in strides of
-        two, too."""
+        """Search each axis of the grid of settings once, beginning at the point `best`, and return the best point
+        found: the index of a value for each setting. If `first` is true, strides of two values are tried as well.
+        """
         for axis, values in enumerate(self.grid.values()):
             if isinstance(values, Ladder):
                 for stride in (2, 1) if first else (1,):
@@ -116,7 +117,9 @@ class Search:
         return best
 
     def _walk(self, at: tuple[int, ...], axis: int, stride: int) -> tuple[int, ...]:
-        """Return the point that is reached along an axis while the bytes shrink, in steps of `stride`."""
+        """Move along one axis of the grid of settings in steps of `stride` values while the encoded bytes shrink, and
+        return the point reached. `at` is the starting point: the index of a value for each setting.
+        """
         last = len(list(self.grid.values())[axis].values) - 1
         for direction in (stride, -stride):
             start = at
@@ -164,7 +167,9 @@ class Baseline(ABC):
         return self._trial(source, bound, self.settings)
 
     def _searched(self, source: Source, bound: float) -> Settings:
-        """Return the settings of the smallest encoding found."""
+        """Search the codec's settings and return those of the smallest encoding that keeps the error bound, in scene
+        units.
+        """
 
         def search(source: Source, grid: dict[str, Ladder | Choice], rounds: int) -> Settings:
             return Search(lambda settings: len(self._trial(source, bound, settings)), grid).run(rounds)
@@ -189,6 +194,9 @@ class Baseline(ABC):
         return writer.data() + write_corrections(positions, ordered(source, order), limit)
 
     def decode(self, data: bytes) -> np.ndarray:
+        """Return the float32 positions (T, N, 3), in the source's order of vertices, that `data` holds: the lossy
+        motion with its corrections added.
+        """
         reader = Reader(data)
         lossy, order = self.read(reader)
         positions = np.ascontiguousarray(lossy, np.float32)

@@ -47,6 +47,9 @@ class Blosc2(Program):
         return self._unpacked(data, "f4", choice[0], shape)
 
     def _packed(self, part: np.ndarray, filters: str, thorough: bool) -> bytes:
+        """Compress an array with Blosc2 and return the bytes. `filters` names Blosc2's filter, and `thorough` selects
+        the highest level of zstd and tries a second block size.
+        """
         blosc2 = self.load()
         pipeline = (
             [blosc2.Filter.SHUFFLE, blosc2.Filter.BYTEDELTA]
@@ -74,7 +77,7 @@ class Blosc2(Program):
 
 
 def _rounded(values: np.ndarray, bits: int) -> np.ndarray:
-    """Return values rounded to the nearest with so many bits of mantissa."""
+    """Return floating-point values rounded to the nearest values whose mantissas have `bits` bits."""
     cut = MANTISSA - bits
     if cut == 0:
         return values

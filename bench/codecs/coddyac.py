@@ -44,6 +44,9 @@ class Coddyac(Baseline):
         )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        """Write the clip as a basis of trajectories and coefficients that are predicted from vertex to vertex along the
+        branches. Return the order in which the decoder gets the vertices.
+        """
         order, trajectories, pose, motion, step = write_front(writer, source, bound, settings)
         rows = trajectories.rows(motion)
         spectrum = source_basis(source, order, trajectories)
@@ -80,7 +83,9 @@ def _step_ratio(order: VertexOrder, pose: np.ndarray) -> np.ndarray:
 
 
 def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> np.ndarray:
-    """Return (2, K) integers: weights of the vertex before, and of its step, that predict each component best."""
+    """Return integers (2, K), two for each of K components: the weight of the coefficient of the vertex before, and
+    that of its step from the vertex before it, which together predict coefficients `units` best.
+    """
     some = np.flatnonzero(order.before >= 0)
     target, near = units[some], units[order.before[some]]
     step = step_ratio[some] * (near - units[order.before2[some]])
@@ -98,7 +103,9 @@ def _weights(units: np.ndarray, order: VertexOrder, step_ratio: np.ndarray) -> n
 def _predicted(
     order: VertexOrder, step_ratio: np.ndarray, weights: np.ndarray, shape: tuple[int, ...], residual
 ) -> np.ndarray:
-    """Return coefficients (N, W, K) in steps: the weighted prediction plus `residual(vertices, predicted)`."""
+    """Return coefficients (N, W, K), in quantisation steps, vertex by vertex: the prediction from the vertices before,
+    plus what `residual(vertices, predicted)` returns for it.
+    """
     units = np.zeros(shape)
     near, along = weights / WEIGHT_STEPS
     for vertices in order.generations:

@@ -55,9 +55,10 @@ def compiler() -> list[str] | None:
 
 
 def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
-    """Compile C with the options that CMakeLists.txt gives the core.
+    """Compile C sources to a program or library at `target`, with the compiler options that CMakeLists.txt gives the
+    core and further `options`.
 
-    Raises SystemExit with the compiler's line about the first error.
+    Raise SystemExit with the compiler's first error if the sources do not compile.
     """
     command = compiler()
     if command is None:
@@ -75,7 +76,9 @@ def compile_c(target: Path, sources: Sequence[Path], *options: str) -> None:
 
 @cache
 def library(writes: bool) -> ctypes.CDLL:
-    """Return coder.c for one direction; compiled once per process."""
+    """Return the compiled coder.c as a ctypes library: its writers if `writes` is true, else its readers. Each is
+    compiled once per process.
+    """
     folder = Path(tempfile.mkdtemp(prefix="athcodec-bench-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / ("writer.so" if writes else "reader.so")
@@ -94,6 +97,9 @@ def library(writes: bool) -> ctypes.CDLL:
 
 
 def _written(name: str, capacity: int, *arguments) -> bytes:
+    """Call the C writer `name` with a buffer of `capacity` bytes, four times as large whenever it does not suffice, and
+    return the stream that it wrote. Raise ValueError for numbers that the stream cannot hold.
+    """
     while True:
         buffer = np.empty(capacity, np.uint8)
         size = getattr(library(True), name)(buffer.ctypes.data, capacity, *arguments)
@@ -114,8 +120,9 @@ def _read(name: str, data: bytes, *arguments) -> None:
 
 
 def _code_rows(rows: np.ndarray, unit: int) -> bytes:
-    """Return (R, 3, F) int32 below 2^30, `unit` rows of which belong together, as motion coefficients or as a table,
-    whichever is smaller."""
+    """Code integers (R, 3, F) below 2^30 twice, as motion coefficients and as a table, and return the smaller stream.
+    `unit` is the number of consecutive rows that belong together.
+    """
     parts = [np.ascontiguousarray(rows[:, :, at : at + SEGMENT_FRAMES]) for at in _blocks(rows.shape[2])]
     coded = [
         _written("bench_rows", 4096 + part.size, len(part), part.shape[2], unit, part.ctypes.data) for part in parts
@@ -126,7 +133,9 @@ def _code_rows(rows: np.ndarray, unit: int) -> bytes:
 
 
 def _read_rows(data: bytes, shape: tuple[int, int, int], unit: int) -> np.ndarray:
-    """Return integers of a shape (rows, 3, frames) that `data` holds. unit: rows that are coded together."""
+    """Return the int32 array of shape (rows, 3, frames) that `data` holds. `unit` is the number of consecutive rows
+    that were coded together.
+    """
     if data[0]:
         return _read_table(data[1:], (shape[0], 3 * shape[2])).reshape(shape)
     rows = np.zeros(shape, np.int32)
@@ -169,6 +178,9 @@ def _split(data: bytes, count: int) -> list[bytes]:
 
 
 def varint(value: int) -> bytes:
+    """Return a non-negative integer as a variable-length integer: 7 bits per byte, low bits first, with the high bit
+    set in all bytes but the last.
+    """
     if value < 0:
         raise ValueError(f"varint: got {value}; expected a number >= 0")
     result = bytearray()
@@ -180,6 +192,9 @@ def varint(value: int) -> bytes:
 
 
 def read_varint(data: bytes, at: int) -> tuple[int, int]:
+    """Read a variable-length integer of `data` that begins at byte `at`. Return its value and the position of the byte
+    after it; raise DamagedStream if the data ends before it does.
+    """
     value = shift = 0
     while True:
         if at >= len(data):
@@ -240,6 +255,9 @@ class Writer:
         return self._add(head + coded, wide)
 
     def _integers(self, integers: np.ndarray, code) -> tuple[bytes, np.ndarray]:
+        """Code integers with the function `code`, split into several streams if they do not fit 32 bits. Return the
+        bytes (the number of streams, and each with its length in front) and the integers as int64.
+        """
         integers = np.asarray(integers, np.int64)
         if not integers.size:
             return b"", integers
@@ -259,7 +277,10 @@ class Writer:
         return self._add(varint(len(bits)) + np.packbits(bits).tobytes(), bits)
 
     def pose(self, branches: np.ndarray, lags: Sequence[np.ndarray], step: float, pose: np.ndarray) -> np.ndarray:
-        """Return (N, 3) as athcodec codes a rest pose, by the best of several lags of the branches."""
+        """Quantise a pose (N, 3) by `step` and write it as athcodec codes a rest pose. `lags` has alternative sets of a
+        number per branch, the vertices back that predict a vertex; the set that makes the smallest stream is used.
+        Return the pose (N, 3) that a decoder gets.
+        """
         coded = []
         for lag in lags:
             branches["lag"] = lag
@@ -340,6 +361,7 @@ class Reader:
         return pose
 
     def hierarchy(self) -> Hierarchy:
+        """Read the numbers of branches and vertices and the hierarchy's stream, and return the branch hierarchy."""
         branch_count, vertex_count = self.count(), self.count()
         stream = self.take(self.count())
         branches = np.zeros(branch_count, BRANCH)
@@ -362,9 +384,10 @@ class Reader:
 
 
 def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -> bytes:
-    """Correct (N, 3, T) float32 positions in place, so that every vertex is within `limit` of `wanted`, float64.
+    """Add quantised corrections in place to float32 positions (N, 3, T), so that every vertex is within `limit` of
+    `wanted`, float64 (N, 3, T). Return the bytes that let a decoder add the same corrections.
 
-    As in athcodec, in segments of SEGMENT_FRAMES frames: the step, then a length and a stream for each segment.
+    The bytes hold the quantisation step, and then a length and a stream for each segment of SEGMENT_FRAMES frames.
     """
     starts = range(0, positions.shape[2], SEGMENT_FRAMES)
     factor = 1.0
@@ -391,7 +414,7 @@ def write_corrections(positions: np.ndarray, wanted: np.ndarray, limit: float) -
 
 
 def read_corrections(positions: np.ndarray, reader: Reader) -> None:
-    """Apply them in place to contiguous (N, 3, T) float32."""
+    """Read corrections and add them in place to contiguous float32 positions (N, 3, T)."""
     vertices, _, frames = positions.shape
     step = reader.single()
     for at in range(0, frames, SEGMENT_FRAMES):

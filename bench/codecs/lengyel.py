@@ -30,6 +30,9 @@ class Lengyel(Baseline):
     name = "moving frames + PCA (Lengyel)"
 
     def grid(self, source: Source, bound: float) -> dict[str, Ladder | Choice]:
+        """Return the values that the search tries for each setting, such as whether the parts move rigidly, how many
+        generations of branches share a part, and the quantisation steps of the parts' motion and of the residual.
+        """
         depths = tuple(range(min(DEEPEST, int(source.hierarchy.branch_depth.max())) + 1))
         return grid_of(
             "rigid joint depth step learned keep_tracks tracks keep basis pose_of differences dead_zone pose first",
@@ -45,6 +48,9 @@ class Lengyel(Baseline):
         )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        """Write the clip as the motion of parts and the principal components of the residual. Return the order in which
+        the decoder gets the vertices; `bound` is the error bound in scene units.
+        """
         order = vertex_order(source, "hierarchy")
         write_order(writer, order)
         positions = ordered(source, order)
@@ -75,6 +81,7 @@ class Lengyel(Baseline):
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        """Read what `write` has written. Return the decoded positions (N, 3, T) and the order of their vertices."""
         order = read_order(reader)
         frames, rigid, depth = reader.count(), reader.count(), reader.count()
         trajectories = Trajectories(bool(reader.count()), frames)
@@ -86,7 +93,9 @@ class Lengyel(Baseline):
 
 
 def _write_tracks(writer: Writer, exact: np.ndarray, step: float, settings: Settings) -> np.ndarray:
-    """Write tracks (parts, k, 3, T) by athcodec's waves or a learned basis; return what a reader will decode."""
+    """Write the motion of parts, (parts, k, 3, T) with k vectors per part and frame, as athcodec's functions of time or
+    by a learned basis. Return the values of the same shape that a decoder gets.
+    """
     parts, count, _, frames = exact.shape
     writer.count(count)
     if writer.count(settings["learned"]):
@@ -140,8 +149,8 @@ class Parts:
     # affine: displacement = sum of orthonormal functions of the pose times their tracks
 
     def functions(self) -> np.ndarray:
-        """Return (N, 4): a constant and up to three linear functions, orthonormal over each part; 0 where it is
-        flat.
+        """Return functions over the vertices of each part, (N, 4): a constant and up to three linear ones, orthonormal
+        over the part. A column is 0 in a part that has no extent in that direction.
         """
         spread = self.sum_of(self.around[:, :, None] * self.around[:, None])
         extents, axes = np.linalg.eigh(spread)
@@ -170,7 +179,9 @@ class Parts:
         return np.sqrt(np.maximum(square, 1e-12))[:, None, None]
 
     def fit_rigid(self, positions: np.ndarray) -> np.ndarray:
-        """Return (parts, 2, 3, T): shifts and rotation vectors."""
+        """Fit a rigid motion of every part to positions (N, 3, T). Return (parts, 2, 3, T): translations first, then
+        rotation vectors in radians.
+        """
         centre = self.sum_of(positions) / self.sizes[:, None, None]
         around = positions - centre[self.of_vertex]
         spread = np.stack([self.sum_of(around * self.around[:, i, None, None]) for i in range(3)], axis=2)
@@ -208,8 +219,8 @@ def _rotations(vectors: np.ndarray) -> np.ndarray:
 
 
 def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
-    """Return (parts, T, 3) of (parts, T, 3, 3), each the one nearest to that of the frame before (which half turns
-    need).
+    """Return the rotation vectors (parts, T, 3) of rotation matrices (parts, T, 3, 3). Of the vectors that describe one
+    rotation, the vector nearest to that of the frame before is taken.
     """
     quaternion = quaternions(rotation)
     for t in range(1, quaternion.shape[1]):
@@ -221,7 +232,7 @@ def _rotation_vectors(rotation: np.ndarray) -> np.ndarray:
 
 
 def quaternions(rotation: np.ndarray) -> np.ndarray:
-    """Return (..., 4), scalar first and positive: the eigenvector of the largest eigenvalue."""
+    """Return the unit quaternions (..., 4), with a positive scalar first, of the rotation matrices (..., 3, 3)."""
     m = rotation
     trace = np.trace(m, axis1=-2, axis2=-1)
     k = np.zeros((*trace.shape, 4, 4))

@@ -18,7 +18,9 @@ class Meshopt(Program):
     name, module, package = "meshoptimizer", "meshoptimizer", "meshoptimizer"
 
     def choices(self, form: str) -> list:
-        """Return (elements, how many of the others each holds; 0: as many as fit, zigzag)."""
+        """Return the layouts to try, as tuples: the array's axis that elements run along, the number of items that each
+        element holds (0: as many as fit), and whether signed integers are folded to unsigned ones.
+        """
         elements = [
             ("vertices", 1),
             ("vertices", 4),
@@ -32,6 +34,9 @@ class Meshopt(Program):
         return [(*element, folded) for element in elements for folded in (False, True)]
 
     def encode_integers(self, values: np.ndarray, choice, thorough: bool) -> bytes:
+        """Return integers (T, N, 3) as buffers of meshoptimizer's vertex codec, compressed once more where that makes
+        them smaller. `choice` is an item of `choices`; `thorough` selects the higher level of compression.
+        """
         encoder = self.load()
         encoder.encode_vertex_version(1)
         elements, count, folded = choice
@@ -43,6 +48,7 @@ class Meshopt(Program):
         return bytes([numbers.itemsize, small]) + (packed if small else plain)
 
     def decode_integers(self, data: bytes, shape: tuple[int, int, int], choice) -> np.ndarray:
+        """Return the int32 array of shape (T, N, 3) that `encode_integers` has packed with the same `choice`."""
         decoder = self.load()
         elements, count, folded = choice
         dtype = np.dtype(f"{'u' if folded else 'i'}{data[0]}")

@@ -28,6 +28,9 @@ class Athcodec:
         return None
 
     def encode(self, source: Source, bound: float) -> bytes:
+        """Return the clip as an .ath file within `bound`, in scene units, or without loss, and keep the encoder's
+        choices in `settings`. Raise CannotKeep if athcodec cannot keep the bound.
+        """
         out, limit = BytesIO(), {"lossless": True} if self.lossless else {"max_error": bound}
         try:
             summary = athcodec.encode(source.clip, out, **self.options, **limit)

@@ -113,7 +113,9 @@ def source_basis(source: Source, order: VertexOrder, trajectories: Trajectories)
 
 
 def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectories: Trajectories) -> np.ndarray:
-    """Return basis rows (K, length), each at about its step; returns what a reader will decode."""
+    """Quantise and write the rows of a basis (K, length), each by about its own step of `steps` (K,). Return the basis
+    (K, length) that a decoder gets.
+    """
     exponents = np.minimum(np.rint(2 * np.log2(steps)), COARSEST_BASIS).astype(np.int64)
     writer.table(np.diff(exponents, prepend=COARSEST_BASIS)[None])
     steps = 2.0 ** (exponents / 2)
@@ -127,7 +129,9 @@ def write_basis(writer: Writer, basis: np.ndarray, steps: np.ndarray, trajectori
 
 
 def read_basis(reader: Reader, trajectories: Trajectories) -> np.ndarray:
-    """Read the basis of trajectories, a row for each component, (K, numbers of a trajectory)."""
+    """Read a basis of trajectories and return it as (K, length): one row per component, with as many numbers as a
+    trajectory has.
+    """
     steps = 2.0 ** ((np.cumsum(reader.table()[0]) + COARSEST_BASIS) / 2)
     kind = reader.count()
     width = 3 if trajectories.joint else 1
@@ -149,8 +153,8 @@ def _in_threes(tracks: np.ndarray) -> np.ndarray:
 def write_coefficients(
     writer: Writer, q: np.ndarray, order: VertexOrder, trajectories: Trajectories, most: int
 ) -> None:
-    """Write integers (rows, K), each component by the differences between vertices that make it smallest, of degree
-    <= most.
+    """Write integer coefficients (rows, K). Each component is coded by its differences from vertex to vertex, of the
+    degree from 0 to `most` that makes its stream smallest.
     """
     q = q.reshape(len(order.source), -1, q.shape[1])
     costs = np.array([_cost(differences(q, order, degree)) for degree in range(most + 1)])
@@ -198,9 +202,10 @@ def write_group(
     settings: Settings,
     trajectories: Trajectories,
 ) -> np.ndarray:
-    """Write motion (N, 3, T) as coefficients times basis; `spectrum`: its singular values and vectors.
+    """Write the motion (N, 3, T) of some vertices as quantised coefficients times a basis. `spectrum` has the motion's
+    singular values and singular vectors, and `step` is the quantisation step in scene units.
 
-    Returns what a reader will decode.
+    Return the motion (N, 3, T) that a decoder gets.
     """
     rows = trajectories.rows(motion)
     basis, steps = significant(spectrum, rows, step, settings, trajectories)
@@ -244,7 +249,9 @@ def read_group(reader: Reader, order: VertexOrder, step: float, trajectories: Tr
 def write_front(
     writer: Writer, source: Source, bound: float, settings: Settings
 ) -> tuple[VertexOrder, Trajectories, np.ndarray, np.ndarray, float]:
-    """Write order, kind of trajectories, mean pose (N, 3), motion about that pose (N, 3, T), and step."""
+    """Write what all codecs by principal components begin with. Return the order of vertices, the kind of trajectories,
+    the mean pose (N, 3), the motion (N, 3, T) about that pose, and the quantisation step in scene units.
+    """
     order = vertex_order(source, settings.get("order", "hierarchy"))
     write_order(writer, order)
     positions = ordered(source, order)
@@ -294,6 +301,9 @@ class ClusteredPca(Baseline):
         )
 
     def write(self, writer: Writer, source: Source, bound: float, settings: Settings) -> VertexOrder:
+        """Write the clip as clusters of vertices, each with principal components of its own. Return the order in which
+        the decoder gets the vertices.
+        """
         order, trajectories, _, motion, step = write_front(writer, source, bound, settings)
         groups, spectra = self._clusters(source, order, settings["clusters"], trajectories)
         writer.count(len(spectra))
@@ -304,6 +314,7 @@ class ClusteredPca(Baseline):
         return order
 
     def read(self, reader: Reader) -> tuple[np.ndarray, VertexOrder]:
+        """Read what `write` has written. Return the decoded positions (N, 3, T) and the order of their vertices."""
         order, trajectories, pose, step = read_front(reader)
         count, groups = reader.count(), np.cumsum(reader.table()[:, 0])
         positions = np.repeat(pose[:, :, None], trajectories.frames, axis=2)
@@ -313,7 +324,9 @@ class ClusteredPca(Baseline):
         return positions, order
 
     def _clusters(self, source: Source, order: VertexOrder, count: int, trajectories: Trajectories):
-        """Return cluster of each vertex (N,), and the spectrum of each cluster."""
+        """Divide the vertices into `count` clusters that move alike. Return the cluster (N,) of each vertex, and for
+        each cluster its singular values and vectors.
+        """
 
         def make():
             motion = mean_motion(source, order)
@@ -325,7 +338,9 @@ class ClusteredPca(Baseline):
         return memo(source, ("clusters", order.hierarchy is not None, count, trajectories.joint), make)
 
     def _lloyd(self, coefficients: np.ndarray, count: int, vertices: int) -> np.ndarray:
-        """Return clusters of vertices by the basis that has most of their motion; starts from runs of neighbours."""
+        """Return the cluster of each vertex. Beginning with runs of neighbours, every round learns a basis of each of
+        `count` clusters and moves each vertex to the cluster whose basis holds most of its motion.
+        """
         by_vertex = coefficients.reshape(vertices, -1, coefficients.shape[1])
         some = by_vertex[:: -(-vertices // self.moved)]
         groups = np.arange(len(some)) * count // len(some)

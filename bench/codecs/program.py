@@ -1,12 +1,12 @@
 """Common parts of the programs: layouts, grids, poses, predictors, and the search among them.
 
-A program compresses numbers, not motion. For its best result, the search tries: the
-vertices in the source's or in the hierarchy's order; positions, or displacements from the rest pose, the mean
-pose or the first frame; integers on a grid as coarse as the bound allows, or floats where the program bounds
-their error itself; differences over time and along the vertices, exact on integers; and the program's own
-layouts and settings. Setups are compared on a piece of the clip, the best few on all of it. The pose that is
-subtracted and the order of vertices are stored and counted. Displacements are taken from the pose as it
-will be decoded, so that its rounding adds no error. No program is imported before it is used.
+A program compresses numbers, not motion. For its best result, the search tries: the vertices in the source's or in the
+hierarchy's order; positions, or displacements from the rest pose, the mean pose or the first frame; integers on a grid
+as coarse as the bound allows, or floats where the program bounds their error itself; differences over time and along
+the vertices, exact on integers; and the program's own layouts and settings. Setups are compared on a piece of the
+clip, the best few on all of it. The pose that is subtracted and the order of vertices are stored and counted.
+Displacements are taken from the pose as it will be decoded, so that its rounding adds no error. No program is imported
+before it is used.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def from_zigzag(values: np.ndarray) -> np.ndarray:
 
 
 def narrowest(values: np.ndarray) -> np.ndarray:
-    """Return the same integers in the narrowest type of their signedness that holds them."""
+    """Return integers in the smallest integer type that holds them, signed or unsigned as before."""
     low, high = (int(values.min()), int(values.max())) if values.size else (0, 0)
     kind = values.dtype.kind
     for size in (1, 2):
@@ -198,7 +198,7 @@ class Grid:
     origin: tuple[float, float, float]
 
     def integers(self, positions: np.ndarray) -> np.ndarray:
-        """Return positions rounded to the grid, as int32. Raises CannotKeep where that takes more bits."""
+        """Return positions as int32 multiples of the grid's step. Raise CannotKeep if int32 is too small."""
         integers = np.empty(positions.shape, np.int32)
         for block in blocks(positions):
             scaled = np.rint((positions[block].astype(np.float64) - self.origin) / self.step)
@@ -246,7 +246,7 @@ class Case:
         return self.rest if name == "rest" else self.positions[0]
 
     def grid(self, bound: float, search: bool) -> Grid:
-        """Return the coarsest grid that keeps the bound; on a piece, where `search` is off, one that nearly does."""
+        """Return the coarsest grid that keeps the bound; if `search` is false, for a piece, nearly that grid."""
         if "grid" not in self._known:
             origin = tuple(self.positions.reshape(-1, 3).min(axis=0).astype(float).tolist())
             grids = [Grid(CORNER * bound * factor, origin) for factor in COARSER]
@@ -269,7 +269,7 @@ class Case:
         return self._known["integers"]
 
     def piece(self, values: int) -> Case:
-        """Return neighbouring vertices and frames, about so many numbers."""
+        """Return a case with neighbouring vertices and frames only, of about `values` numbers."""
         frames, vertices, _ = self.positions.shape
         length = min(frames, SAMPLE_FRAMES)
         width = min(vertices, max(64, values // (3 * length)))
@@ -306,7 +306,6 @@ class Setup:
 
 class Program:
     """A program as a Codec; see bench.codecs. Subclasses define how it encodes integers, floats or both.
-
     `choices(form)` lists the program's own settings; `encode_*` and `decode_*` get one of them. Floats have a
     strength: the error that a value may have, or one of `strengths`, the exactest last; None: exact.
     """
@@ -358,6 +357,7 @@ class Program:
     # -- the Codec --
 
     def encode(self, source: Source, bound: float) -> bytes:
+        """Return the smallest encoding found that keeps `bound`, in scene units; raise CannotKeep if none does."""
         cases = cases_of(source, self.lossless)
         pieces = {order: case.piece(self.sample_values) for order, case in cases.items()}
         sizes: dict[Setup, float] = {}
@@ -381,6 +381,7 @@ class Program:
         return data
 
     def decode(self, data: bytes) -> np.ndarray:
+        """Return the float32 positions (T, N, 3) that `encode` has packed into `data`."""
         head, *rest = split(data)
         form, exact, pose, predictor, reordered, choice, frames, vertices = HEAD.unpack(head)
         choice = self.choices(FORMS[form])[choice]
@@ -405,7 +406,7 @@ class Program:
     # -- choosing --
 
     def _descend(self, form: str, order: str, size: Callable[[Setup], float]) -> None:
-        """Search the program's settings, then poses for the best few, and both once more."""
+        """Search the settings of one form and vertex order for the smallest `size`, and then poses for the best few."""
         integers = form == "integers"
         predictors = self.predictors if integers else ("none",)
         steps = (1.0,) if integers else POSE_STEPS
@@ -503,7 +504,7 @@ class Program:
         return [numbers, packed, data]
 
     def _pose_of_floats(self, case: Case, setup: Setup, bound: float) -> tuple[bytes, bytes, np.ndarray]:
-        """Return its grid, its bytes, and as it will be decoded."""
+        """Return the pose's grid as bytes, the coded pose, and the pose (N, 3) that a decoder gets."""
         if setup.pose == "none":
             return b"", b"", np.zeros((1, 3), np.float32)
         key = (setup.pose, setup.pose_step)
@@ -548,7 +549,7 @@ def _unpack_exact(data: bytes, count: int) -> np.ndarray:
 
 
 def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[int], bound: float) -> bytes:
-    """Return bisects for the first of the strengths, exactest last, that keeps the bound."""
+    """Return the bytes at the first strength that keeps the bound, by bisection; strengths grow in exactness."""
     data, error = encode(strengths[-1])
     if not error <= bound:
         raise CannotKeep("exactest setting: beyond the bound")
@@ -564,8 +565,7 @@ def _weakest(encode: Callable[[int], tuple[bytes, float]], strengths: Sequence[i
 
 
 def _fitted(encode: Callable[[float], tuple[bytes, float]], bound: float, trials: int) -> bytes:
-    """Return the smallest within the bound: the allowed error is adjusted until the resulting error just keeps the
-    bound."""
+    """Return the smallest bytes within the bound: the program's allowed error is adjusted in `trials` steps."""
     allowed, kept, broken, best = bound / np.sqrt(3), 0.0, np.inf, None
     for trial in range(trials + 20):
         data, error = encode(allowed)

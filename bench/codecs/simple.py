@@ -62,6 +62,9 @@ class Simple:
         return None
 
     def encode(self, source: Source, bound: float) -> bytes:
+        """Return the clip as integers on a grid, in differences and compressed by zstd, with every vertex within
+        `bound`, in scene units. Of several layouts and differences the smallest result is kept.
+        """
         step, integers = _on_grid(source.positions, bound)
         low = integers.min(axis=(0, 1))
         numbers = (integers - low).astype(np.int32)
@@ -74,6 +77,7 @@ class Simple:
         return bytes([SETUPS.index(best)]) + struct.pack("<f", step) + b"".join(map(varint, counts)) + body
 
     def decode(self, data: bytes) -> np.ndarray:
+        """Return the positions (T, N, 3) that `encode` has packed."""
         setup = SETUPS[data[0]]
         (step,) = struct.unpack_from("<f", data, 1)
         at, counts = 5, []
@@ -87,7 +91,9 @@ class Simple:
 
 
 def _on_grid(positions: np.ndarray, bound: float) -> tuple[float, np.ndarray]:
-    """Return the step, a float32, and (T, N, 3) int64 within 31 bits of each other. CannotKeep where there is none."""
+    """Return the spacing of a grid, exact in float32, and the positions (T, N, 3) rounded to it as int64 that span less
+    than 31 bits. Raise CannotKeep if no such grid keeps `bound`.
+    """
     for factor in FINER:
         step = float(np.float32(CORNER * bound * factor))
         integers = np.rint(positions.astype(np.float64) / step).astype(np.int64)

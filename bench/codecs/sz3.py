@@ -24,6 +24,9 @@ class Sz3(Program):
         return list(product(LAYOUTS, ("LOSSLESS",) if self.lossless else ALGORITHMS))
 
     def encode_floats(self, values: np.ndarray, strength: float | None, choice, thorough: bool) -> bytes:
+        """Return float values as SZ3 compresses them. `strength` is the absolute error bound (None: lossless), `choice`
+        a pair of the array's layout and SZ3's algorithm; `thorough` changes nothing.
+        """
         pysz = self.load()
         layout, algorithm = choice
 

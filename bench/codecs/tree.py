@@ -124,7 +124,9 @@ def differences(q: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
 
 
 def sums(residual: np.ndarray, order: VertexOrder, degree: int) -> np.ndarray:
-    """Return the inverse of differences."""
+    """Return integers from their differences along the branches, the inverse of `differences`. `degree` is how often
+    differences were taken, and `order` tells which vertex comes before each.
+    """
     if degree == 0:
         return residual
     if order.hierarchy is None:

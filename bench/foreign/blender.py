@@ -17,8 +17,9 @@ NODES, LEAVES = 110, 5  # Leaves: on each node that carries foliage.
 
 
 def armature(path: Path, seed: int) -> None:
-    """Make a tree of the skin modifier on the bones that Blender makes for it, each with noise on its keyed
-    rotation."""
+    """Write a GLB of a tree that Blender's skin modifier makes, moved by the armature that Blender makes for it: each
+    bone's rotation is keyed and has noise.
+    """
     rng = np.random.default_rng(seed)
     plant = grow(NODES, 2, 4.0, seed)
     tree = _tree(plant)
@@ -44,7 +45,9 @@ def shape_keys(path: Path, seed: int) -> None:
 
 
 def grass(path: Path, seed: int, blades: int) -> None:
-    """Make blades whose upper parts are displaced by clouds that an empty carries over them."""
+    """Write a GLB of `blades` blades of grass whose upper parts are displaced by a cloud texture that moves over
+    them.
+    """
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     levels = np.linspace(0, 1, 10)[:, None]
@@ -75,8 +78,9 @@ def grass(path: Path, seed: int, blades: int) -> None:
 
 
 def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
-    """Return a flower that opens by shape keys, one for each whorl of petals; flat faces, whose corners a GLB has
-    apart."""
+    """Write a GLB of a flower that opens by shape keys, one for each of `whorls` whorls of `petals` petals. Faces are
+    flat, so the GLB repeats a vertex for each face.
+    """
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     rows, columns = 11, 7
@@ -85,7 +89,9 @@ def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
     quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
     def petal(angle: float, size: float, opened: float, curl: float) -> np.ndarray:
-        """Return points of a petal that leans outwards by an angle, and the more the farther it is from its foot."""
+        """Return the points (rows * columns, 3) of one petal at the azimuth `angle`, in radians. `opened`, 0 to 1,
+        tells how far it leans outwards, and `curl`, in radians, adds to that lean towards the tip.
+        """
         lean = np.radians(10 + 70 * opened) * along + np.radians(25) * opened + curl * along**2
         step = size / (rows - 1)
         out, up = np.cumsum(np.sin(lean) * step, axis=0), np.cumsum(np.cos(lean) * step, axis=0)
@@ -126,7 +132,7 @@ def flower(path: Path, seed: int, whorls: int, petals: int) -> None:
 
 
 def forest(path: Path, seed: int, trees: int, nodes: int) -> None:
-    """Make trees beside each other, each an object with shapes and winds of its own."""
+    """Write a GLB of several trees beside each other, each an object with shapes and winds of its own."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     side = int(np.ceil(np.sqrt(trees)))
@@ -141,7 +147,7 @@ def forest(path: Path, seed: int, trees: int, nodes: int) -> None:
 
 
 def terrain(path: Path, seed: int, nodes: int, side: int) -> None:
-    """Make a tree that sways on ground that stands still, as two meshes of a GLB."""
+    """Write a GLB of two meshes: a swaying tree, and ground that stands still."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=side, y_subdivisions=side, size=14.0)
@@ -161,7 +167,7 @@ def terrain(path: Path, seed: int, nodes: int, side: int) -> None:
 
 
 def turntable(path: Path, seed: int, nodes: int) -> None:
-    """Make a tree that sways on a table that turns once."""
+    """Write a GLB of a swaying tree that stands on a table which turns once."""
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     plant = grow(nodes, 2, 4.0, seed)
@@ -178,7 +184,9 @@ def turntable(path: Path, seed: int, nodes: int) -> None:
 
 
 def cloth(path: Path, seed: int, width: float, rows: int, columns: int) -> None:
-    """Make a leaf of cloth that is held at its stalk, in wind and turbulence."""
+    """Write a GLB of a leaf that is simulated as cloth, held at its stalk, in wind and turbulence. The cloth has `rows`
+    times `columns` vertices.
+    """
     rng = np.random.default_rng(seed)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(-1, 1, columns), indexing="ij")
@@ -218,7 +226,7 @@ def cloth(path: Path, seed: int, width: float, rows: int, columns: int) -> None:
 
 
 def _bend(tree: Any, rng: np.random.Generator) -> None:
-    """Give a tree four shapes, bent by wind from four sides, and key their values."""
+    """Add four shape keys to a tree, each bent by wind from another side, and key their values over the frames."""
     points = np.array([vertex.co for vertex in tree.data.vertices])
     tree.shape_key_add(name="Basis")
     for side in range(4):
@@ -243,7 +251,7 @@ def _tree(plant: Plant) -> Any:
 
 
 def _bark(plant: Plant, name: str) -> Any:
-    """Return the skeleton of a tree under a skin modifier, beside what is there."""
+    """Return a new Blender object in the scene: the skeleton of a plant under a skin modifier, which makes its bark."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(_z_up(plant.position).tolist(), plant.edges.tolist(), [])
     tree = bpy.data.objects.new(name, mesh)
@@ -259,7 +267,7 @@ def _bark(plant: Plant, name: str) -> Any:
 
 
 def _finish(tree: Any, plant: Plant, rng: np.random.Generator, bones: Sequence[Any] = ()) -> None:
-    """Make a mesh of the skin, with leaves that are weighted to the nearest bone."""
+    """Turn a tree's skin modifier into a mesh, and add leaves that are weighted to the nearest of `bones`."""
     bpy.context.view_layer.objects.active = tree
     tree.modifiers.new("Smooth", "SUBSURF").levels = 1
     tree.modifiers.move(tree.modifiers.find("Smooth"), 1)

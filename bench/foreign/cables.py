@@ -35,7 +35,9 @@ def grass(path: Path, seed: int, stems: int) -> None:
 
 
 def field(path: Path, seed: int, stems: int, apart: float, speed: float, has_faces: bool) -> None:
-    """Make blades of a crop in rows, `apart` metres from each other, as ribbons of pairs of vertices."""
+    """Write blades of a crop that stand in rows `apart` metres from each other, in wind of `speed` m/s. Each blade is a
+    ribbon of pairs of vertices, with faces if `has_faces` is true.
+    """
     rng = np.random.default_rng(seed)
     level, side = np.linspace(0, 1, 12)[:, None], int(np.ceil(np.sqrt(stems)))
     row, column = np.divmod(np.arange(stems), side)
@@ -49,7 +51,7 @@ def field(path: Path, seed: int, stems: int, apart: float, speed: float, has_fac
 
 
 def hedge(path: Path, seed: int, stems: int, sides: int) -> None:
-    """Make stems of a hedge as tubes, 40 to a metre, that grow through each other."""
+    """Write the stems of a hedge as tubes of `sides` sides, 40 stems to a metre, which grow through each other."""
     rng = np.random.default_rng(seed)
     level = np.linspace(0, 1, 12)[:, None]
     feet = rng.uniform(-0.5, 0.5, (stems, 1, 3)) * [stems / 40, 0, 0.4]
@@ -71,6 +73,9 @@ def vine(path: Path, seed: int, joints: int) -> None:
 
 
 def _write(path: Path, rods: np.ndarray, pins: str, young: float, wind: Wind) -> None:
+    """Simulate rods (S, P, 3) in wind and write their motion as an HDF5 clip with a branch for each rod. `pins` names
+    the points that are held, and `young` is Young's modulus in pascals.
+    """
     moved = _moved(rods, pins, young, wind, FRAMES)
     clip = athcodec.MotionClip(
         moved.reshape(FRAMES, -1, 3).astype(np.float32),
@@ -107,7 +112,9 @@ def _in_groups(rods: np.ndarray, young: float, wind: Wind) -> np.ndarray:
 
 
 def _moved(rods: np.ndarray, pins: str, young: float, wind: Wind, frame_count: int) -> np.ndarray:
-    """Return (T, S, P, 3) nodes of rods in the wind."""
+    """Simulate elastic rods in the wind and return their points (T, S, P, 3) in `frame_count` frames. `rods` (S, P, 3)
+    has the points at rest, `pins` names those that are held, and `young` is Young's modulus in pascals.
+    """
     count = rods.shape[1]
     lengths = np.linalg.norm(np.diff(rods, axis=1), axis=2)
     elements = " ".join(f"{i} {i + 1}" for i in range(count - 1))

@@ -28,7 +28,9 @@ def bed(
 
 
 def array(path: Path, species: str, start: int, days: int, step: int, seed: int, has_faces: bool) -> None:
-    """Make a NumPy archive of the positions alone, or with faces: what remains of a simulator's mesh in a script."""
+    """Write a NumPy archive of a growing plant's positions, with faces if `has_faces` is true, as a script would keep
+    them. The plant is shown every `step` days for `days` days, from an age of `start` days on.
+    """
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder) / "growth.usdc"
         growth(stage, species, start, days, step, seed)
@@ -43,6 +45,9 @@ def array(path: Path, species: str, start: int, days: int, step: int, seed: int,
 def _grown(
     path: Path, species: str, places: Sequence[tuple[float, float]], start: int, days: int, step: int, seed: int
 ) -> None:
+    """Grow a plant of a species at each (x, y) of `places` in Helios, and write its growth as USD: a frame every `step`
+    days, for `days` days from an age of `start` days on.
+    """
     with tempfile.TemporaryDirectory() as folder, Context() as context, PlantArchitecture(context) as architecture:
         architecture.disableMessages()
         context.seedRandomGenerator(seed)
@@ -64,7 +69,7 @@ def _grown(
 
 
 def _side_by_side(files: Sequence[str]) -> Usd.Stage:
-    """Return a stage that has the files' stages as prims beside each other."""
+    """Return a USD stage in which the contents of several USD files are prims beside each other."""
     first, stage = Usd.Stage.Open(files[0]), Usd.Stage.CreateInMemory()
     for name in ("timeCodesPerSecond", "framesPerSecond", "startTimeCode", "endTimeCode", "upAxis", "metersPerUnit"):
         if first.HasAuthoredMetadata(name):

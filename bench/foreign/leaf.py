@@ -15,8 +15,9 @@ FRAMES, FPS, MODES = 200, 60.0, 12
 
 
 def flutter(path: Path, seed: int, shape: float, refine: int) -> None:
-    """Return an XDMF series with the displacement of every step, as meshio writes it; `shape` is the width over the
-    length."""
+    """Write an XDMF series, as meshio writes it, with the displacement of a fluttering leaf blade in every step.
+    `shape` is the blade's width over its length, and `refine` how often its mesh is refined.
+    """
     rng = np.random.default_rng(seed)
     grid = skfem.MeshTri.init_tensor(np.linspace(0, 1, 10 * refine + 1), np.linspace(-1, 1, 6 * refine + 1))
     along, across = grid.p

@@ -21,8 +21,9 @@ SIDES, LEAVES, WIDTH = 5, 2, 0.05  # Leaves: on each node that carries foliage. 
 
 
 def bush(path: Path, seed: int, stems: int, nodes: int, height: float) -> None:
-    """Make stems that leave one patch of ground, each with side stems and cards as leaves; a NumPy archive of the
-    mesh."""
+    """Write a NumPy archive of a shrub's mesh in wind: `stems` stems of `nodes` nodes that leave one patch of ground,
+    each with side stems, and with cards as leaves.
+    """
     rng = np.random.default_rng(seed)
     points, faces, motion = [], [], []
     wind = Wind(4.0, height, length=2.0, seed=seed)
@@ -49,8 +50,9 @@ def bush(path: Path, seed: int, stems: int, nodes: int, height: float) -> None:
 
 
 def _moved(plant: Plant, rest: np.ndarray, wind: Wind) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (T, N, 3) and rotations (T, N, 3, 3) of the ends of a plant's elements; the lowest one stands
-    still."""
+    """Simulate a plant as rigid links on sprung joints in the wind. Return the positions (T, N, 3) and rotation
+    matrices (T, N, 3, 3) of the ends of its N elements; the lowest element stands still.
+    """
     below = plant.parent
     piece = rest - rest[np.maximum(below, 0)]
     lengths = np.linalg.norm(piece, axis=1)
@@ -59,6 +61,7 @@ def _moved(plant: Plant, rest: np.ndarray, wind: Wind) -> tuple[np.ndarray, np.n
         children[parent].append(node)
 
     def body(node: int) -> str:
+        """Return the MuJoCo XML of the element that ends at `node`, with the elements of all nodes above it inside."""
         parent, radius = int(below[node]), max(float(plant.radius[node]), 0.003)
         place = piece[parent] if below[parent] >= 0 else 0 * piece[node] if parent else rest[0]
         end, start = _words(piece[node]), _words(place)

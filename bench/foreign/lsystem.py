@@ -37,8 +37,9 @@ SIDES = np.array([[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 
 
 
 def sequence(path: Path, plant: str, seed: int, is_split: bool = False) -> None:
-    """Make numbered files beginning with `path`; split: each triangle has vertices of its own, as flat shading
-    needs."""
+    """Write a growing plant as numbered mesh files whose names begin with `path`. If `is_split` is true, each triangle
+    has vertices of its own, as flat shading needs.
+    """
     grammar = PLANTS[plant]
     word = _derived(grammar)
     chance = np.random.default_rng(seed).normal(1, 0.12, len(word))
@@ -54,7 +55,9 @@ def sequence(path: Path, plant: str, seed: int, is_split: bool = False) -> None:
 
 
 def _derived(grammar: Grammar) -> list[tuple[str, int]]:
-    """Return symbols with the derivation step of their birth."""
+    """Return the symbols that a grammar derives, each as a pair of the symbol and the number of the derivation step in
+    which it was born.
+    """
     word = [("A", 0)]
     for step in range(grammar.steps):
         word = [
@@ -68,6 +71,9 @@ def _derived(grammar: Grammar) -> list[tuple[str, int]]:
 def _mesh(
     grammar: Grammar, word: list[tuple[str, int]], chance: np.ndarray, now: float
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points (V, 3) and faces (F, 4) of a plant at the time `now`, in derivation steps. `word` has pairs of
+    a symbol and its step of birth, and `chance` a random factor on each symbol's size.
+    """
     place, frame, stack = np.zeros(3), np.eye(3)[[0, 2, 1]].T, []  # Columns: right, up, ahead.
     points: list[np.ndarray] = []
     faces: list[np.ndarray] = []

@@ -14,7 +14,9 @@ FRAMES, FPS = 120, 24.0
 
 
 def growth(path: Path, plant: str, days: float, seed: int) -> None:
-    """Make a plant of its library with a branch per root; CPlantBox has no file format for motion of one topology."""
+    """Write a root system that grows for `days` days, with a branch for each root. CPlantBox has no file format for
+    motion of one topology, so athcodec's own is written.
+    """
     system = plantbox.Plant()
     system.setSeed(seed)
     system.readParameters(str(FOLDER / f"{plant}.xml"))

@@ -20,8 +20,9 @@ FRAMES, FPS = 150, 30.0
 
 
 def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
-    """Make numbered VTU files beginning with `path`, of line cells, as a script around meshio writes them; the plant
-    stands on a table that makes so many turns."""
+    """Write the skeleton of a scanned tree as numbered VTU files of line cells, whose names begin with `path`. The
+    plant sways on a table that makes `turns` turns.
+    """
     rng = np.random.default_rng(seed)
     plant = grow(nodes, 3, 9.0, seed)
     points, quads = tubes(plant, 8)
@@ -46,7 +47,9 @@ def skeleton(path: Path, seed: int, nodes: int, turns: float = 0.0) -> None:
 
 
 def _swayed(rest: np.ndarray, order: np.ndarray, parent: np.ndarray, wind: Wind, seconds: float) -> np.ndarray:
-    """Return every piece turns with the one below and a little more, across the wind where it is."""
+    """Return the positions (N, 3) of a skeleton at a time in seconds. Each piece turns with the piece below it, and a
+    little more by the wind across it; `order` lists the pieces from the root outwards.
+    """
     push = wind.at(rest, seconds)
     axis = np.cross([0, 1, 0], push) * (0.002 + 0.006 * rest[:, 1:2] / rest[:, 1].max())
     above = order[1:]

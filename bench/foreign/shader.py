@@ -23,6 +23,9 @@ class _Tree:
     """Points, faces, and the colours: red the leaf's edge, green the branch's phase, blue how far it swings."""
 
     def __init__(self, nodes: int, orders: int, height: float, seed: int) -> None:
+        """Grow a tree of tubes and cards, `height` metres high, whose vertex colours tell a wind shader how far and in
+        which phase each vertex moves.
+        """
         rng = np.random.default_rng(seed)
         plant = grow(nodes, orders, height, seed)
         bark, bark_faces = tubes(plant, SIDES)
@@ -43,7 +46,7 @@ class _Tree:
         self.height = height
 
     def at(self, seconds: float) -> np.ndarray:
-        """Return the positions that the shader gives."""
+        """Return the positions (V, 3) that the wind shader gives the vertices at a time in seconds."""
         edge, phase, swing = self.colours.T
         phases = np.stack([self.points @ np.full(3, 0.7) + phase, phase], axis=1)
         waves = np.abs(((seconds + phases)[:, [0, 0, 1, 1]] * WAVES * 0.7 + 0.5) % 1.0 * 2 - 1)
@@ -62,6 +65,9 @@ class _Willow(_Tree):
     """Leaves alone, on a crown that is not there, each a strip of pairs of vertices that hangs and flutters."""
 
     def __init__(self, leaves: int, pairs: int, height: float, seed: int) -> None:
+        """Make `leaves` hanging ribbons of `pairs` pairs of vertices on the twigs of a tree that is not shown, with
+        vertex colours for the wind shader.
+        """
         rng = np.random.default_rng(seed)
         plant = grow(400, 3, height, seed)
         node = np.sort(rng.choice(np.flatnonzero(plant.foliage > 0), leaves))
@@ -95,6 +101,9 @@ def willow(path: Path, seed: int, leaves: int, pairs: int, height: float, frames
 
 
 def _write(path: Path, tree: _Tree, name: str, frames: int) -> None:
+    """Write a GLB of a tree with a morph target for each of `frames` frames, as a tool that bakes the shader's wind
+    writes it.
+    """
     triangles = np.concatenate([tree.faces[:, :3], tree.faces[:, [0, 2, 3]]])
     times = np.arange(frames) / FPS
     targets = [tree.at(seconds) - tree.points for seconds in times]

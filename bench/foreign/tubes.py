@@ -8,7 +8,9 @@ from bench.trees.plant import Plant
 
 
 def tubes(plant: Plant, sides: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (N * sides, 3) points, those of each node together, and (F, 4) faces."""
+    """Return the bark of a plant with N nodes: points (N * sides, 3), a ring of `sides` points around each node in
+    turn, and quadrilateral faces (F, 4).
+    """
     along = plant.elements + (plant.parent < 0)[:, None] * [0.0, 1.0, 0.0]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     first = np.cross(along, [0.3, 0.2, 1.0])

@@ -52,8 +52,10 @@ class Bones:
         return np.stack([self.parent[1:], np.arange(1, len(self.parent))], axis=1).astype(np.int32)
 
     def bent(self, turns: np.ndarray, length: np.ndarray | None = None) -> np.ndarray:
-        """Return (T, N, 3) positions of stems that bend by rotation vectors (T, B, 3), from base to tip and beside
-        their parent; length: (T, B) factors on their elements."""
+        """Return positions (T, N, 3) of stems that bend by rotation vectors (T, B, 3), in radians, spread evenly from
+        each stem's base to its tip. A stem also turns with its parent; `length` (T, B) multiplies the lengths of its
+        elements.
+        """
         share = 1.0 / np.bincount(self.branch)[self.branch]
         positions = np.empty((len(turns), len(self.parent), 3))
         frames = np.empty((len(self.parent), len(turns), 3, 3))
@@ -68,7 +70,9 @@ class Bones:
 
 
 def gusty(time: np.ndarray, branches: int, amount: float, lean: float, rng: np.random.Generator) -> np.ndarray:
-    """Return (T, B, 3) rotation vectors of stems: the lean is about one horizontal axis, as are the gusts; radians."""
+    """Return rotation vectors (T, B, 3), in radians, of `branches` stems in gusts at times (T,) in seconds. Both the
+    constant lean and the gusts, of the size `amount`, turn about one horizontal axis.
+    """
     across = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
     seen = time[:, None] - rng.uniform(0.0, LATEST, branches)  # each stem's own time in the gusts
     phase = rng.uniform(0, 2 * np.pi, GUSTS)
@@ -91,7 +95,9 @@ def swaying(
 
 
 def clip_of(bones: Bones, positions: np.ndarray, fps: float = FPS, rest: np.ndarray | None = None) -> MotionClip:
-    """Return the motion as a clip with named branches; rest: that of the bones by default."""
+    """Return positions (T, N, 3) as a clip with named branches at `fps` frames per second. `rest` (N, 3) is the rest
+    pose, by default that of the bones.
+    """
     return MotionClip(
         positions.astype(np.float32),
         np.arange(len(positions)) / fps,
@@ -141,7 +147,9 @@ def scanned_tree(seed: int, frames: int, stems: int, longest: int, lean: float) 
 
 
 def _twiggy(rng: np.random.Generator, stems: int, longest: int, trunk: int = 12) -> Bones:
-    """Return stems of 1 to `longest` vertices on the trunk or on one of the last stems before them."""
+    """Return a plant of `stems` stems. Every stem but the trunk, which has `trunk` vertices, has 1 to `longest`
+    vertices and stands on the trunk or on one of the last stems before it.
+    """
     below = np.concatenate([[-1], [_host(rng, stem) for stem in range(1, stems)]]).astype(np.int32)
     count = np.concatenate([[trunk], rng.integers(1, longest + 1, stems - 1)])
     first = np.cumsum(count) - count

@@ -15,10 +15,11 @@ ORDERS = ("blades", "interleaved", "shuffled")
 def grass(
     seed: int, blades: int = 800, points: int = 7, frames: int = 160, named: bool = True, order: str = "blades"
 ) -> MotionClip:
-    """Return a meadow in which the gusts of one wind travel; points without faces, a branch per blade where they are
-    `named`.
+    """Return a meadow of `blades` blades of `points` points each, in gusts of one wind that travel across it. Blades
+    are branches if `named` is true; there are no faces.
 
-    order: of the vertices, blade after blade, all lowest points before all second ones ("interleaved"), or at random.
+    `order` is the order of the vertices: "blades" for blade after blade, "interleaved" for all lowest points before all
+    second ones, "shuffled" for a random order.
     """
     rng = np.random.default_rng(seed)
     positions = _bending(rng, blades, points, np.arange(frames) / FPS)  # (T, blades, points, 3)
@@ -38,8 +39,9 @@ def grass(
 
 
 def _bending(rng: np.random.Generator, blades: int, points: int, time: np.ndarray) -> np.ndarray:
-    """Return (T, blades, points, 3): the lowest points stand still, every other one keeps its distance to the one
-    below."""
+    """Return the points (T, blades, points, 3) of blades at times (T,) in seconds, relative to their feet. The lowest
+    points stand still, and every other point keeps its distance to the point below.
+    """
     side = np.sqrt(blades / DENSITY)
     foot = np.stack([rng.uniform(0, side, blades), np.zeros(blades), rng.uniform(0, side, blades)], axis=-1)
     length, limp = rng.uniform(0.25, 0.5, blades), rng.uniform(0.6, 1.4, blades)

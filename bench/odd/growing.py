@@ -21,9 +21,12 @@ WOOD = 0.8  # Share of the time of growth after which a sapling's branches have 
 def growth(
     seed: int, frames: int, vertices: int, eased: bool = False, carried: bool = False, flowing: bool = False
 ) -> MotionClip:
-    """Return a tree whose branches grow out of their parents when these have stopped, and stop too, or, `flowing`, as
-    soon as the parent's tip has passed. Until then they wait where they will be attached, or are `carried` there by
-    what grows."""
+    """Return a tree of `vertices` vertices whose branches grow out of their parents one by one. A branch begins when
+    its parent has stopped, or with `flowing` as soon as the parent's tip has passed.
+
+    A branch that has not begun waits where it will be attached, or with `carried` at the growing tip of its parent.
+    `eased` lets growth begin and end slowly.
+    """
     bones = Bones.of(grow(vertices, 2, 8.0, seed))
     rng = np.random.default_rng(seed)
     times = flowing_begin_and_end(bones, frames, rng) if flowing else begin_and_end(bones, frames, rng)
@@ -52,8 +55,9 @@ def attach_node(bones: Bones) -> np.ndarray:
 
 
 def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """Return (B, 2) frames at which branches begin and stop growing: after their parent has stopped, one by one along
-    it."""
+    """Return the frames (B, 2) at which each branch begins and stops growing. A branch begins after its parent has
+    stopped, the earlier the lower it stands on the parent.
+    """
     part = frames / PARTS
     times = np.zeros((len(bones.branch_parent), 2))
     times[0] = part * np.array([0.1, 0.8])
@@ -67,8 +71,9 @@ def begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.nda
 
 
 def flowing_begin_and_end(bones: Bones, frames: int, rng: np.random.Generator) -> np.ndarray:
-    """Return (B, 2) frames at which branches begin and stop growing: as the eased tip of their parent passes, so that
-    something grows in every frame but those of the last second."""
+    """Return the frames (B, 2) at which each branch begins and stops growing. A branch begins as the eased tip of its
+    parent passes, so that something grows in every frame but those of the last second.
+    """
     times = np.zeros((len(bones.branch_parent), 2))
     times[0] = 0.0, 1.0
     node = attach_node(bones)
@@ -100,8 +105,9 @@ BUD = 0.9  # Radians by which a closed leaf lies nearer to its twig.
 
 
 def sapling(seed: int, frames: int, nodes: int, leaves: int, height: float = 2.0) -> MotionClip:
-    """Return a young tree with bark, whose branches come out as the tips of their parents pass and thicken to the end;
-    leaves unfold where a branch has come to an end, small at first."""
+    """Return a young tree with bark, `height` metres high. Branches come out as the tips of their parents pass and
+    thicken to the end; leaves unfold, small at first, where a branch has stopped growing.
+    """
     plant, rng = grow(nodes, 2, height, seed), np.random.default_rng(seed)
     bones, last = Bones.of(plant), frames - 1 - HELD * FPS
     times = WOOD * flowing_begin_and_end(bones, frames, rng)
@@ -137,8 +143,10 @@ BLADE = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
 def _sapling_leaves(
     skeleton: Skeleton, ends: np.ndarray, last: float, count: int, length: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the (count,) nodes that leaves stand on, and their (T, count, V, 3) vertices. ends: (B,) frames at which
-    branches have their lengths; last: the frame from which nothing moves."""
+    """Return the nodes (count,) that `count` leaves stand on, and the leaves' vertices (T, count, V, 3). `ends` (B,)
+    has the frames at which branches reach their lengths, `last` is the frame from which nothing moves, and `length` a
+    leaf's length.
+    """
     rest = skeleton.rest
     node = np.sort(rng.choice(np.flatnonzero((skeleton.branch > 0) | (rest[:, 1] > 0.8 * skeleton.height)), count))
     begin = np.minimum(ends[skeleton.branch[node]] * rng.uniform(0.75, 1.0, count), WOOD * last)
@@ -159,7 +167,9 @@ ROWS, WIDE = 6, 3  # vertices of a leaf along and across
 
 
 def unfolding_leaves(seed: int, frames: int, leaves: int) -> MotionClip:
-    """Return a twig whose leaves, folded at the midrib and rolled up, open and stretch out one after the other."""
+    """Return a twig whose leaves, folded at the midrib and rolled up at first, open and stretch out one after the
+    other.
+    """
     rng = np.random.default_rng(seed)
     twig = np.linspace(0.0, 1.0, leaves + 1)[:, None] * [0.1, 1.0, 0.0]
     open_share = np.clip((np.arange(frames)[:, None] / frames - np.linspace(0.05, 0.7, leaves)) / 0.2, 0.0, 1.0)
@@ -182,7 +192,9 @@ def unfolding_leaves(seed: int, frames: int, leaves: int) -> MotionClip:
 
 
 def _leaves(feet: np.ndarray, open_share: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return (T, leaves, ROWS, WIDE, 3) vertices; a leaf's own axes: along, across, upwards."""
+    """Return vertices (T, leaves, ROWS, WIDE, 3) of leaves whose feet are at `feet` (leaves, 3). `open_share` (T,
+    leaves) runs from 0, folded and rolled up, to 1, open.
+    """
     count = len(feet)
     closed = 1.0 - open_share[..., None]
     curl = (1.2 * closed + 0.05) * np.arange(ROWS)  # the angle of each row, rolled up by up to 6 rad

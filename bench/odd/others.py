@@ -13,8 +13,9 @@ from bench.trees.wind import Wind
 
 
 def captured_stem(seed: int, frames: int, points: int, noise: float, fps: float = 120.0) -> MotionClip:
-    """Return a stem with markers that sways, as a capture gives it: the same noise on every coordinate; noise: RMS over
-    the diagonal."""
+    """Return a swaying stem of `points` markers as motion capture gives it: every coordinate has noise of the same
+    standard deviation, `noise` times the diagonal.
+    """
     rng = np.random.default_rng(seed)
     stem = np.linspace(0.0, 2.0, points)[:, None] * [0.0, 1.0, 0.0]
     element = np.diff(stem, axis=0, prepend=0.0)
@@ -43,8 +44,10 @@ def still_mesh(seed: int, frames: int, nodes: int, leaves: int) -> MotionClip:
 def morph_targets(
     seed: int, frames: int, points: int, targets: int, active: int, key: int, reach: tuple[float, float]
 ) -> MotionClip:
-    """Return a ball of radius 1 with bumps of such reach, few of them at a time, by weights that are straight between
-    keys `key` frames apart."""
+    """Return a ball of radius 1 with `points` points, moved by `targets` bumps whose radii lie between the two numbers
+    of `reach`. Every `key` frames, `active` of the bumps get new random weights, and weights change linearly in
+    between.
+    """
     rng = np.random.default_rng(seed)
     base = _ball(points)
     centre = base[rng.integers(0, points, targets)]
@@ -61,7 +64,7 @@ def morph_targets(
 
 
 def rippling_sheet(seed: int, side: int, frames: int, bumps: int) -> MotionClip:
-    """Return a square of triangles over which smooth bumps move."""
+    """Return a square sheet of `side` times `side` vertices, with triangles, over which `bumps` smooth bumps move."""
     rng = np.random.default_rng(seed)
     plane = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, side)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
     time = np.arange(frames)[:, None] / FPS
@@ -102,7 +105,7 @@ def one_vertex(seed: int, frames: int) -> MotionClip:
 
 
 def tumbling_cube(seed: int, frames: int) -> MotionClip:
-    """Return a cube of 24 vertices, four to a side, thrown and turning."""
+    """Return a cube of 24 vertices, four to a side, that is thrown and turns."""
     rng = np.random.default_rng(seed)
     square = np.array([[-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]) / 2.0
     sides = [[0, 0, 0], [0, 0.5, 0], [0, 1, 0], [0, 1.5, 0], [0.5, 0, 0], [1.5, 0, 0]]
@@ -115,7 +118,9 @@ def tumbling_cube(seed: int, frames: int) -> MotionClip:
 
 
 def triangulated_leaf(seed: int, frames: int, points: int) -> MotionClip:
-    """Return a leaf that sways, a mesh of irregular triangles as scans and decimated meshes have them."""
+    """Return a swaying leaf as a mesh of irregular triangles over `points` points, as scans and decimated meshes have
+    them.
+    """
     from scipy.spatial import Delaunay
 
     rng = np.random.default_rng(seed)

@@ -37,7 +37,9 @@ CALM_SECONDS, SPIN_UP_SECONDS = 1.0, 4.0  # The wind rises over the former; the 
 def bend(
     plant: Plant, wind: Wind, frames: int, fps: float = 30.0, damping: float = 0.05, spin_up: float = SPIN_UP_SECONDS
 ) -> np.ndarray:
-    """Return (T, N, 3) float32 positions of the plant's nodes, from `spin_up` seconds after the wind began."""
+    """Return float32 positions (T, N, 3) of a plant's nodes as elastic beams in wind. The first frame is `spin_up`
+    seconds after the wind began; `damping` is a fraction of the critical damping.
+    """
     from scipy.sparse.linalg import splu
 
     stiffness, mass, drag = _stiffness(plant), node_mass(plant), node_drag(plant)
@@ -78,8 +80,9 @@ def _diagonal(numbers: np.ndarray) -> csc_matrix:
 
 
 def _stiffness(plant: Plant) -> csc_matrix:
-    """Return (6N, 6N) for displacements and turns of the nodes, from what every element resists: stretch, twist, and
-    the turns of its two ends against its chord."""
+    """Return the stiffness matrix (6N, 6N) for displacements and turns of a plant's N nodes. It sums what each element
+    resists: stretch, twist, and turns of its two ends against its chord.
+    """
     from scipy.sparse import coo_matrix
 
     element = plant.elements[1:]
@@ -116,7 +119,7 @@ def _stiffness(plant: Plant) -> csc_matrix:
 
 
 def node_mass(plant: Plant) -> np.ndarray:
-    """Return (6N,) masses and moments of inertia of the nodes, with half of each element beside them."""
+    """Return (6N,) masses and moments of inertia of N nodes, six for each node, with half of each adjacent element."""
     length, section = plant.lengths, np.square(plant.radius)
     half = 0.5 * DENSITY * np.pi * section * length
     turned = half * (np.square(length) / 12 + section)
@@ -156,7 +159,9 @@ def _lowest_frequency(stiffness: csc_matrix, mass: np.ndarray) -> float:
 
 
 def _placed(plant: Plant, displacement: np.ndarray) -> np.ndarray:
-    """Return (N, 3) nodes of elements that keep their lengths and turn as their chords do."""
+    """Return positions (N, 3) of nodes whose elements turn as `displacement` (N, 3) turns their chords, but keep their
+    lengths.
+    """
     element = plant.elements
     change = displacement - displacement[np.maximum(plant.parent, 0)]
     square = np.maximum((element**2).sum(axis=1, keepdims=True), 1e-30)

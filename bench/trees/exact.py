@@ -46,7 +46,7 @@ class Numbers:
 
 
 def sine(turns: np.ndarray) -> np.ndarray:
-    """Return the sine of angles in turns, by a series: the same bits on every machine."""
+    """Return the sine of angles, given in turns of 360 degrees, by a series that has the same bits on every machine."""
     turns = turns - np.rint(turns)
     folded = np.where(np.abs(turns) > 0.25, np.copysign(0.5, turns) - turns, turns)
     angle = 2 * np.pi * folded
@@ -78,7 +78,9 @@ def product(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def inverses(matrices: np.ndarray) -> np.ndarray:
-    """Return (6, 6, N) inverses of symmetric positive definite matrices, by Gauss-Jordan elimination."""
+    """Return the inverses (6, 6, N) of N symmetric positive definite matrices (6, 6, N), by Gauss-Jordan
+    elimination.
+    """
     result = matrices.copy()
     for k in range(6):
         pivot = 1.0 / result[k, k]
@@ -89,7 +91,9 @@ def inverses(matrices: np.ndarray) -> np.ndarray:
 
 
 def grow(orders: tuple[tuple[int, int], ...], height: float, seed: int) -> Plant:
-    """Return a plant with so many stems of so many elements in all, for each order from the trunk on."""
+    """Return a plant of the given height in metres. `orders` has for each generation, from the trunk on, the number of
+    its stems and the number of their elements in all.
+    """
     numbers = Numbers(seed)
     parent, branch, branch_parent = np.array([-1]), np.array([0]), np.array([-1])
     heading, position, length = UP, np.zeros((3, 1)), np.ones(1)
@@ -151,6 +155,9 @@ class Gusts:
     def __init__(
         self, points: np.ndarray, speed: float, height: float, intensity: float, length: float, seed: int
     ) -> None:
+        """Prepare a turbulent wind at points (3, N): `speed` in m/s at the height `height`, with gusts of the relative
+        strength `intensity` and of the length `length` in metres.
+        """
         numbers, scale = Numbers(seed), 1.339 * length
         edges = 0.05 / scale * np.cumprod(np.full(WAVES, WAVE_RATIO))
         number = edges * numbers.uniform(1.0, WAVE_RATIO, WAVES)
@@ -182,7 +189,9 @@ class Equations:
     """The stiffness of beams.py times a factor, plus a diagonal (6, N), with the root held: solved along the tree."""
 
     def __init__(self, plant: Plant, factor: float, diagonal: np.ndarray) -> None:
-        """Eliminate the equations from the tips to the root, once for all calls of `solve`."""
+        """Eliminate the equations of a plant's stiffness, with `factor` times the elasticity and `diagonal` added, from
+        the tips to the root, once for all calls of `solve`.
+        """
         matrices, coupling = _stiffness(plant, factor)
         for k in range(6):
             matrices[k, k] += diagonal[k]
@@ -195,7 +204,7 @@ class Equations:
             self._groups.append((nodes, below, inverse, passed, passed.transpose(1, 0, 2).copy()))
 
     def solve(self, load: np.ndarray) -> np.ndarray:
-        """Return (6, N) displacements and turns under (6, N) loads."""
+        """Return the displacements and turns (6, N) of the nodes under loads (6, N): forces and then moments."""
         load, moved = load.copy(), np.zeros_like(load)
         for nodes, below, _, passed, _ in self._groups:
             load[:, below] -= reduce(add, (passed * load[:, nodes]).transpose(1, 0, 2))
@@ -206,7 +215,9 @@ class Equations:
 
 
 def _stiffness(plant: Plant, factor: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (6, 6, N) blocks of the nodes, and those between each node's parent (rows) and the node (columns)."""
+    """Return two arrays (6, 6, N) of the plant's stiffness, multiplied by `factor`: the blocks of the nodes, and the
+    blocks that couple each node's parent (rows) to the node (columns).
+    """
     element = plant.elements.T.copy()
     element[:, 0] = UP[:, 0]
     length = np.sqrt(dot(element, element))
@@ -241,7 +252,10 @@ def _tips_first(plant: Plant) -> Iterator[np.ndarray]:
 def bend(
     plant: Plant, gusts: Gusts, speed: float, frames: int, hertz: float, damping: float, spin_up: float
 ) -> np.ndarray:
-    """Return (T, N, 3) float32 positions of the plant's nodes; beams.bend, with the lowest frequency given in Hz."""
+    """Return float32 positions (T, N, 3) of a plant's nodes in gusts, with the same bits on every machine. `hertz` is
+    the lowest natural frequency, `damping` a fraction of the critical damping, and the first frame is `spin_up` seconds
+    after the wind began.
+    """
     mass, drag = (part(plant).reshape(-1, 6).T for part in (node_mass, node_drag))
     mass_factor, stiffness_factor = rayleigh(2 * np.pi * hertz, damping)
     friction = drag * speed
@@ -270,8 +284,9 @@ def bend(
 
 
 def _placed(plant: Plant, displacement: np.ndarray) -> np.ndarray:
-    """Return (3, N) nodes of elements that keep their lengths and turn as their chords do; a turn t is by 2 arctan(t /
-    2)."""
+    """Return positions (3, N) of nodes whose elements turn as `displacement` turns their chords, but keep their
+    lengths. A turn of size t, the tangent of small turns, is by an angle of 2 arctan(t / 2).
+    """
     element = plant.elements.T
     change = displacement - displacement[:, np.maximum(plant.parent, 0)]
     half = 0.5 * cross(element, change) / np.maximum(dot(element, element), 1e-30)
@@ -323,7 +338,7 @@ class Cards:
     digest: str
 
     def make(self) -> MotionClip:
-        """Return a clip of leaf cards that turn about pivots on twigs."""
+        """Return a clip of leaf cards, quadrilaterals that each turn about a pivot on a twig, in all frames."""
         numbers, count = Numbers(self.seed), self.cards
         twig = numbers.uniform(-1.0, 1.0, 3, (count + 6) // 7) * [[0.3], [0.3], [0.8]] + [[0.0], [0.0], [1.5]]
         pivots = np.repeat(twig, 7, axis=1)[:, :count] + 0.01 * numbers.normal(3, count)
@@ -349,7 +364,9 @@ class Cards:
         )
 
     def _turns(self, numbers: Numbers) -> np.ndarray:
-        """Return (T, 4, N) quaternions, scalar first; frames between keys halve the turn, twice for four frames."""
+        """Return the quaternions (T, 4, N), scalar first, of N cards. Keys are random; frames between two keys are
+        found by halving the turn between neighbours again and again.
+        """
         half = numbers.normal(self.keys, 3, self.cards) * (np.array(self.degrees)[:, None] / 720.0)
         half[0] = 0.0
         x, y, z = (_about(axis, half[:, axis]) for axis in range(3))

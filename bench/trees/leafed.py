@@ -69,6 +69,7 @@ class _Dressed:
         self.shade = rng.integers(0, SHADES, sprays * LEAVES_OF_SPRAY)
 
     def clip(self, wind: Wind) -> MotionClip:
+        """Return one loop of the leafed tree in a wind, as a mesh of bark and sprays of leaves."""
         turns = self.leaves.flown(wind)[self.frames :]
         skeleton = self.skeleton
         positions = np.concatenate(
@@ -112,7 +113,9 @@ _LEAF = sheet([0.0, 0.5, 1.0], [LEAF_WIDTH / 2] * 3, [0.0, 0.09, 0.0])
 
 
 def _spray() -> Species:
-    """Return the species of leaves along a short twig, one at its end, lying about in one plane as light lets them."""
+    """Return the species that describes a spray: leaves along a short twig and one at its end, spread in one plane as
+    light lets them.
+    """
     points, quads = _LEAF
     cards = []
     for number in range(LEAVES_OF_SPRAY):
@@ -128,7 +131,9 @@ def _spray() -> Species:
 
 
 def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
-    """Return the stems as splines, their motion twice over: leaves settle in the first round."""
+    """Return the stems of a plant as smooth splines through its nodes (T, N, 3). The motion is there twice, so that
+    leaves can settle in the first round.
+    """
     time = np.arange(len(nodes)) / fps
     bare = Skeleton(nodes, plant.position, plant.parent, plant.branch, plant.branch_parent, plant.radius, time)
     splines = _Splines(bare, FINER)
@@ -141,7 +146,9 @@ def _smooth(plant: Plant, nodes: np.ndarray, fps: float) -> Skeleton:
 
 
 def _drawn_radius(plant: Plant, splines: _Splines, rest: np.ndarray) -> np.ndarray:
-    """Return (V,) with a thicker trunk, its foot wider, and tips that end thin."""
+    """Return the radii (V,) with which vertices on splines are drawn: the trunk is thicker, its foot is wider, and tips
+    end thin.
+    """
     start, end = splines.controls[:, 1], splines.controls[:, 2]
     same = plant.branch[start] == plant.branch[end]
     share = splines.share
@@ -162,6 +169,9 @@ class _Splines:
     """
 
     def __init__(self, skeleton: Skeleton, factor: int) -> None:
+        """Divide each element of a skeleton into `factor` parts, and find the four nodes, with weights, that each of
+        the new vertices follows.
+        """
         self.count = factor * (len(skeleton.parent) - 1) + 1
         self.node = -(-np.arange(self.count) // factor)
         self.branch = skeleton.branch[self.node]
@@ -177,7 +187,9 @@ class _Splines:
 
 
 def _controls(skeleton: Skeleton, node: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (V, 4) nodes and weights of vertices that lie at the fractions t of the elements below `node`."""
+    """Return the nodes and weights, (V, 4) each, of a Catmull-Rom spline for V vertices. Vertex i lies at the fraction
+    `t[i]` of the element that ends at `node[i]`.
+    """
     parent, branch = skeleton.parent, skeleton.branch
     start = np.maximum(parent[node], 0)
     before = np.where((branch[start] == branch[node]) & (start > 0), parent[start], -1)

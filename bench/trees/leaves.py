@@ -100,6 +100,9 @@ class Leaves:
     steps = STEPS  # small leaves, which the wind turns faster, take more
 
     def __init__(self, skeleton: Skeleton, species: Species, count: int, rng: np.random.Generator) -> None:
+        """Put `count` leaves of a species on random outer nodes of a skeleton, with random directions, lengths and
+        stiffness.
+        """
         self.skeleton, self.species = skeleton, species
         self.node = np.sort(rng.choice(skeleton.outer_nodes(), count))
         below = skeleton.direction(skeleton.rest, self.node)
@@ -137,7 +140,9 @@ class Leaves:
         return self.species.width * self.species.chord * self.length**2
 
     def turned(self, air: Air, plates: Plates) -> np.ndarray:
-        """Return (T, L, 4) float32 quaternions of plates that start as they are."""
+        """Return float32 quaternions (T, L, 4) of L leaves in the wind `air`, a function of positions and seconds.
+        `plates` has the state at which the leaves begin.
+        """
         frames = len(self.skeleton.time)
         step = 1.0 / 30.0 if frames < 2 else float(self.skeleton.time[1] - self.skeleton.time[0])
         turns = np.empty((frames, len(self.node), 4), np.float32)
@@ -168,7 +173,9 @@ class _Carriers:
         self.known: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def at(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the foot (L, 3) and the axes of each leaf (L, 3, 3) in a frame; the last frames are kept."""
+        """Return the positions (L, 3) of the leaves' feet and the axes (L, 3, 3) of each leaf in a frame. The last two
+        frames are kept.
+        """
         frame = max(0, frame)
         if frame not in self.known:
             leaves, nodes = self.leaves, self.leaves.skeleton.positions[frame]
@@ -182,6 +189,9 @@ class Plates:
     """The state of L plates: quaternions (4, L) from the carrier's frame, angular velocities (3, L) in the plates'."""
 
     def __init__(self, leaves: Leaves) -> None:
+        """Set the mass, stiffness and damping of rigid blades on hinges, for the leaves' sizes, with all blades at
+        rest.
+        """
         species, length = leaves.species, leaves.length
         count = len(length)
         self.turn = leaves.unturned().T.copy()
@@ -200,7 +210,9 @@ class Plates:
         self.damping = 2 * species.damping * self.inertia * omega
 
     def step(self, air: np.ndarray, seconds: float) -> None:
-        """Move by one step. air: (3, L) relative to the hinge, in the axes of the leaf at rest."""
+        """Advance the blades by `seconds`. `air` (3, L) is the wind relative to each hinge in m/s, in the axes of the
+        leaf at rest.
+        """
         wind = _turned_back(self.turn, air)
         wind[1] -= self.speed[2] * self.arm
         wind[2] += self.speed[1] * self.arm
@@ -215,7 +227,9 @@ class Plates:
         self.turn = _advanced(self.turn, seconds * self.speed)
 
     def _pressed(self, wind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (3, L) moments of the wind about the hinges, and how they fall with the angular velocities."""
+        """Return two arrays (3, L): the moments of the wind about the hinges of L blades, and by how much these fall
+        per unit of angular velocity.
+        """
         flat = np.hypot(wind[0], wind[1])
         speed = np.sqrt(flat**2 + wind[2] ** 2) + LEAST_WIND
         sine = np.abs(wind[2]) / speed
@@ -230,8 +244,9 @@ class Plates:
 
 
 def sheltered(points: np.ndarray, area: np.ndarray, cell: float) -> np.ndarray:
-    """Return (L,) the share of the wind that is left behind the leaves that stand up wind, in columns along the
-    wind."""
+    """Return the fraction (L,) of the wind's strength that reaches each of L leaves behind the leaves upwind of it.
+    `area` (L,) is the leaves' areas; leaves shelter those in the same column, `cell` wide, along the wind.
+    """
     side = np.cross(DIRECTION, [0.0, 1.0, 0.0])
     column = np.floor(np.stack([points @ side, points[:, 1]]) / cell)
     order = np.lexsort((points @ DIRECTION, *column))
@@ -264,7 +279,9 @@ def _rotation_vectors(turn: np.ndarray) -> np.ndarray:
 
 
 def _advanced(turn: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return quaternions (4, L) after turns about their own axes by small rotation vectors (3, L)."""
+    """Return quaternions (4, L) after further turns by small rotation vectors (3, L), in radians, about the turned
+    axes.
+    """
     half = 0.5 * angle
     w, v = turn[0], turn[1:]
     moved = np.empty_like(turn)
@@ -275,7 +292,7 @@ def _advanced(turn: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 
 def _matrices(turns: np.ndarray) -> np.ndarray:
-    """Return (..., 3, 3) of quaternions (..., 4)."""
+    """Return the rotation matrices (..., 3, 3) of quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(turns.astype(np.float64), -1, 0)
     rows = [
         *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),

@@ -19,7 +19,9 @@ SIDES = 6
 def dress(
     clip: MotionClip, wind: Wind, frames: int, leaves: int, seed: int, species: str = "poplar", sides: int = SIDES
 ) -> MotionClip:
-    """Return the first frames of a simulated clip as a mesh with so many leaves, and tubes of so many sides."""
+    """Return the first `frames` frames of a simulated clip as a mesh: tubes of `sides` sides around the stems, and
+    `leaves` leaves in the wind on the outer nodes.
+    """
     skeleton, kind = Skeleton.of(clip, frames), SPECIES[species]
     tubes = Tubes(skeleton, sides)
     cards = Leaves(skeleton, kind, leaves, np.random.default_rng(seed))
@@ -49,6 +51,9 @@ class Tubes:
     """Rings in the order of the stems, each with a centre node and the node whose element carries it."""
 
     def __init__(self, skeleton: Skeleton, sides: int = SIDES) -> None:
+        """Lay tubes of `sides` sides around the stems of a skeleton: a ring at each node, and one more where a stem
+        begins on its parent.
+        """
         self.skeleton, self.sides = skeleton, sides
         nodes = np.arange(len(skeleton.parent))
         first = np.flatnonzero((np.diff(skeleton.branch, prepend=0) != 0) & (nodes > 0))
@@ -64,7 +69,9 @@ class Tubes:
         self.faces = _tube_faces(ring_branch, sides)
 
     def _circles(self, radius: np.ndarray) -> np.ndarray:
-        """Return (rings, sides, 3) around the elements of the rest pose, without twist from ring to ring."""
+        """Return rings of offsets (rings, sides, 3) across the stems of the rest pose, with the given radii (rings,),
+        without twist from ring to ring.
+        """
         along = self.skeleton.direction(self.skeleton.rest, self.carrier)
         helper = np.eye(3)[np.abs(self._chords()).argmin(axis=1)]
         first = np.cross(along, helper)
@@ -97,7 +104,9 @@ def _tube_faces(ring_branch: np.ndarray, sides: int) -> np.ndarray:
 
 
 def bark_uv(skeleton: Skeleton, tubes: Tubes) -> np.ndarray:
-    """Return (count, 2): 0 to 1 and back around a stem, and along it in units of the girth at its foot."""
+    """Return texture coordinates (count, 2) of the tubes' vertices: around the stem from 0 to 1 and back, and along the
+    stem in units of the girth at its foot.
+    """
     below = skeleton.rest[np.maximum(skeleton.parent, 0)]
     length = np.linalg.norm(skeleton.rest - below, axis=1)
     girth = 2 * np.pi * np.maximum.reduceat(skeleton.radius, np.unique(skeleton.branch, return_index=True)[1])

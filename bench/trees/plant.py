@@ -74,7 +74,9 @@ class Plant:
         return np.split(np.argsort(depth, kind="stable"), np.cumsum(np.bincount(depth))[:-1])
 
     def clip(self, positions: np.ndarray, time: np.ndarray, fps: float, **metadata: Any) -> MotionClip:
-        """Return the motion of its nodes, (T, N, 3) positions at (T,) seconds."""
+        """Return the plant's motion as a clip: positions (T, N, 3) of its nodes at times (T,) in seconds, and
+        `metadata` of the clip.
+        """
         return MotionClip(
             positions,
             time,
@@ -88,7 +90,9 @@ class Plant:
 
 
 def grow(nodes: int, orders: int, height: float, seed: int) -> Plant:
-    """Return a plant of exactly `nodes` nodes with stems of the orders 0 to `orders`. ValueError for too few."""
+    """Return a random plant of exactly `nodes` nodes, with stems of the generations 0 (the trunk) to `orders`. Raise
+    ValueError if there are too few nodes for that.
+    """
     fewest = 1 + SMALLEST_STEM * (orders + 1)
     if nodes < fewest:
         raise ValueError(f"plant: got {nodes} nodes for orders 0 to {orders}, expected at least {fewest}")
@@ -115,7 +119,9 @@ class _Grower:
         self.shortening = 0.1 ** (1.0 / max(2, orders))
 
     def stem(self, base: int, below: int, direction: np.ndarray, length: float, budget: int, order: int) -> None:
-        """Grow a stem on node `base` of branch `below` with everything on it, `budget` elements in all."""
+        """Grow a stem of a length, from node `base` of branch `below`, with all that it carries. `budget` is the number
+        of elements of the stem and of everything on it, and `order` its generation.
+        """
         branch = len(self.branch_parent)
         self.branch_parent.append(below)
         count, budgets = self._share(budget, self.orders - order)
@@ -130,7 +136,9 @@ class _Grower:
             self.stem(nodes[fork], branch, side, side_length, int(side_budget), order + 1)
 
     def _share(self, budget: int, levels_above: int) -> tuple[int, np.ndarray]:
-        """Return elements of the stem itself, and of each of its side stems with all they carry."""
+        """Divide `budget` elements and return how many the stem itself gets, and how many each of its side stems gets
+        with all that it carries. `levels_above` is the number of generations that are still to grow.
+        """
         if levels_above == 0:
             return budget, np.zeros(0, int)
         reserve = SMALLEST_STEM * levels_above
@@ -145,7 +153,9 @@ class _Grower:
     def _elements(
         self, base: int, branch: int, direction: np.ndarray, length: float, count: int, order: int
     ) -> tuple[list[int], list[np.ndarray]]:
-        """Append the stem's nodes; gives their numbers and the directions of their elements."""
+        """Append the `count` nodes of a stem that begins at node `base`. Return the nodes' numbers, and the direction
+        of the element that ends at each.
+        """
         nodes, directions = [], []
         for _ in range(count):
             upwards = 0.0 if order == 0 else 0.6 / count

@@ -29,7 +29,9 @@ class Skeleton:
 
     @classmethod
     def of(cls, clip: MotionClip, frames: int) -> Skeleton:
-        """Return the first `frames` frames of a clip as bench.data makes it from a simulation."""
+        """Return the skeleton of the first `frames` frames of a simulated clip: the nodes' positions, parents, branches
+        and radii.
+        """
         parent = np.full(clip.vertex_count, -1)
         parent[clip.edges[:, 1]] = clip.edges[:, 0]
         return cls(

@@ -48,7 +48,9 @@ def thickened(skeleton: MotionClip, factor: float) -> MotionClip:
 
 
 def scanned(clip: MotionClip, cell: float, noise: float, seed: int) -> MotionClip:
-    """Return a scan of a simulated clip, with its own motion. cell and noise, a standard deviation, are in metres."""
+    """Return a simulated clip as a scanner would see it, with the clip's motion: one irregular mesh around all stems.
+    `cell` is the size of its triangles and `noise` the standard deviation of its points, both in metres.
+    """
     random, skeleton = np.random.default_rng(seed), Skeleton.of(clip, clip.frame_count)
     scan = _skin(skeleton, cell, random)
     tubes = Tubes(skeleton, SIDES)
@@ -70,7 +72,7 @@ def scanned(clip: MotionClip, cell: float, noise: float, seed: int) -> MotionCli
 
 
 def _distance(points: np.ndarray, skeleton: Skeleton) -> np.ndarray:
-    """Return the distance of points (n, 3) from the nearest stem's bark, below 0 inside."""
+    """Return the distance of points (n, 3) from the bark of the nearest stem; it is negative inside."""
     child = np.flatnonzero(skeleton.parent >= 0)
     start, radius = skeleton.parent[child], skeleton.radius.astype(np.float64)
     distance = np.full(len(points), np.inf)
@@ -85,7 +87,7 @@ def _distance(points: np.ndarray, skeleton: Skeleton) -> np.ndarray:
 
 
 def _skin(skeleton: Skeleton, cell: float, random: np.random.Generator) -> Scan:
-    """Return the mesh around a skeleton, as a scanner would triangulate it, from a grid of cells."""
+    """Return the irregular mesh around a skeleton at rest, from a grid of cells `cell` metres wide."""
     child = np.flatnonzero(skeleton.parent >= 0)
     start, most = skeleton.parent[child], float(skeleton.radius.max()) + 2 * cell
     boxes = []
@@ -130,6 +132,9 @@ class _Ride:
     carrier's vertices at each."""
 
     def __init__(self, carrier: np.ndarray, quads: np.ndarray, points: np.ndarray):
+        """Attach each point to the nearest of the triangles that quadrilaterals `quads` of the vertices `carrier` (V,
+        3) make, so that it can follow them.
+        """
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         near = cKDTree(carrier[triangles].mean(axis=1)).query(points, k=24)[1]
         shares, away = _nearest_on(carrier[triangles[near]], points[:, None])
@@ -148,7 +153,9 @@ class _Ride:
         return foot + np.einsum("pij,pj->pi", frame, self._off)
 
     def _frames(self, carrier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return for each point its foot on the carrier (P, 3), and the axes of the triangle there (P, 3, 3)."""
+        """Return the positions (P, 3) of the places that P points are attached to on moved vertices, and the axes (P,
+        3, 3) of the triangles there.
+        """
         corners = carrier[self._triangle].astype(np.float64)
         along, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -163,6 +170,9 @@ class _Membrane:
     """Displacements of points around forks as those of a membrane between the points that ride on one stem."""
 
     def __init__(self, scan: Scan, branch: np.ndarray, skeleton: Skeleton):
+        """Prepare to smooth motion across the joints of a scan's stems. `branch` is the stem of each point; points near
+        a joint are free, and all others hold them.
+        """
         ends = np.concatenate([scan.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
         seeds = np.unique(ends[branch[ends[:, 0]] != branch[ends[:, 1]]])
         radius = skeleton.radius[cKDTree(skeleton.rest).query(scan.points[seeds])[1]]
@@ -183,8 +193,9 @@ class _Membrane:
 
 
 def _nearest_on(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the shares (..., 3) of corners in the places on triangles (..., 3, 3) that are nearest to points, about,
-    and how far away these are: shares in the plane, cut off at 0."""
+    """Return barycentric weights (..., 3) of the places on triangles (..., 3, 3) that are nearest to points (..., 3),
+    and their distances from the points. Places beyond an edge are approximate.
+    """
     a, u, v = corners[..., 0, :], corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]
     w = points - a
     uu, uv, vv = ((x * y).sum(axis=-1) for x, y in ((u, u), (u, v), (v, v)))

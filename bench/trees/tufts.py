@@ -53,7 +53,7 @@ class Arch:
         return np.stack([-np.sin(self.azimuth), np.zeros(len(self.azimuth)), np.cos(self.azimuth)], axis=1)
 
     def plant(self, count: int) -> Plant:
-        """Return the plant of arched stems, each with a foot and `count` nodes above it."""
+        """Return the plant of the arched stems, each with a foot on the ground and `count` nodes above it."""
         stems, share = len(self.foot), (np.arange(count) + 0.5) / count
         away = np.stack([np.cos(self.azimuth), np.zeros(stems), np.sin(self.azimuth)], axis=1)
         angle = self.start[:, None] + (self.end - self.start)[:, None] * share**1.4
@@ -76,7 +76,9 @@ class Arch:
 
 
 def grass(blades: int, height: float, frames: int, winds: Mapping[str, float], seed: int, fps: float) -> MotionClip:
-    """Return a tuft in one loop for each of the winds (m/s)."""
+    """Return a tuft of grass of `blades` blades, with one loop of `frames` frames for each of `winds`: names with
+    speeds in m/s.
+    """
     count = 6
     rng = np.random.default_rng(seed)
     far = np.sqrt(rng.uniform(0.01, 1, blades))
@@ -107,6 +109,9 @@ class _Ribbons:
     """Two vertices across each node of a blade, that end in a point."""
 
     def __init__(self, plant: Plant, arch: Arch, count: int, height: float, rng: np.random.Generator) -> None:
+        """Make the blades of a tuft of grass: ribbons along arched stems of 1 + `count` nodes, with random widths and
+        twists.
+        """
         blades = len(arch.foot)
         self.plant, self.count = plant, count
         share = np.arange(1 + count) / count
@@ -130,6 +135,7 @@ class _Ribbons:
         self.uv = leaf_uv(share, rng.integers(0, SHADES, blades))
 
     def clip(self, nodes: np.ndarray, fps: float) -> MotionClip:
+        """Return the clip of ribbons that follow the nodes (T, N, 3) of their stems."""
         skeleton = _skeleton(self.plant, nodes, self.plant.radius, fps)
         return MotionClip(
             positions=self._at(skeleton, nodes),
@@ -151,7 +157,9 @@ class _Ribbons:
 def fern(
     fronds: int, pairs: int, height: float, frames: int, winds: Mapping[str, float], seed: int, fps: float
 ) -> MotionClip:
-    """Return a fern with so many pairs of pinnae to a frond, in one loop for each of the winds (m/s)."""
+    """Return a fern of `fronds` fronds with `pairs` pairs of pinnae each, with one loop of `frames` frames for each of
+    `winds`: names with speeds in m/s.
+    """
     rng = np.random.default_rng(seed)
     inner = np.arange(fronds) / fronds  # the younger fronds stand steeper
     arch = Arch(
@@ -177,6 +185,9 @@ class _Pinnae(Leaves):
     steps = 24
 
     def __init__(self, skeleton: Skeleton, arch: Arch, rng: np.random.Generator) -> None:
+        """Put two pinnae (leaflets) on each upper node of a fern's fronds, with directions and lengths that change
+        along the frond.
+        """
         self.skeleton, self.species = skeleton, PINNAE
         fronds = len(arch.foot)
         each = (len(skeleton.parent) - 1) // fronds
@@ -205,6 +216,7 @@ class _Fern:
     """A moving fern; the motion of its fronds is taken twice over: pinnae settle in the first round."""
 
     def __init__(self, plant: Plant, arch: Arch, nodes: np.ndarray, fps: float, rng: np.random.Generator) -> None:
+        """Dress the simulated nodes (T, N, 3) of a fern's fronds with tubes and pinnae."""
         self.frames, self.fps = len(nodes), fps
         twice = np.concatenate([nodes, nodes])
         drawn = np.where(plant.radius > 2 * arch.radius.max(), 2.2, 1.5 / arch.radius.max() * plant.radius)
@@ -214,6 +226,7 @@ class _Fern:
         self.shade = np.repeat(rng.integers(0, SHADES, len(arch.foot)), len(self.pinnae.node) // len(arch.foot))
 
     def clip(self, wind: Wind) -> MotionClip:
+        """Return one loop of the fern in a wind, as a mesh of stalks and pinnae."""
         skeleton, pinnae, frames = self.skeleton, self.pinnae, self.frames
         turns = pinnae.flown(wind)[frames:]
         blocks = [slice(start, min(start + BLOCK_FRAMES, frames)) for start in range(0, frames, BLOCK_FRAMES)]

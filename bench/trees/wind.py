@@ -53,7 +53,9 @@ class Wind:
 
     @cached_property
     def _waves(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Vectors (K, 3), phases (K,), amplitudes (K, 3): one wave per equal step of log wave number."""
+        """Return the waves that the gusts are summed from, one per equal step of the logarithm of the wave number: wave
+        vectors (K, 3), phases (K,), and amplitudes (K, 3).
+        """
         rng = np.random.default_rng(self.seed)
         scale = 1.339 * self.length
         edges = np.geomspace(0.05 / scale, max(300.0 / scale, 60.0 / self.speed), WAVES + 1)

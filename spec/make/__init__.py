@@ -24,7 +24,9 @@ def results(data: bytes, mesh: bytes | None = None) -> dict[str, str]:
 
 
 def line_of(vector: Vector, data: bytes) -> str:
-    """Return the line in expected.txt. Raises ValueError if the document's result is not the vector's."""
+    """Return the line of a vector in expected.txt. Raise ValueError if FORMAT.md's code gives another result than the
+    vector states.
+    """
     outcome = results(data, vector.mesh)
     wrong = {item: result for item, result in outcome.items() if result in conformance.ERRORS}
     if (vector.error and outcome.get(vector.item) != vector.error) or (not vector.error and wrong):
@@ -37,7 +39,9 @@ def line_of(vector: Vector, data: bytes) -> str:
 
 
 def write(folder: Path = conformance.FOLDER) -> int:
-    """Write missing vectors; returns their number."""
+    """Write the vectors that are missing in a folder, with their expected results and checksums, and return their
+    number.
+    """
     for name in ("valid", "invalid"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     listed = folder / "expected.txt"

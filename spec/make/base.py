@@ -66,7 +66,9 @@ def bytes_of(made: Plant | Draft | bytes | Callable) -> bytes:
 
 
 def stems_of(text: str) -> list[Stem]:
-    """Return stems, separated by commas: parent, vertices and place, then flags and other fields by their names."""
+    """Return the stems that a text describes, separated by commas. A stem is its parent, its number of vertices and its
+    place on the parent, and then names of flags and other fields as name=value.
+    """
     stems = []
     for words in map(str.split, text.split(",")):
         named = dict(word.split("=") for word in words if "=" in word)
@@ -90,7 +92,9 @@ FORK = [Stem(-1, 3), Stem(0, 2, 1)]
 
 
 def forked(**fields) -> Plant:
-    """Return a trunk and a branch, four frames in two segments, every kind of motion chunk."""
+    """Return a plant of a trunk and one branch, with four frames in two segments and with every kind of motion chunk.
+    `fields` replace fields of Plant.
+    """
     scripts = {
         (SHAPES, 1, 0): [2, *row((3, 0, 4), (0, 1, 0)), *row((0, 0, 1)), 0],
         (STEMS, 1): 1,
@@ -150,7 +154,9 @@ UNTURNED = stems_of(
 
 
 def refinements(stems: list[Stem], seed: int, large: int = 12, **fields) -> Plant:
-    """Return three layers of random rows and rest poses."""
+    """Return a plant of three layers with random rows and refined rest poses. `large` bounds the size of the random
+    integers, in bits; `fields` replace fields of Plant.
+    """
     plant = moving(stems, seed, **{"layers": 3, "heads": LAYER_HEADS} | fields)
     plant.scripts |= {
         (STEMS, level): lambda level=level: Chance(100 * seed + level, large=large) for level in range(40)

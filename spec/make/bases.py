@@ -28,8 +28,9 @@ def basis(rank: int, kind: int, stream: bytes) -> Callable[[], bytes]:
 
 
 def shrunk(last: int) -> Plant:
-    """Return a row that 15 known ones along it leave about 1e-100 of; `last`: an entry of the last of these, in
-    1/8192."""
+    """Return a plant whose learned basis has a row of which about 1e-100 remains once it is made orthogonal to 15 known
+    rows. `last` / 8192 is every entry of the last known row.
+    """
     known = [[1235] * 44] * 14 + [[last] * 44]
     rows = [[entry / 8192 for entry in entries] for entries in known]
     in_waves = basis_in_waves(44, -200, *row((1, 0, 0)), rank=16, known=rows)

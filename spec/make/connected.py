@@ -13,7 +13,9 @@ def connected(
     order: list | None = None,
     **fields,
 ) -> Plant:
-    """Return a plant with the stems of BY_VERTEX, whose rest pose is coded by faces."""
+    """Return a plant with the stems of BY_VERTEX, whose rest pose is coded by its faces. `make_faces` returns the chunk
+    of faces, and `step` is the step of the rest pose.
+    """
     content, branches, script = make_faces(), branches_of(BY_VERTEX), Chance(seed, large=6)
     count = sum(stem.count for stem in BY_VERTEX)
     mesh = mesh_of(content, order or list(range(count)), fields.get("places"))
@@ -28,7 +30,9 @@ def connected(
 
 
 def meshed(stems: list[Stem], faces: list[list[int]], script: list | Chance, **fields) -> Plant:
-    """Return a rest pose by faces, of any sizes."""
+    """Return a plant whose rest pose is coded by `faces`, lists of vertices of any lengths. `script` has the integers
+    of the rest pose, or draws them at random.
+    """
     count, step = sum(stem.count for stem in stems), 0.3
     places = fields.get("places")
     content = mixed_polygons(faces, count if places is None else places)
@@ -48,7 +52,7 @@ def hub(first: int, quads: int, edges: int) -> list[list[int]]:
 
 
 def hubs() -> list[list[int]]:
-    """Return the faces of a mesh whose vertices have every number of neighbours that the coder tells apart."""
+    """Return the faces of a mesh in which every number of neighbours that the coder tells apart occurs at a vertex."""
     first, faces = 0, []
     for quads, edges in (
         (1, 0),
@@ -83,7 +87,9 @@ LEAVES = [  # on a stem: of four vertices that are shapes or copies, finer ones,
 
 
 def leaves() -> list[list[int]]:
-    """Return a triangle or quadrangle of each but for the last, whose first vertex is alone, and faces of several."""
+    """Return faces that make one triangle or quadrilateral of each stem but the last. The last stem has faces of
+    several sizes, and its first vertex is in none.
+    """
     faces = [[v, v + 1, v + 2, v + 3] if v % 8 else [v, v + 1, v + 2] for v in range(4, 40, 4)]
     return [
         *faces,

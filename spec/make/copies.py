@@ -30,8 +30,9 @@ def with_copies(stems: Sequence[int | Stem], *script: list, step: float = 0.3, s
 
 
 def broken_rest(make: Callable[[], Plant], goes_on: bool = True) -> Draft:
-    """Return the file, whose rest pose is refused, and may go on behind that; all else is as in one that stands
-    still."""
+    """Return a draft whose rest pose a decoder refuses, made from the plant that `make` returns; all else is as for a
+    plant that stands still. If `goes_on` is true, the stream continues behind the fault.
+    """
     kept, rules.require = rules.require, (lambda *_: None) if goes_on else rules.require
     try:
         plant = make()
@@ -48,7 +49,9 @@ def copy_of(tip: tuple[int, int, int], *places: Sequence[int], largest: int = 0)
 
 
 def copies_turned() -> Plant:
-    """Return numbers are alike at first, so that they are expected again, and later near 0 again."""
+    """Return a plant of 38 stems that are copies of shapes. Their integers are alike at first, so that a decoder comes
+    to expect them, and are near 0 again later.
+    """
     random = np.random.default_rng(280)
     script = [[1, *by_chance(4, 162, 40)], [0, 1, *by_chance(4, 163, 40)]]
     for i in range(36):
@@ -60,7 +63,9 @@ def copies_turned() -> Plant:
 
 
 def copies_of_many() -> Plant:
-    """Return 64 shapes of one vertex behind others, of which one has two vertices."""
+    """Return a plant of 64 shapes of one vertex and then stems that copy such shapes; one of the shapes has two
+    vertices.
+    """
     random, counts, script = np.random.default_rng(165), [1, 1, 2, *[1] * 64], []
     for b, count in enumerate(counts):
         script += [[*([0] if b not in (0, 2) else []), 1, *by_chance(count, 166 + b)]]
@@ -71,8 +76,9 @@ def copies_of_many() -> Plant:
 
 
 def copies_of_lengths() -> Plant:
-    """Return shapes, copies and branches that are neither: whether one is, is expected of others of its length up to
-    16."""
+    """Return a plant of shapes, copies and other branches of 15 to 17 vertices. Up to 16, a decoder expects a branch to
+    be what others of its length were.
+    """
     counts, script = [15, 16, 17, 15, 17, 16, 16, 15, 17, 16, 15, 17], []
     shapes: list[int] = []
     for b, (count, kind) in enumerate(zip(counts, (1, 1, 0, 2, 1, 2, 0, 0, 2, 1, 2, 0))):

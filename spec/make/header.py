@@ -9,7 +9,7 @@ from spec.make.static import attributes, element
 
 
 def traced() -> Plant:
-    """Return the file of "A file in bytes" and "A level traced" in FORMAT.md."""
+    """Return the plant of the file that FORMAT.md traces in "A file in bytes" and "A level traced"."""
     stem = [Stem(-1, 3)]
     return Plant(
         stem,
@@ -59,8 +59,10 @@ def of_memory(vertices: int) -> Draft:
 
 
 def of_range(max_error: int) -> Draft:
-    """Return a draft that tells whether a decoder takes counts whose product is just beyond 38 bits, 2^38 + 56: it then
-    meets a bad checksum, the first fault behind the front."""
+    """Return a draft whose counts have a product of 2^38 + 56, just above a decoder's limit of 38 bits. A decoder that
+    accepts it goes on to a wrong checksum, so the error tells which rule it applied. `max_error` has the bits of the
+    error bound.
+    """
     clips = [clip_entry(25, 17, "0"), *(clip_entry(1, 1, str(i)) for i in range(1, 25))]
     return (
         lone()
@@ -80,6 +82,9 @@ def of_range(max_error: int) -> Draft:
 
 
 def later_minor() -> Draft:
+    """Return a draft as a later minor version might write it: with unknown members of the metadata and chunks of
+    unknown kinds.
+    """
     return fork().add(
         Entry(METADATA, b'\0{"unit":"m","new":[1,{}]}'),
         Entry(0x800A, FUTURE),
@@ -90,7 +95,9 @@ def later_minor() -> Draft:
 
 
 def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().draft(), **fields) -> None:
-    """Declare a vector with a Minor_Version, which a decoder takes or not by the rule of its own version."""
+    """Declare a vector with the minor version `minor` in its header, which a decoder accepts or refuses by the rule of
+    its own version. `made` returns the draft, and `title` names the vector.
+    """
     name, reason = title.split(": ", 1)
     name, *errors = name.split()
 

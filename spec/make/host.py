@@ -25,8 +25,9 @@ def tall(*counts: int) -> Draft:
 
 
 def deep() -> Draft:
-    """Return a file for a host's mesh with 1,300 branches that hang on each other in a row, and four that hang on
-    earlier ones."""
+    """Return a draft for a host's mesh with 1,300 branches, each hanging on the one before it, and four more that hang
+    on earlier ones.
+    """
     stems = chain(1300, 1, flags=0)
     for up in (1200, 1, 20, 98):
         parent = len(stems) - 1
@@ -37,7 +38,9 @@ def deep() -> Draft:
 
 
 def without_mesh(stems: list[Stem]) -> Draft:
-    """Return a file of which only the hierarchy is decoded: the rest pose is the host's mesh, which is not there."""
+    """Return a draft whose rest pose is a host's mesh that is not supplied, so that only its hierarchy can be
+    decoded.
+    """
     count = sum(stem.count for stem in stems)
     stream = write(rules.decode_hierarchy, hierarchy_script(stems), len(stems), count)
     plan = rules.make_parts(rules.decode_hierarchy(stream, len(stems), count)[0])

@@ -10,8 +10,9 @@ from spec.make.tubes import RIGID, TUBES
 
 
 def layered(layers: int = 3, *left_out: tuple, **fields) -> Plant:
-    """Return the fork, which is level 0 to 2, and refinements with everything that they may have; `left_out`:
-    scripts."""
+    """Return a forked plant, which makes the levels 0 to 2, with refinements that use everything a refinement may have.
+    `left_out` has the keys (kind, level, segment) of scripts to leave out.
+    """
     more = {"scripts": {}} | fields
     scripts = forked().scripts | {
         (SHAPES, 3, 0): [
@@ -52,7 +53,9 @@ def rest_by_level(stems: list[Stem], seed: int, **fields) -> Plant:
 
 
 def learned(*levels: int) -> dict:
-    """Return heads with learned time bases for some levels, in segments of two frames."""
+    """Return the heads of motion chunks, by level, with learned bases over time for some levels, in segments of two
+    frames.
+    """
     random = np.random.default_rng(5)
     return LAYER_HEADS | {
         level: stems_head(

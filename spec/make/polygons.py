@@ -17,7 +17,9 @@ def polygon_head(type_: str, faces: int, corners: int, count_type: str | None = 
 
 
 def polygon_shape(index_type: int, count_type: int | None, face_count: int, columns: int, corner_count: int):
-    """Return head of FACES or EDGES."""
+    """Return the head of a chunk FACES or EDGES: the types of its indices and counts, the number of faces, the columns
+    of a table of faces (0: mixed sizes), and the number of corners.
+    """
     return rules.Record(
         index_type=index_type,
         count_type=count_type,
@@ -76,7 +78,9 @@ def edges(content: bytes) -> Callable[[], Draft]:
 
 
 def recent(_: bytes) -> None:
-    """Decode a triangle of vertex 0 and of the corner before that."""
+    """Decode, with FORMAT.md's code, a triangle whose corners are vertex 0 and vertices among the most recent
+    corners.
+    """
     coder, model = rules.RangeDecoder(b""), rules.PolygonModel(range(5))
     decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]
     node = 1

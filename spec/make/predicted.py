@@ -12,7 +12,9 @@ RESTING = [0, 1, *[0] * 16]  # a frame of them that is no copy, and in which non
 
 
 def frame_of(stems: list[Stem], of_vertex: Callable[[], list[int]], follow: Callable[[], int]) -> list[int]:
-    """Return what a frame says of its vertices, but for those that follow the ends of their stem."""
+    """Return the integers that code one predicted frame. `of_vertex` returns those of a vertex, and `follow` how the
+    inner vertices of a stem are coded: 0 one by one, else as followers of the stem's ends.
+    """
     values = []
     for stem in stems:
         ends = 2 if stem.parent < 0 and stem.count > 1 else 1
@@ -32,7 +34,10 @@ def followed_at(share: float) -> int:
 
 
 def frame_steps(stems: list[Stem], seed: int, large: int = 12, still: float = 0.5, follow: float = 0.3) -> list[int]:
-    """Return, for the vertices of a frame, whether they have integers, and these."""
+    """Return random integers that code the vertices of one predicted frame. A vertex stands still with probability
+    `still`, inner vertices follow their stem's ends with probability `follow`, and `large` bounds the integers, in
+    bits.
+    """
     chance = Chance(seed, large=large)
 
     def of_vertex() -> list[int]:
@@ -63,7 +68,9 @@ PREDICTED_PLACE = PREDICTED, 1, 1
 
 
 def with_source(draft: Draft, seed: int) -> Draft:
-    """Return a last level that is up to 2^22 numbers away from the one before it."""
+    """Return a draft with a last level that is the source's own motion, up to 2^22 floating-point numbers away from the
+    level before it.
+    """
     file, level, chance = rules.open_file(draft.file()), draft.header["level_count"], Chance(seed, large=22)
     plans = rules.plans_of(file, level - 1)
 
@@ -290,8 +297,9 @@ GROWING = [  # of both stems: how far the tip is off what is expected of it, whi
 
 
 def growing() -> Plant:
-    """Return two stems whose tips go along them, from near their base to their end: the first one gets there
-    earlier."""
+    """Return a plant of two stems whose tips move along them, from near the base to the end. The first stem's tip
+    arrives earlier.
+    """
     stems, frames = [Stem(-1, 5)] * 2, []
     for frame in GROWING:
         values = [0, 1]

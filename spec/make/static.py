@@ -16,9 +16,11 @@ def frame(
     reserved: int = 0,
     blocks: bytes | None = None,
 ) -> bytes:
-    """Return a zstd frame (RFC 8878) of raw blocks, or of `blocks`. -1: the true value; None: left out.
+    """Return a zstd frame (RFC 8878) of raw blocks with `content`, or of the bytes `blocks`. For `stated`, the content
+    size, and `checksum`, -1 is the true value and None leaves the field out.
 
-    window: the byte Window_Descriptor, where there is no single segment."""
+    `window` is the byte Window_Descriptor, used if `single_segment` is false.
+    """
     size = len(content) if stated == -1 else stated
     flags = reserved << 3 | (checksum is not None) << 2 | single_segment << 5
     flags |= (3 << 6 if size is not None else 0) | (1 if dictionary is not None else 0)

@@ -21,7 +21,9 @@ def of_sizes(*powers: int) -> list[list[float]]:
 
 
 def of_any_size(*powers: int) -> Plant:
-    """Return rigid branches of these sizes, all turned."""
+    """Return a plant of rigid branches, all turned, whose extents in metres are powers of two with the exponents
+    `powers`.
+    """
     stems = [Stem(-1, 2), *(Stem(0, 3, 0, rigid=1) for _ in powers)]
     size = [1 << 28 if power > 0 else 1 for power in powers]
     turned = [row((n * (1 + i % 3), n * (2 - i % 4), n), (i % 2, 3 * n, -n)) for i, n in enumerate(size)]

@@ -20,7 +20,7 @@ EVERYTHING = stems_of(
 
 
 def everything() -> Draft:
-    """Return the file in which every feature of the format occurs at once."""
+    """Return the draft of a file in which every feature of the format occurs at once."""
     random = np.random.default_rng(99)
     vertices = sum(stem.count for stem in EVERYTHING)
     places = [*range(vertices), 2, 0, 2]
@@ -75,7 +75,9 @@ def everything() -> Draft:
 
 
 def encoded(name: str) -> bytes:
-    """Return a small plant encoded by athcodec."""
+    """Return the bytes of a small plant's file as athcodec's encoder writes it. `name` selects the plant and the
+    options.
+    """
     import athcodec
     from athcodec.motion.clip import MotionClip
 

@@ -43,7 +43,9 @@ class Cases:
 
 
 def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
-    """Run as many cases as time allows, in a fixed random order."""
+    """Run as many cases as `seconds` allow, in a fixed random order, in a separate process. A case that takes more than
+    `hang` seconds counts as hanging. Return the numbers of cases and faults as a row.
+    """
     order = list(range(len(cases.arguments)))
     random.Random(0).shuffle(order)
     counts = dict.fromkeys(("crashes", "hangs", "over_limit", "wrong"), 0)
@@ -58,7 +60,9 @@ def run(cases: Cases, seconds: float, hang: float = HANG_SECONDS) -> Row:
 
 
 def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, hang: float) -> tuple[int, str, str]:
-    """Run cases from number `start`: (the next number, kind of fault or "", message)."""
+    """Run cases in a new process, beginning with number `start` of `order`, until one fails, all are done or `deadline`
+    has passed. Return three results: the next number, the kind of the fault ("" for none), and a message.
+    """
     context = multiprocessing.get_context("spawn")
     at, messages = context.Value("q", start), context.SimpleQueue()
     process = context.Process(target=_work, args=(cases, order, start, deadline, at, messages), daemon=True)
@@ -82,7 +86,9 @@ def _until_a_fault(cases: Cases, order: list[int], start: int, deadline: float, 
 
 
 def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messages) -> None:
-    """Run cases in the separate process until one fails, all are done or time is up."""
+    """Run cases in the separate process until one fails, all are done or `deadline` has passed. `at` shares the number
+    of the running case, and `messages` gets the outcome.
+    """
     for place in range(start, len(order)):
         if place > start and time.monotonic() > deadline:
             messages.put((place, "", ""))

@@ -37,8 +37,10 @@ def build(folder: Path) -> Path:
 
 
 def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, until: float = float("inf")) -> Row:
-    """Return a run of `verb` for every call that can fail; for so many of them, chosen at random, where `sample` says
-    so. lasts: all further calls fail too."""
+    """Run an athcodec command once for each of its file operations, with the n-th operation failing in run n, and
+    return the counts as a row. `sample` limits the runs to so many random ones (0: all), and `lasts` lets all later
+    operations fail too.
+    """
     row = Row(f"{verb}: call n fails{', and all after it' if lasts else ''}", 0)
     library = build(folder)
     asked = {"verb": verb, "folder": str(folder), "sample": sample, "lasts": lasts, "seconds": until - time.monotonic()}
@@ -61,8 +63,10 @@ def each_call(verb: str, folder: Path, sample: int = 0, lasts: bool = False, unt
 
 
 def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("inf")) -> Row:
-    """Return a batch of one clip whose n-th call fails, in the run and in each of its workers; the next run, without
-    faults, has to finish it and to leave nothing else."""
+    """Run a batch of one clip for each n of `numbers`, with the n-th file operation failing in the main process and in
+    each worker. The next run, without faults, must finish the batch and leave no other files. Return the counts as a
+    row.
+    """
     row = Row("batch: call n fails", 0, note="in the run and in its worker")
     library, place = build(folder), Place.make(folder)
     words = ["batch", str(place.source), "--out", str(place.folder), "--workers", "1", "--effort", "fast"]
@@ -86,7 +90,9 @@ def each_call_of_batch(folder: Path, numbers: list[int], until: float = float("i
 
 
 def _runs(verb: str, place: Place, sample: int, lasts: bool, deadline: float) -> Iterator[dict]:
-    """Run a child for each call, in the process with the library."""
+    """Yield the result of a child process for each file operation that can fail; these are counted by a first run
+    without faults.
+    """
     calls = _run(verb, place, 0, lasts)["calls"]
     numbers = list(range(1, calls + 1))
     if sample:
@@ -98,6 +104,10 @@ def _runs(verb: str, place: Place, sample: int, lasts: bool, deadline: float) ->
 
 
 def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
+    """Run a command in a child process whose `n`-th file operation fails (0: none). Return what happened: "kind" is ""
+    if all is well, "crash" or "wrong", "kept" tells whether an older file is unchanged, and "left" names files that
+    remain.
+    """
     target = place.folder / VERBS[verb]
     target.write_bytes(OLDER[target.suffix])
     ends, start = os.pipe()
@@ -122,6 +132,9 @@ def _run(verb: str, place: Place, n: int, lasts: bool) -> dict:
 
 
 def _in_child(start: int, place: Place, verb: str, target: Path, n: int, lasts: bool) -> None:
+    """Run a command in the forked child process with its `n`-th file operation failing, write the exit code and
+    messages as JSON to the pipe `start`, and end the process.
+    """
     code, err = DEAD, io.StringIO()
     try:
         from athcodec import cli
@@ -151,7 +164,7 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def rows(budget: float) -> list[Row]:
-    """Return all calls of all verbs, within about `budget` seconds."""
+    """Test all file operations of all commands for about `budget` seconds, and return the counts as rows."""
     start, outcomes = time.monotonic(), []
     for number, (verb, lasts) in enumerate((verb, lasts) for verb in VERBS for lasts in (False, True)):
         with tempfile.TemporaryDirectory() as folder:
@@ -163,6 +176,9 @@ def rows(budget: float) -> list[Row]:
 
 
 def main() -> None:
+    """Run the tests that the first argument asks for, as JSON, in a process with the library that makes operations
+    fail, and print each result as a line of JSON.
+    """
     asked = json.loads(sys.argv[1])
     import athcodec.cli.verbs  # noqa: F401 - what all runs need
     import athcodec.encoding  # noqa: F401

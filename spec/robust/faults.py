@@ -64,7 +64,7 @@ class Place:
 
 
 def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subprocess.Popen:
-    """Start the command, in a process that runs `prepare` first."""
+    """Start athcodec with some arguments in a process that calls `prepare` first, and return the process."""
     return subprocess.Popen(
         [sys.executable, "-m", "athcodec", *words],
         stdout=subprocess.PIPE,
@@ -75,7 +75,9 @@ def spawn(words: list[str], prepare: Callable[[], None] | None = None) -> subpro
 
 
 def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tuple[int, str]:
-    """Return (exit code, stderr) of a command; the exit code is -SIGKILL after TIMEOUT."""
+    """Run athcodec with some arguments, and return its exit code and its standard error output. The exit code is
+    -SIGKILL if it takes longer than TIMEOUT.
+    """
     process = spawn(words, prepare)
     try:
         _, err = process.communicate(timeout=TIMEOUT)
@@ -86,7 +88,7 @@ def finished(words: list[str], prepare: Callable[[], None] | None = None) -> tup
 
 
 def is_whole(path: Path) -> bool:
-    """Return whether an .ath or HDF5 file can be read to its last byte."""
+    """Return whether an .ath or HDF5 file is complete, so that all of it can be read."""
     try:
         if path.suffix == ".ath":
             with athcodec.open(path, strict=True) as decoder:
@@ -103,7 +105,9 @@ def is_whole(path: Path) -> bool:
 
 
 def kill_while_writing(place: Place, rounds: int, seed: int, until: float = float("inf")) -> Row:
-    """Kill a verb with SIGKILL, half of the time as soon as its part file exists, else at any moment."""
+    """Run commands `rounds` times and kill each with SIGKILL: half of the time as soon as its partial file exists, else
+    at a random moment. Return the counts as a row.
+    """
     rng, row = random.Random(seed), Row("killed while writing", 0)
     parts = cleaned = 0
     while row.tried < rounds and time.monotonic() < until:
@@ -126,7 +130,7 @@ def kill_while_writing(place: Place, rounds: int, seed: int, until: float = floa
 
 
 def _survives_a_kill(place: Place, verb: str, target: Path, older: bytes | None, rng: random.Random) -> bool:
-    """Return whether the target is, after the kill, absent, unchanged or complete."""
+    """Kill a command while it writes, and return whether its target is then absent, unchanged (`older`) or complete."""
     process = spawn(place.words(verb, target))
     if rng.random() < 0.5:
         while process.poll() is None and not place.left_over(target):
@@ -154,7 +158,9 @@ def _next_run(place: Place, target: Path) -> None:
 
 
 def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: float = float("inf")) -> Row:
-    """Return verbs under a limit on file sizes (RLIMIT_FSIZE): the write that exceeds it fails with EFBIG."""
+    """Run commands under limits on the size of files (RLIMIT_FSIZE), so that a write fails with EFBIG. Return the
+    counts as a row.
+    """
     row = Row("no room to write", 0, note="RLIMIT_FSIZE, the error is EFBIG")
     for size in sizes:
         for verb in verbs:
@@ -165,7 +171,9 @@ def fill_disk(place: Place, verbs: tuple[str, ...], sizes: list[int], until: flo
 
 
 def _judge_refusal(place: Place, verb: str, row: Row, prepare: Callable[[], None]) -> None:
-    """Check for one line, exit code 1 and an unchanged older file; or a complete file, if it fitted."""
+    """Run a command that is expected to fail, and count it as wrong in `row` unless it prints one line, exits with 1
+    and leaves an older file unchanged. A complete file is right, too, if it fitted.
+    """
     target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
     target.write_bytes(OLDER[target.suffix])
     code, err = finished(place.words(verb, target), prepare)
@@ -188,7 +196,7 @@ def obey_permissions() -> None:
 
 
 def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
-    """Write into a read-only folder, and over a read-only file."""
+    """Run commands that write into a read-only folder and over a read-only file, and return the counts as a row."""
     row = Row("read-only target", 0)
     for verb in verbs:
         target = place.folder / ("target.h5" if verb.startswith("decode") else "target.ath")
@@ -206,7 +214,7 @@ def write_where_not_allowed(place: Place, verbs: tuple[str, ...]) -> Row:
 
 
 def run(budget: float) -> list[Row]:
-    """Return all faults, 200 kills among them, within about `budget` seconds."""
+    """Test all faults for about `budget` seconds, with 200 kills among them, and return the counts as rows."""
     from spec.robust._io_errors import rows as io_errors  # which uses this module
 
     start = time.monotonic()

@@ -22,6 +22,9 @@ COUNTS = {"crash": "crashes", "hang": "hangs", "over_limit": "over_limit", "wron
 
 
 def run(budget: float) -> list[Row]:
+    """Run each fuzz target for an equal part of `budget` seconds, and return the counts as rows, the last of which is
+    the coverage.
+    """
     fuzzer = targets.compiler().fuzzer
     rows, seconds = [], budget / len(cli.ALL)
     for target in cli.ALL:
@@ -50,6 +53,9 @@ def _failure(line: str) -> str:
 
 
 def _coverage_row() -> Row:
+    """Return a row on how many lines of the decoder the inputs of the fuzz targets reach; it is wrong if they are fewer
+    than LEAST_COVERAGE.
+    """
     files = coverage.measure()
     if files is None:
         return Row("lines of the decoder", 0, note=coverage.NO_CLANG)

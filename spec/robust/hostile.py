@@ -50,6 +50,9 @@ def valid_files() -> dict[str, bytes]:
 
 
 def refused(data: bytes, expected: type[FormatError] | tuple = FormatError, **options) -> None:
+    """Open and check a file, and raise Wrong unless it raises an error of the type `expected` whose message is one
+    line.
+    """
     try:
         athcodec.open(BytesIO(data), **options).file.check()
     except expected as error:
@@ -89,6 +92,9 @@ def prefix_strictly(data: bytes, size: int) -> int:
 
 
 def prefix_as_a_stream(data: bytes, size: int) -> int:
+    """Open the first `size` bytes of a file as a stream, and raise Wrong unless exactly the levels that are complete
+    can be played, with the same positions as in the whole file. Return 0, the memory needed beyond the usual.
+    """
     whole = AthFile(BytesIO(data))
     if size < whole.prelude_length:
         refused(data[:size], (Truncated, NotAnAthFile))
@@ -138,7 +144,7 @@ def _flipped(data: bytes, bit: int) -> bytes:
 
 
 def repaired(data: bytes) -> bytes:
-    """Return the file with correct checksums, as far as the front can be read."""
+    """Return a file with correct checksums, as far as its front can be read."""
     *_, length, count = ct._HEADER.unpack_from(data) if len(data) >= ct._HEADER.size else (0, 0)
     if not ct._HEADER.size + 4 * count <= length <= len(data):
         return data
@@ -159,7 +165,9 @@ def flipped_bit_repaired(data: bytes, bit: int) -> int:
 
 
 def corrupted(data: bytes, seed: int) -> int:
-    """Return changed fields of the front that are mostly consistent with each other, or changed contents of chunks."""
+    """Change fields of the front so that they mostly fit each other (odd `seed`), or contents of chunks (even `seed`),
+    and decode the file within limits. Return the memory that this needs, in bytes.
+    """
     rng = np.random.default_rng(seed)
     if seed % 2:
         return within_limits(corrupted_front(rng, data))
@@ -182,8 +190,9 @@ MOST_GROWTH = 3.2
 
 
 def seconds_and_bytes(data: bytes) -> tuple[float, int]:
-    """Return seconds to decode all; bytes read, returned, and of the decoder's memory, which the file's counts
-    determine."""
+    """Decode a file completely. Return the seconds, and the sum of the bytes read, the bytes returned and the bytes of
+    the decoder's memory, which the counts in the file determine.
+    """
     start = time.perf_counter()
     decoder = athcodec.open(BytesIO(data))
     decoded = sum(block.nbytes for _, block in decoder.blocks())
@@ -200,8 +209,9 @@ def _sample_per_byte() -> float:
 
 
 def slow_file(_: bytes, name: str) -> int:
-    """Raise Wrong if a file takes too long to open; return the memory that the test needs. Other load on the machine
-    can only add to a time: a time that is too long is measured again; the least counts."""
+    """Raise Wrong if the slow file `name` takes too long to open for its size; return the memory that the test needs.
+    Times that are too long are measured again and the least counts, because other load can only add to them.
+    """
     files = [hostile_files.SLOW[name](scale) for scale in (1, 2)]
     least, fault = [float("inf")] * 2, ""
     for _ in range(8):
@@ -231,7 +241,7 @@ def announces_too_much(_: bytes, name: str) -> int:
 
 
 def _classes(files: dict[str, bytes]) -> list[tuple[float, Cases]]:
-    """Return (weight of the time, cases)"""
+    """Return pairs of a weight, the part of the time, and the cases of one class of hostile files."""
     small = {name: data for name, data in files.items() if len(data) <= SMALL}
     of_files = [
         (0.5, "a byte or more too many", files, lambda _: [b"\0", b"more", bytes(4096)], too_long),
@@ -261,7 +271,7 @@ def run(budget: float) -> list[Row]:
 
 
 def figures() -> dict[str, str]:
-    """Return the cost of slow files, measured again in this process."""
+    """Return sentences on the seconds that slow files take, by the name of the file, measured in this process."""
     lines = {}
     for name, make in hostile_files.SLOW.items():
         seconds, size = seconds_and_bytes(make(2))

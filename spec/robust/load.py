@@ -67,7 +67,9 @@ def compilers() -> list[str]:
 
 
 def compiled(folder: Path, sources: list[Path], *options: str) -> Path:
-    """Return a program or library in C, by the first compiler that succeeds."""
+    """Compile C sources to a program or library in `folder`, with the first compiler that succeeds, and return its
+    path.
+    """
     target = folder / sources[0].stem
     problems = ""
     for compiler in compilers():
@@ -112,12 +114,15 @@ def threads_in_c(program: Path, files: list[Path], threads: int, rounds: int) ->
 
 
 def threads_in_python(files: list[Path], threads: int, looks: int) -> Row:
-    """Return threads on shared and on separate decoders of each file, compared with a single thread."""
+    """Read from files in several threads, through shared decoders and through separate ones, and compare all frames
+    with those of a single thread. Each thread reads `looks` times. Return the counts as a row.
+    """
     row = Row("threads, Python", 0, note=f"{threads} threads on {len(files)} files, shared and their own")
     shared = [athcodec.open(path) for path in files]
     expected = [[decoder.positions(level=level) for level in range(decoder.file.level_count)] for decoder in shared]
 
     def watch(seed: int) -> int:
+        """Read random frames in one thread, and return how many of them are wrong."""
         rng, wrong = random.Random(seed), 0
         decoders = [athcodec.open(path) for path in files]
         for _ in range(looks):
@@ -157,7 +162,9 @@ def resident_bytes() -> int:
 
 
 def seek_at_random(path: str, seeks: int) -> dict:
-    """Return growth of memory and of the number of Python's objects over so many seeks and changes of level."""
+    """Read `seeks` random frames at random levels, and return how much the memory and the number of Python's objects
+    grow, and how many frames are wrong.
+    """
     rng = random.Random(4)
     with athcodec.open(path) as decoder:
         expected = [decoder.positions(level=level) for level in range(decoder.file.level_count)]
@@ -190,7 +197,9 @@ ALLOWED_GROWTH = 4 << 20
 
 
 def open_many(path: str, count: int) -> dict:
-    """Open many decoders at once and read from each, before and after others are closed in random order."""
+    """Open `count` decoders at once and read from each, before and after others are closed in random order. Return the
+    number of wrong frames, the bytes per decoder, and the number of files left open.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = count + 100
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -229,6 +238,9 @@ class FailingAllocator:
     """Replaces NumPy's allocator of arrays in this process, permanently, by that of scarce.c."""
 
     def __init__(self, folder: Path):
+        """Install an allocator for NumPy's arrays whose n-th allocation can be made to fail; it is compiled in
+        `folder`.
+        """
         self._library = ctypes.CDLL(str(compiled(folder, [HERE / "scarce.c"], "-fPIC", "-shared")))
         self._library.scarce_arm.argtypes = [ctypes.c_long]
         self._library.scarce_install.argtypes = [ctypes.c_void_p]
@@ -252,7 +264,7 @@ Call = Callable[[], object]
 
 
 def _calls(path: str, out: str) -> dict[str, Call]:
-    """Return the tested calls, which keep nothing in memory between each other."""
+    """Return the calls to test by name. They read the file `path` or write to `out`, and keep nothing in memory."""
 
     def opened(use: Callable[[athcodec.Decoder], object]) -> Call:
         def call() -> object:
@@ -290,8 +302,12 @@ def _calls(path: str, out: str) -> dict[str, Call]:
 
 
 def run_out_of_memory(path: str, seconds: float) -> dict:
-    """Return each call with its n-th allocation failing, for n from 1 until the call needs fewer. It may succeed, or
-    raise MemoryError or an error of athcodec and leave no file; an open decoder must continue to work."""
+    """Run each call with its n-th allocation failing, for n from 1 until the call needs fewer, and return the counts
+    and faults.
+
+    A call may succeed, or raise MemoryError or an error of athcodec and leave no file. An open decoder must continue to
+    work.
+    """
     wrong, tried, raised, until = [], {}, 0, time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name, athcodec.open(path) as lasting:
         folder = Path(name)
@@ -344,7 +360,9 @@ def failing_allocations(path: Path, seconds: float = 300.0) -> Row:
 
 
 def in_little_space(path: str, megabytes: float) -> dict:
-    """Decode with a limit on additional address space (RLIMIT_AS): the frames, or a MemoryError."""
+    """Decode a file with a limit on further address space (RLIMIT_AS), in megabytes. Return whether the frames are
+    right, and the name of the error if there was one.
+    """
     with athcodec.open(path) as decoder:
         expected = decoder.positions(0)
         room = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + int(megabytes * 1e6)
@@ -356,6 +374,9 @@ def in_little_space(path: str, megabytes: float) -> dict:
 
 
 def little_space(path: Path, sizes: list[float], until: float = float("inf")) -> Row:
+    """Decode a file under several limits on address space, in megabytes, and return the counts as a row. Each run must
+    give the right frames or raise MemoryError.
+    """
     row, refused = Row("little address space", 0), 0
     for size in sizes:
         if time.monotonic() >= until:
@@ -370,7 +391,9 @@ def little_space(path: Path, sizes: list[float], until: float = float("inf")) ->
 
 
 def budgets(path: Path) -> Row:
-    """Try Limits.memory_bytes from 1 to enough: each gives LimitExceeded before it allocates much, or right frames."""
+    """Decode a file with Limits.memory_bytes from 1 up to enough, and return the counts as a row. Each run must raise
+    LimitExceeded or give the right frames.
+    """
     row = Row("memory budgets", 0)
     with athcodec.open(path) as decoder:
         expected = decoder.positions()
@@ -396,7 +419,7 @@ JOBS: dict[str, Callable[..., dict]] = {
 
 
 def run(budget: float) -> list[Row]:
-    """Return all runs, within about `budget` seconds."""
+    """Test the decoder under load for about `budget` seconds, and return the counts as rows."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         files = [folder / "short.ath", folder / "long.ath"]

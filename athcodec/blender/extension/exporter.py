@@ -62,6 +62,7 @@ class EXPORT_OT_ath(bpy.types.Operator, ExportHelper):
         return context.active_object is not None and context.active_object.type == "MESH"
 
     def execute(self, context):
+        """Compress the active object to the chosen file and report the size, or the error in one line."""
         try:
             summary = write_object(
                 context,
@@ -98,7 +99,9 @@ def left_out_of(context, summary) -> str:
 def write_object(
     context, obj, path: str, world: bool = True, effort: str = "default", attributes: bool = True, **bound
 ):
-    """Compress the frames of the scene; returns athcodec's Summary. Raises athcodec's errors, OSError."""
+    """Compress the motion of an object in the scene's frames to an .ath file and return athcodec's Summary. `world`
+    takes positions in the world's space, and `bound` has options of the error bound. Raise athcodec's errors, OSError.
+    """
     scene = context.scene
     before, frames = scene.frame_current_final, range(scene.frame_start, scene.frame_end + 1)
     manager = context.window_manager
@@ -124,7 +127,9 @@ def write_object(
 
 
 def encoded(clip, path: str, **options):
-    """Return athcodec.encode, with the pieces of the mesh as branches where none are named and none can be found."""
+    """Encode a clip to a file and return athcodec's Summary. If no branches are named and none can be found, the
+    connected pieces of the mesh are the branches.
+    """
     import athcodec
     from athcodec.motion.branches.finding import pieces
     from athcodec.motion.branches.result import with_branches
@@ -151,8 +156,9 @@ class Recording:
         self._frames, self._first, self._shape, self._static = [], None, None, {}
 
     def add(self, context, frame: int) -> None:
-        """Add the object in this frame, which the scene is at. Raises ValueError where it has other vertices or
-        faces."""
+        """Add the object's positions in a frame that the scene shows at present. Raise ValueError if the number of
+        vertices or the faces have changed.
+        """
         evaluated = self._obj.evaluated_get(context.evaluated_depsgraph_get())
         mesh = evaluated.to_mesh()
         try:
@@ -171,7 +177,7 @@ class Recording:
         self._spool.write(positions.tobytes())
 
     def clip(self, scene):
-        """Return the MotionClip of the frames."""
+        """Return the recorded frames as a MotionClip."""
         from athcodec.motion.clip import MotionClip
 
         self._spool.flush()
@@ -208,6 +214,7 @@ def _shape(mesh) -> tuple[int, int, int, int]:
 
 
 def _positions(mesh, matrix) -> np.ndarray:
+    """Return the positions (N, 3) of a mesh, float32, moved by a 4 by 4 matrix unless it is None."""
     positions = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", positions)
     positions = positions.reshape(-1, 3)
@@ -218,6 +225,9 @@ def _positions(mesh, matrix) -> np.ndarray:
 
 
 def _unit(scene, world: bool) -> dict:
+    """Return the metadata that states the scene's unit; empty if the scene has none or positions are in the object's
+    own space.
+    """
     from athcodec.motion.units import METRES, METRES_PER_UNIT
 
     if scene.unit_settings.system == "NONE" or not world:
@@ -228,8 +238,9 @@ def _unit(scene, world: bool) -> dict:
 
 
 def _static(mesh, obj) -> dict:
-    """Return arguments of MotionClip that do not move, the domains of the attributes, and the names of those left
-    out."""
+    """Return three results: the arguments of MotionClip that are constant in time, such as faces, the domains of
+    attributes by name, and the names of the attributes left out.
+    """
     fields, arrays, domains = {}, {}, {}
     counts = np.empty(len(mesh.polygons), np.int32)
     corners = np.empty(len(mesh.loops), np.int32)
@@ -254,7 +265,9 @@ def _static(mesh, obj) -> dict:
 
 
 def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
-    """Add the attributes that an .ath file holds, and returns the names of the others."""
+    """Add the mesh's attributes that an .ath file can hold to `arrays` and `domains`, and return the names of the
+    others.
+    """
     from athcodec.motion.clip import RESERVED_NAMES
 
     active = mesh.uv_layers.active
@@ -280,6 +293,9 @@ def _add_attributes(mesh, arrays: dict, domains: dict) -> list[str]:
 
 
 def _take_branches(obj, arrays: dict, fields: dict) -> None:
+    """Move the branches that an imported mesh has as attributes from `arrays` to `fields`, the arguments of
+    MotionClip.
+    """
     vertex_branch, stem_index = arrays.pop("vertex_branch", None), arrays.pop("stem_index", None)
     parents = obj.data.get(PARENTS)
     if vertex_branch is not None and parents is not None:
@@ -291,7 +307,9 @@ def _take_branches(obj, arrays: dict, fields: dict) -> None:
 
 
 def _skin(obj, vertex_count: int):
-    """Return the armature that moves the object, for finding its branches."""
+    """Return the skin of the armature that moves the object, from which branches are found: the parents of its bones,
+    the bone with the largest weight at each vertex, and the bones' names. Return None without an armature.
+    """
     from athcodec.motion.clip import Skin
 
     armatures = (modifier.object for modifier in obj.modifiers if modifier.type == "ARMATURE")

@@ -52,7 +52,7 @@ class glTF2ExportUserExtension:
         self._first = {}  # By id: primitives whose vertices are numbered as the motion numbers them.
 
     def pre_export_hook(self, export_settings):
-        """Evaluate the frames of all objects that may move."""
+        """Record the positions of all objects that may move, in all frames of the scene, before the export begins."""
         scene = bpy.context.scene
         if not scene.ath_gltf.use:
             return
@@ -81,7 +81,7 @@ class glTF2ExportUserExtension:
                 yield obj
 
     def gather_attributes_change(self, attributes, export_settings):
-        """Add the numbers of Blender's vertices to those of a mesh."""
+        """Add an attribute to a mesh that has the number of Blender's vertex for each written vertex."""
         if not self._recordings:
             return
         position = next(each for each in attributes if each["gltf_attribute_name"] == "POSITION")
@@ -97,7 +97,7 @@ class glTF2ExportUserExtension:
         attributes.append({"gltf_attribute_name": VERTEX, "skip_getting_to_dots": True, "set": set_vertices} | kind)
 
     def gather_node_hook(self, node, blender_object, export_settings):
-        """Give the mesh of an object its motion."""
+        """Attach the recorded motion of an object to the primitives of its node, by ATH_motion."""
         primitives = node.mesh.primitives if node.mesh is not None else []
         self._primitives += primitives
         recording = self._recordings.get(blender_object.name) if blender_object else None
@@ -119,7 +119,9 @@ class glTF2ExportUserExtension:
                 primitive.attributes.pop(VERTEX, None)
 
     def _motion(self, recording, obj, primitives, export_settings) -> dict:
-        """Return the entry of the motion; primitives number its vertices from now on."""
+        """Return the entry of ATH_motion for a recording. The vertex attribute of the primitives is changed to number
+        the vertices of the motion.
+        """
         if not export_settings["gltf_apply"] and len(obj.data.vertices) != recording.vertex_count:
             raise ValueError(
                 f"{obj.name}: got {recording.vertex_count} vertices that move and {len(obj.data.vertices)} that are "
@@ -153,6 +155,9 @@ class glTF2ExportUserExtension:
         return np.frombuffer(accessor.buffer_view.data, np.float32).reshape(accessor.count, -1)
 
     def _encoded(self, recording, used, rest, export_settings) -> bytes:
+        """Return the motion of the vertices `used` as the bytes of an .ath file, in glTF's axes if the export has y up.
+        `rest` (V, 3) is the rest pose.
+        """
         from athcodec.motion.clip import ClipRange
         from athcodec.motion.frames import Frames
 
@@ -201,6 +206,7 @@ def _draw(context, layout) -> None:
 
 
 def register() -> None:
+    """Register the settings and the panel of the glTF export with Blender."""
     bpy.utils.register_class(AthGltfSettings)
     bpy.types.Scene.ath_gltf = PointerProperty(type=AthGltfSettings)
     try:
@@ -211,6 +217,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    """Remove the settings and the panel of the glTF export from Blender."""
     try:
         from io_scene_gltf2 import exporter_extension_layout_draw
     except ImportError:

@@ -74,6 +74,7 @@ class IMPORT_OT_ath(bpy.types.Operator, ImportHelper):
     )
 
     def execute(self, context):
+        """Add an object for each chosen file, and report the first error in one line."""
         names = [file.name for file in self.files if file.name]
         paths = [os.path.join(self.directory, name) for name in names] or [self.filepath]
         for path in paths:
@@ -122,7 +123,9 @@ def add_object(
     clip: str = "",
     host_mesh: str = "",
 ):
-    """Return a new object in the active collection that plays `path`. Raises OSError, athcodec's errors."""
+    """Add an object that plays the file at `path` to the active collection, and return it. `set_scene` sets the scene's
+    frame rate and range from the file. Raise OSError, athcodec's errors.
+    """
     from athcodec.opening import set_host_mesh_of
 
     path = os.path.normpath(bpy.path.abspath(path))
@@ -170,6 +173,7 @@ def _place(obj, decoder, scene) -> None:
 
 
 def _mesh(name: str, decoder):
+    """Return a new mesh in the rest pose of a decoder's file, with its faces, edges and attributes."""
     from athcodec.motion.clip import polygons
 
     mesh = bpy.data.meshes.new(name)
@@ -200,6 +204,7 @@ def _add_faces(mesh, counts: np.ndarray, indices: np.ndarray) -> None:
 
 
 def _add_attributes(mesh, decoder) -> None:
+    """Add the file's attributes and branches to the mesh, as far as Blender has a type and a domain for them."""
     domains = decoder.metadata.get("domains", {})
     arrays = {**decoder.file.attributes, "vertex_branch": decoder.file.vertex_branch}
     if decoder.file.stem_index is not None:
@@ -220,6 +225,7 @@ def _add_attributes(mesh, decoder) -> None:
 
 
 def _add_uv(mesh, values: np.ndarray, domain: str) -> None:
+    """Add texture coordinates as a UV map. `domain` is "POINT" or "CORNER"; those of faces are left out."""
     if domain == "FACE":
         return
     if domain == "POINT":

@@ -17,6 +17,7 @@ class OBJECT_PT_ath(bpy.types.Panel):
         return context.object is not None and context.object.type == "MESH"
 
     def draw(self, context) -> None:
+        """Draw the panel: the settings of the object's file, and facts of it or what is wrong with it."""
         obj, layout = context.object, self.layout
         layout.use_property_split = True
         layout.prop(obj.ath, "filepath")
@@ -35,6 +36,9 @@ class OBJECT_PT_ath(bpy.types.Panel):
 
     @staticmethod
     def _facts(obj) -> list[str]:
+        """Return lines about the shown level, its error, and the frames and vertices of the file; one line with the
+        error if it cannot be opened.
+        """
         try:
             decoder = player.decoder_for(obj)
         except Exception as error:  # shown, not raised while drawing

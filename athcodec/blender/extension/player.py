@@ -19,8 +19,9 @@ _busy = False
 
 
 def decoder_of(path: str, clip: str = ""):
-    """Return the decoder of a clip of a file ("": of its first), opened again where the file has changed. Raises
-    OSError, athcodec's errors."""
+    """Return a decoder of the file's clip with a name, or of its first clip for "". The file is opened again if it has
+    changed. Raise OSError, athcodec's errors.
+    """
     import athcodec
 
     status = os.stat(path)
@@ -73,7 +74,7 @@ def level_of(obj, decoder) -> int:
 
 
 def place_in(decoder, settings, scene) -> float:
-    """Return the frame of the file, a fraction between two of them, that the scene's frame shows."""
+    """Return the frame of the file, with a fraction between two frames, that the scene shows at its current frame."""
     rate = scene.render.fps / scene.render.fps_base
     seconds = (scene.frame_current_final - settings.frame_offset) / rate * settings.speed
     time = decoder.time - decoder.time[0]
@@ -98,7 +99,7 @@ def positions_at(decoder, place: float, level: int) -> np.ndarray:
 
 
 def show(obj, scene) -> None:
-    """Put the scene's frame into an object; what goes wrong is kept for the panel and printed once."""
+    """Move an object's vertices to the scene's current frame. An error is kept for the panel and printed once."""
     if _busy or obj.type != "MESH" or not obj.ath.filepath or obj.mode == "EDIT":
         return
     try:
@@ -112,6 +113,9 @@ def show(obj, scene) -> None:
 
 
 def _show(obj, scene) -> None:
+    """Move an object's vertices to the scene's current frame. Raise ValueError if the mesh has another number of
+    vertices than the file.
+    """
     decoder = decoder_for(obj)
     mesh = obj.data
     if len(mesh.vertices) != decoder.file.vertex_count:
@@ -138,7 +142,9 @@ def _on_load(*_) -> None:
 
 @persistent
 def _on_save(target=None, *_) -> None:
-    """Make paths relative to the new folder of a .blend: Blender leaves those of an extension as they are."""
+    """Change the paths of files to be relative to the new folder of the .blend that is saved, because Blender does not
+    change those of an extension.
+    """
     global _busy
     if not isinstance(target, str) or not target:
         return
@@ -159,7 +165,7 @@ def _on_save(target=None, *_) -> None:
 
 @persistent
 def _after_save(*_) -> None:
-    """Put paths back where only a copy has been saved elsewhere."""
+    """Restore the paths of files if only a copy of the .blend has been saved elsewhere."""
     global _busy
     _busy = True
     try:
