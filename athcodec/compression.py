@@ -62,59 +62,48 @@ def encode(
     Parameters
     ----------
     source : (frames, vertices, 3) array, MotionClip, Decoder, str or path-like
-        The motion to compress. An array may be anything that slices by frames: NumPy, h5py, zarr, dask; it is never
-        read whole. Integers and float16 are converted, and the summary says so. A path names a file that `read` knows.
+        An array may be anything that slices by frames: NumPy, h5py, zarr, dask. It is never read whole. Integers and
+        float16 are converted, and the summary says so. A path is that of a file that `read` knows.
     target : str, path-like or binary file object, optional
-        The file to write, which appears at a path when it is complete. A path that holds anything but an .ath file, or
-        that has the suffix of another format, is refused. None: return the bytes of the file.
+        A path gets its file when that is whole; other files and names of other formats are refused. None: return bytes.
     **options
-        The parameters below.
+        Those below.
 
     Other Parameters
     ----------------
     faces, vertex_branch, branch_parent, fps, unit, up_axis, axes, dataset : optional
-        For an array: fields of the clip that the array itself does not state, as in MotionClip. By default fps is 30
-        and branches are found. unit is "m", "cm", "mm", "km", "in" or "ft"; up_axis is "x", "y" or "z"; axes is the
-        order of the array's axes, such as "vertices,frames,xyz". For a path, fps and the options after it are passed
-        to `read`.
+        What an array does not say, as in MotionClip; fps is 30 and branches are found unless they are passed. Units are
+        "m", "cm", "mm", "km", "in" and "ft", axes of space "x", "y" and "z"; axes is the order of an array's own, such
+        as "vertices,frames,xyz". With a path, all from fps on are those of `read`.
     max_error, rel_error, target_size : optional
-        Pass at most one. max_error: the largest distance of any vertex in any frame from the source, in scene units or
-        as text, "1mm"; rel_error: this distance divided by the diagonal of all frames (default 1e-4, lossless 4e-7);
-        target_size: the size of the file in bytes, or as text, "50kB".
+        At most one: the largest distance of any vertex in any frame from the source, in scene units or as "1mm"; the
+        same over the diagonal of all frames (default 1e-4, lossless 4e-7); or the bytes of the file, or "50kB".
     ladder : {"decades", "none"} or sequence of float
-        Largest errors, divided by the diagonal, at which decoding can stop; each is held by a layer of the file.
-        "none" makes a single layer. Such a file is a few per cent smaller, and is made for "decades", too, if it seems
-        to be a fifth smaller. Errors below 4 times the bound, or less than 2.5 times apart, make no layer.
+        Largest errors over the diagonal at which decoding can stop, each held by a layer; "none", a single layer, is a
+        few percent smaller, and taken for "decades" where it seems to be a fifth smaller. Errors below 4 bounds, or
+        less than 2.5 times apart, make no layer.
     lossless, exact_rest, host_rest : bool
-        lossless adds a level that equals the source bit for bit; exact_rest stores the rest pose bit for bit;
-        host_rest leaves it out, so that `open` needs it as host_mesh.
+        Add a level that is the source bit for bit; keep the rest pose so; leave it out (`open`, host_mesh).
     rest_error : float, str or Length, optional
-        Largest error of the rest pose: a fraction of the diagonal, a length ("2mm"), or "bound" for the error bound. By
-        default, the rest pose of faces is precise enough to keep their shape at every level; that of other clips is
-        within the error bound.
+        Largest error of the rest pose: a fraction of the diagonal, a length ("2mm") or "bound". By default faces keep
+        their shape at every level, and other rest poses are within the bound.
     weights : str or (vertices,) array, optional
-        A factor on the error bound of each vertex, 4 allows four times the error; or the name of an attribute that has
-        these factors.
+        A factor on the bound for each vertex, or the attribute that has them.
     attributes : {"all", "none"}
-        "all" stores faces, edges and named arrays; "none" leaves them out.
+        "none" drops faces, edges and named arrays.
     effort, smoothness : str
-        effort is how long to search for a smaller file: "fast", "default" or "best". smoothness is how many bytes may
-        be spent on errors of growing plants that change smoothly: "bytes" (none), "default", or "motion" (up to twice
-        the file).
+        How long to search ("fast", "default", "best"), and how many bytes steady errors of growth may cost ("bytes":
+        none, "default", "motion": twice the file).
     segment_frames, jobs : int, optional
-        segment_frames is the largest number of frames that are decoded together, 16 to 256. jobs is the number of
-        threads, which does not change the file.
+        Longest run of frames that is decoded at once, 16 to 256; threads, which do not change the file.
     tam : Thresholds, optional
-        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3), in place of those that follow from the
-        error bound.
+        Acceptance thresholds of the ATH (Song, Yang and Peng 2011, section 3) in place of those that the bound allows.
     progress : callable, optional
-        A function that is called with the phase of the work, as text, and the fraction that is done, which never falls
-        and ends with 1.0.
+        Called with the phase of the work and the fraction that is done, which never falls and ends with 1.0.
 
     Returns
     -------
     Summary, or bytes if target is None
-        Size, bound and errors of the file, or the file itself.
 
     Raises
     ------

@@ -145,6 +145,13 @@ LARGEST = {"module": (600,), "class": (300, 25), "function": (60, 6)}
 """Lines, and then methods of a class or arguments of a function that may be passed without a name."""
 
 
+def lines_without_docstrings(part: ast.ClassDef | ast.FunctionDef) -> int:
+    """Return the lines of a class or function, without the docstrings of it and of what is in it."""
+    documented = (node for node in ast.walk(part) if isinstance(node, (ast.ClassDef, ast.FunctionDef)))
+    texts = (ast.get_docstring(node, clean=False) for node in documented)
+    return part.end_lineno - part.lineno + 1 - sum(text.count("\n") + 1 for text in texts if text is not None)
+
+
 def large_parts(tree: ast.Module, module: str) -> set[str]:
     """Return the names of a module and of what is in it that are larger than `LARGEST`."""
     large = {module} if tree.body and tree.body[-1].end_lineno > LARGEST["module"][0] else set()
@@ -153,12 +160,11 @@ def large_parts(tree: ast.Module, module: str) -> set[str]:
         for part in ast.iter_child_nodes(node):
             name = f"{place}.{getattr(part, 'name', '')}"
             if isinstance(part, ast.ClassDef):
-                sizes = part.end_lineno - part.lineno + 1, sum(isinstance(one, ast.FunctionDef) for one in part.body)
+                sizes = lines_without_docstrings(part), sum(isinstance(one, ast.FunctionDef) for one in part.body)
                 large.update({name} if sizes[0] > LARGEST["class"][0] or sizes[1] > LARGEST["class"][1] else ())
             elif isinstance(part, ast.FunctionDef):
-                text = (ast.get_docstring(part, clean=False) or "").count("\n") + 1
                 named = [one.arg for one in part.args.args if one.arg not in ("self", "cls")]
-                sizes = part.end_lineno - part.lineno + 1 - text, len(named)
+                sizes = lines_without_docstrings(part), len(named)
                 large.update({name} if sizes[0] > LARGEST["function"][0] or sizes[1] > LARGEST["function"][1] else ())
             look(part, name if hasattr(part, "name") else place)
 
