@@ -248,8 +248,9 @@ def _text(one: Order) -> str:
 
 
 def _order_rows(store: Store, halves: Mapping[str, list[Case]], rel_error: float, learned: Order) -> list[dict]:
-    """Return a row for each choice in the learned order: the per cent of the bytes that it saves and of the work that
-    it takes, on average over each half of the clips.
+    """Return the rows of a table of the search's choices, one for each choice in the learned order. A row has, for each
+    half of the clips, two averages over its clips: by how many per cent the choice makes the files smaller when all
+    choices before it have been made, and how many per cent of the work that an encoding may take it needs.
     """
     names, rows = (*learned[0], *STEPS, *learned[1]), []
     for number, name in enumerate(names):

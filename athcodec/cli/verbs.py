@@ -205,7 +205,9 @@ def _batch_settings(args: argparse.Namespace) -> JsonObject:
 
 
 def hierarchy(args: argparse.Namespace) -> int:
-    """Run `athcodec hierarchy` and return its exit code."""
+    """Find the branches of a clip, print how many there are of each order, and save them to a JSON file if `--save`
+    names one: the command `athcodec hierarchy`. Return the exit code.
+    """
     if args.save:
         check_output(args.save, args.input, suffix=".json")
     with read_clip(args, args.input) as clip, naming(args.input), progress() as report:
@@ -512,7 +514,10 @@ def picture(args: argparse.Namespace) -> int:
 
 
 def demo(args: argparse.Namespace) -> int:
-    """Run `athcodec demo` and return its exit code."""
+    """Compress a sample plant into an .ath file, measure the error of each of its levels, write a page that shows the
+    plant, and print what was found: the command `athcodec demo`. With `--keep`, keep the file and each level in a
+    folder. Return the exit code.
+    """
     with tempfile.TemporaryDirectory() if args.keep is None else nullcontext(args.keep) as folder:
         Path(folder).mkdir(parents=True, exist_ok=True)
         source = athcodec.sample_path(args.sample)

@@ -101,7 +101,9 @@ class FileDecisions:
 
     @contextmanager
     def refusing(self, bound: float) -> Iterator[None]:
-        """Let a BoundError of coding at a bound name the smallest bound that can be kept."""
+        """Return a context in which a BoundError, raised while coding at `bound`, is replaced by one that names the
+        smallest bound that this clip can keep, if one is found.
+        """
         try:
             yield
         except BoundError:
@@ -114,7 +116,9 @@ class FileDecisions:
             ) from None
 
     def _smallest_kept(self, low: float) -> float:
-        """Return the smallest bound above `low` that a file was found to keep."""
+        """Return the smallest bound above `low` that trials of a few bounds found to be kept, or infinity if none
+        was.
+        """
         high = math.inf
         for _ in range(REFUSAL_ROUNDS):
             bound = qz.rounded_up(4 * low if high == math.inf else math.sqrt(low * high))
@@ -129,8 +133,9 @@ class FileDecisions:
         return self._holding(bound)._tried(bound, work, frames_ratio)
 
     def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
-        """Return the estimated bytes of a file of `frames_ratio` times the frames, and whether its motion is
-        predicted."""
+        """Return two things: the estimated bytes of a file at `bound` that has `frames_ratio` times as many frames as
+        the clip, infinite if the bound cannot be kept; and whether the motion of that file is predicted.
+        """
         try:
             self._check(bound)
             if self.source.still:
@@ -149,7 +154,9 @@ class FileDecisions:
             return math.inf, False
 
     def decide(self, bound: float) -> Decided:
-        """Search for the settings of a file that keeps the bound, and return them with all that follows from them."""
+        """Decide about a file that keeps `bound`: search for the settings of what moves, settle what stands still
+        beside it, and return both with the layers, streams and segments that follow from them.
+        """
         self._check(bound)
         holding = self._holding(bound)
         split = holding._split(bound, self.thresholds(bound))
@@ -168,8 +175,10 @@ class FileDecisions:
         return decided
 
     def _with_levels(self, decided: Decided, work: Work) -> Decided:
-        """Return what is decided with finer layers where motion moves less smoothly in coarse ones than in the source,
-        as in calms between gusts, so that too few stages are fit for levels."""
+        """Return `decided`, or a decision with finer layers if it gives a file more levels. Coarse layers give too few
+        where the motion that they show is less smooth than the source's, as in calms between gusts. Finer ones are
+        tried for the usual ladder alone, and as far as the work allows to code typical segments.
+        """
         if not self._has_usual_ladder or len(decided.layers.each) == 1:
             return decided
         with work.trying("levels"):
@@ -189,8 +198,9 @@ class FileDecisions:
             return best
 
     def _may_code_typical_segments(self, decided: Decided, work: Work) -> bool:
-        """Return whether typical segments are coded, or there is work left to code them. It counts unless the file
-        takes all of them as they are then."""
+        """Return whether the typical segments have been coded already, or there is work left to code them. If they
+        still have to be coded, their work is counted here as done.
+        """
         typical = [segment for segment, _ in typical_segments(decided.source)]
         if all(segment in decided.tried or decided.source.stands_alone(segment) for segment in typical):
             return True
@@ -221,7 +231,9 @@ class FileDecisions:
         return SplitSource.of(self.source, self.seen.ath(thresholds), bound)
 
     def _of_choice(self, choice: Choice, thresholds: Thresholds) -> Decided:
-        """Return the layers and streams that follow from a choice of settings for all branches."""
+        """Return the decision about a file whose settings are already chosen, for moving and still branches alike: the
+        layers and streams that follow from `choice`, with the hierarchy that TAM gives for `thresholds`.
+        """
         bound = choice.settings.bound
         split = self._split(bound, thresholds)
         source = self.source if split is None else split.marked
@@ -239,8 +251,9 @@ class FileDecisions:
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
     def _decide(self, bound: float, work: Work) -> Decided:
-        """Return what is decided about a file at a bound with so much work: its search, its layers or its
-        prediction."""
+        """Decide about a file at `bound`, all of whose branches are searched, within the allowed `work`: its settings
+        and layers or its prediction, and the length of its segments.
+        """
         ath = self.seen.ath(self.thresholds(bound))
         ratios = self._layer_ratios(ath, bound, self.options.ladder)
         ratio = ratios[0]
@@ -266,8 +279,10 @@ class FileDecisions:
         return best
 
     def _searched(self, search: Search, share: float, work: Work) -> Decided:
-        """Return the file that a search finds, or one of predicted motion if that takes at most `share` of its
-        bytes."""
+        """Return the decision for the best settings that `search` finds, or for predicted motion if a file with it
+        takes at most `share` times the bytes of the file with those settings. Raises BoundError if neither keeps the
+        bound.
+        """
         bound, unsearched = search.trials.start.bound, share * search.first_cost()
         if math.isfinite(unsearched):
             work.allowed -= FILE_BYTE * unsearched
@@ -315,7 +330,10 @@ class FileDecisions:
         return (MOTION * (1 + layers) / 2 + STAGE_MOTION * stages) * self.clip.vertex_count * frames
 
     def _best_of(self, search: Search, choices: list[Choice], prelude: CodedPrelude) -> Decided:
-        """Return the best of what a search has found: the first of it, and others for which there is work left."""
+        """Return the decision, of those for the `choices` of a search, that makes the smallest file. The first choice
+        is always among those compared, the others only while there is work left to code typical segments with them.
+        `prelude`: the hierarchy and poses as coded for these choices.
+        """
         trials = search.trials
         frames = sum(trials.source.frames_of(segment) for segment, _ in typical_segments(trials.source))
         each, coded = self._coding_work(trials.start.bound, frames), choices[:1]
@@ -362,7 +380,9 @@ class FileDecisions:
         return Decided(ath, choice, prelude, layers, source)
 
     def _estimated_bytes(self, decided: Decided) -> float:
-        """Return the bytes of the motion of a file whose segments are like typical ones."""
+        """Return the estimated bytes of a file, without its exact numbers, from typical segments: they are coded, and
+        each counts for the number of frames of the file that it stands for.
+        """
         total = float(decided.shared_bytes)
         for segment, frames in typical_segments(decided.source):
             coded = self._tried_segment(decided, segment)
@@ -391,6 +411,9 @@ class FileDecisions:
         return Decided(ath, choice, prelude, layers, source)
 
     def draft(self, decided: Decided) -> Draft:
+        """Return a record of `decided` from which other processes can code the segments of the file without a
+        search.
+        """
         options = self.options
         if not decided.choice.predicted:
             options = dataclasses.replace(options, segment_frames=decided.source.segment_frames)
@@ -412,8 +435,9 @@ class FileDecisions:
         return self._holding(draft.choice.settings.bound)._decided(draft)
 
     def _decided(self, draft: Draft) -> Decided:
-        """Return what follows from the choice of a draft. Raises ClipError if hierarchy or rest pose are not those of
-        the draft."""
+        """Return the decision that a draft records, made anew from its choice and thresholds. Raises ClipError if the
+        hierarchy or the rest pose that follow here are not those of the draft.
+        """
         decided = self._of_choice(draft.choice, draft.thresholds)
         if decided.fingerprint != draft.fingerprint:
             raise ClipError(

@@ -80,8 +80,9 @@ def _checked(
     tam: Thresholds | None = None,
     **options: Any,
 ) -> tuple[BoundOption, EncodingOptions]:
-    """Return the options with lengths in the units of the clip. Raises ClipError for a clip whose unit or up axis is
-    unknown, and the errors of the options."""
+    """Return two things: the bound that is asked for, and the other options, with lengths in the units of the clip.
+    Raises ClipError for a clip whose unit or up axis is unknown, and the errors of the options.
+    """
     for clip_range in clip.clip_ranges or (ClipRange("", clip.frame_count),):
         stated_scene(metadata_of(clip.metadata, clip_range.name))
     unit = scene_unit(clip.metadata)
@@ -200,9 +201,10 @@ def write(
 def _decided(
     clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress, known: PlacedClip | None = None
 ) -> tuple[FileDecisions, float, Decided]:
-    """Return what decides about a file, its bound in scene units, and what is decided. Trials estimate, so effort
-    "best" decides as "default" does, too, and keeps what makes the smaller file. known: the clip's places, which do not
-    depend on the effort; None: they are found here."""
+    """Decide about the file of a clip. Return three things: the object that makes its decisions, the bound in scene
+    units, and the decision. As trials estimate sizes, effort "best" also decides as "default" does, and keeps the
+    smaller file. `known`: the clip's places, which do not depend on the effort, or None if they have to be found.
+    """
     if known is None:
         clip.check()
         known = placed_clip(clip, options, option.least(clip))
@@ -235,7 +237,9 @@ def _is_compared(option: BoundOption, options: EncodingOptions) -> bool:
 
 
 def _bound(decisions: FileDecisions, option: BoundOption, report: Progress) -> float:
-    """Return the bound of a file in scene units."""
+    """Return the bound of a file in scene units, for which files of several bounds are measured if a target size is
+    asked for.
+    """
     attempts = itertools.count(1)
 
     def file_size(bound: float) -> float:
@@ -265,7 +269,9 @@ def _weighted_progress(
 
 
 def _phase_weights(clip: MotionClip, option: BoundOption, options: EncodingOptions, motion: bool) -> dict[str, float]:
-    """Return about how much work each phase of an encoding takes. motion: whether segments are coded, too."""
+    """Return about how much work each phase of an encoding takes, as {phase: work}. `motion`: whether segments are
+    coded, too.
+    """
     segments = split_segments(clip.frame_count, clip.vertex_count, options.segment_frames, ct.Limits.memory_bytes)
     return phase_weights(
         clip.vertex_count,

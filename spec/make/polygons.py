@@ -78,8 +78,9 @@ def edges(content: bytes) -> Callable[[], Draft]:
 
 
 def recent(_: bytes) -> None:
-    """Decode, with FORMAT.md's code, a triangle whose corners are vertex 0 and vertices among the most recent
-    corners.
+    """Run FORMAT.md's model of faces on a script of decisions for one triangle, whose first corner is guessed to be
+    vertex 0, and one of whose corners is chosen from the list of the most recent corners by its place in the list. The
+    argument, the bytes of a vector, is not used.
     """
     coder, model = rules.RangeDecoder(b""), rules.PolygonModel(range(5))
     decisions = [(model.guessed[1][0][0], 1), (model.guessed[1][1][2], 0), (model.is_recent[1], 1)]

@@ -77,7 +77,10 @@ class FileAssembly:
     def write(
         self, path: str | PathLike[str] | None, out: BinaryIO, spool: writing.Spool, coded: Iterable[CodedSegment]
     ) -> Summary:
-        """Write the whole file into `out`, which is to become `path`."""
+        """Write the whole file to the stream `out`, decode it once as a check, and return its summary. `path`: the name
+        that the file is to have afterwards, for the summary; `spool`: holds the chunks until they are written; `coded`:
+        the segments of the file, each once.
+        """
         result = self._fill(writing.ChunkStore(spool), coded)
         chunks = result.store.write(out, result.header, result.errors)
         if any(clip_range.loop for clip_range in self.clip.motion.clip_ranges):
@@ -92,7 +95,9 @@ class FileAssembly:
         return summary
 
     def _fill(self, store: writing.ChunkStore, coded: Iterable[CodedSegment]) -> _Result:
-        """Add all chunks of a file to a store."""
+        """Add all chunks of a file to `store`, and return what is known of the file then. `coded`: the segments of the
+        file, each once.
+        """
         decided, layers = self.decided, self.decided.layers
         self._add_prelude(store)
         for (stage, kind), content in layer_chunks(layers).items():
@@ -150,7 +155,10 @@ class FileAssembly:
         return after - before
 
     def _seams(self, decoder: Decoder) -> tuple[Seam, ...]:
-        """Return the seams of the loops of the file just written."""
+        """Return for each clip of the file that loops its seam: how far the source moves from the last frame to the
+        first one, how far at most from frame to frame beside the seam, and the error at the seam of the finest level.
+        `decoder`: the file just written.
+        """
         seams = []
         for clip, (start, stop) in zip(decoder.file.clips, self.clip.motion.clip_range_frames):
             if clip.loop:
@@ -162,7 +170,7 @@ class FileAssembly:
         return tuple(seams)
 
     def _add_prelude(self, store: writing.ChunkStore) -> None:
-        """Add the chunks that decoding begins with: hierarchy, rest poses, times and places."""
+        """Add to `store` the chunks that decoding begins with: hierarchy, rest poses, times and places."""
         decided = self.decided
         store.add(ct.HIERARCHY, decided.prelude.hierarchy_stream)
         store.add(ct.REST, writing.pack_rest(decided.layers.rest))
@@ -197,7 +205,7 @@ class FileAssembly:
         return polygons.pack(Polygons.of_rows(edges), places)
 
     def _add_static(self, store: writing.ChunkStore) -> None:
-        """Add the chunks of attributes, faces, edges and metadata."""
+        """Add to `store` the chunks of what does not move: attributes, faces, edges and metadata."""
         source = self.clip.placed.source
         attributes = self._stored(source.attributes, lambda weights: {weights.name: weights.array})
         if self._keeps_static and len(attributes) > ct.Limits.attributes:
@@ -218,8 +226,10 @@ class FileAssembly:
     def _add_motion(
         self, store: writing.ChunkStore, coded: Iterable[CodedSegment]
     ) -> tuple[np.ndarray, np.ndarray, list[int]]:
-        """Return (levels, segments, 3) errors and (levels, segments) joins of the stages that become levels, and which
-        stages these are. Raises ValueError unless each segment comes once."""
+        """Add the chunks of all segments to `store`, choose which stages become levels, and remove chunks that no level
+        needs. Return three things about these levels: their errors by each of MEASURES, (levels, segments, 3); their
+        joins, (levels, segments); and the numbers of their stages. Raises ValueError unless each segment comes once.
+        """
         decided = self.decided
         stages, count = decided.layers.stage_count + self.options.lossless, decided.segment_count
         errors, joins = np.zeros((stages, count, len(MEASURES))), np.zeros((stages, count), np.uint8)
@@ -259,8 +269,10 @@ class FileAssembly:
         return chosen_levels(errors, frames, flaws, diagonal, self.options.lossless, first_held)
 
     def _summary(self, path: Path | None, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:
-        """Return the summary of a file that was written, with its bytes by kind of chunk and the choices of the
-        search."""
+        """Return the summary of a file that has been written, with the bytes of each kind of chunk and the choices that
+        the search made. `path`: the file's name, or None; `result`: what `_fill` returned; `chunks`: those of the file;
+        `decoder`: the file itself.
+        """
         decided = self.decided
         sizes: dict[str, int] = {}
         for chunk in chunks:

@@ -36,6 +36,9 @@ class SegmentCoder:
         return chain(tried, self._coded(others)) if others else tried
 
     def _coded(self, segments: Sequence[int]) -> Iterator[CodedSegment]:
+        """Code some segments on several threads, and yield each as it is finished, in the order of `segments`. A
+        segment that one of these is joined to is coded too, but not yielded unless it is among them.
+        """
         decided, source = self.decided, self.decided.source
         at_once = thread_count(self.options.jobs, source)
         pool = ThreadPool(at_once, beside=source.pool.jobs > 1)
@@ -88,8 +91,10 @@ class SegmentCoder:
 
     @staticmethod
     def _in_order(source: Source, segments: Sequence[int]) -> list[tuple[int, bool]]:
-        """Return the segments, and whether each is wanted: right before it stands the one that it is joined to, which
-        may be there for its ends alone."""
+        """Return pairs of a segment to code and whether it is wanted as a result, in the order in which to code them.
+        Right before a segment that is joined to another one comes that other one; it is not wanted if it is coded for
+        its ends alone.
+        """
         order: list[tuple[int, bool]] = []
         for index in segments:
             before = source.segment_before(index)
@@ -101,8 +106,10 @@ class SegmentCoder:
     def _linked(
         self, order: Sequence[tuple[int, bool]]
     ) -> Iterator[tuple[int, list[np.ndarray], Ends | None, Ends | None]]:
-        """Yield each segment, its positions if they have to be read, the ends that it goes on from, and room for its
-        own if the next one goes on from it."""
+        """Yield four things for each segment of `order`: its number; its block of positions in a list, which is empty
+        if the search already holds them; the ends of the segment that it is joined to, or None; and the object that is
+        to hold its own ends, or None if the next segment is not joined to it.
+        """
         decided = self.decided
         goes_on = [is_wanted and decided.source.segment_before(index) is not None for index, is_wanted in order]
         ends: Ends | None = None

@@ -101,6 +101,7 @@ class Summary:
         return f"<Summary: {self}; {counted(len(self.levels), 'level')}>"
 
     def _repr_html_(self) -> str:
+        """Return the summary as HTML, which notebooks show."""
         rows = [
             [f"{level.level}", level.name, f"{level.nodes:,}", f"{level.bytes:,}"]
             + [f"{error:.3g}" for error in (level.max_error, level.p99_error, level.rms_error)]

@@ -36,8 +36,10 @@ def stored_polygons(clip: MotionClip, options: EncodingOptions) -> Polygons | No
 def hierarchy_and_pose(
     placed: PlacedClip, branches: Found | None, options: EncodingOptions
 ) -> tuple[Hierarchy, np.ndarray]:
-    """Return the hierarchy of a clip's places, and the pose that their motion is coded about, (P, 3) float64 in file
-    order: the rest pose, or one that shows more of the plant. branches: those that were found for a clip without."""
+    """Return two things: the hierarchy of a clip's places, and the reference pose that their motion is coded about, (P,
+    3) float64 in file order, which is the rest pose or a pose that shows more of the plant. `branches`: the branches
+    that were found for a clip that states none; None for other clips.
+    """
     clip = placed.clip
     if options.keeps_rest:
         pose = host_rest(clip) if options.host_rest else clip.rest
@@ -82,7 +84,10 @@ class CodedClip:
         pose: np.ndarray,
         options: EncodingOptions,
     ) -> CodedClip:
-        """Return the record of a clip; hierarchy, pose: as `hierarchy_and_pose` returns them."""
+        """Make the record of a clip as it is coded. `placed`: the clip and its places; `branches`: those that were
+        found for a clip that states none; `hierarchy`, `pose`: the hierarchy and the reference pose that
+        `hierarchy_and_pose` returns.
+        """
         clip, order, places = placed.clip, hierarchy.vertex_source, placed.places
         stored = host_rest(clip) if options.host_rest else clip.source_rest
         rest, reference = stored.astype(np.float64), None
@@ -145,8 +150,10 @@ class CodedClip:
         return all(np.array_equal(frame, self.source_rest) for frame in frames)
 
     def among(self, vertices: np.ndarray, hierarchy: Hierarchy, with_faces: bool = False) -> CodedClip:
-        """Return the record of some vertices, ascending in file order. hierarchy: theirs, whose `vertex_source` counts
-        them in the order of `motion`; with_faces: with the faces all of whose corners are among them."""
+        """Return the record of a part of the clip, which has some of its vertices alone. `vertices`: their numbers in
+        file order, ascending; `hierarchy`: the hierarchy of these vertices, whose `vertex_source` counts them in the
+        order of `motion`; `with_faces`: whether to keep the faces all of whose corners are among them.
+        """
         motion, chosen = self.motion, np.sort(self.hierarchy.vertex_source[vertices])
         frames = Frames(
             lambda start, stop: motion.block(start, stop)[:, chosen], motion.frame_count, len(chosen), motion.dtype

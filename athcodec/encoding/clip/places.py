@@ -60,7 +60,9 @@ class PlacedClip:
         return self.clip.source_rest if pose is None else pose
 
     def apart(self, zeros_differ: bool = False) -> PlacedClip | None:
-        """Return the clip with parts of its mesh apart that touch at single places; None: none do."""
+        """Return this clip with more places: parts of its mesh that touch at a single place, and not along a side of a
+        face, get places of their own there. Return None if no parts touch like that. `zeros_differ` has no effect.
+        """
         if not self.places.are_shared or self.clip.polygons is None:
             return None
         part = parts_by_sides(self.source, self.places)
@@ -91,10 +93,11 @@ class PlacedClip:
 def find_places(
     clip: MotionClip, labels: Sequence[np.ndarray] = (), zeros_differ: bool = False, most_error: float = 0.0
 ) -> Places:
-    """Return the places of a clip: vertices are at one if all their coordinates are equal in the rest pose and in every
-    frame, and they are of the same branch, object and copy, as far as the source says. Vertices of different faces that
-    stay within `most_error` of each other are at one, too, if there are many: programs compute or print the position
-    of a place more than once, with different roundings.
+    """Find the places of a clip, that is, which vertices coincide for ever. Two vertices are at one place if all their
+    coordinates are equal in the rest pose and in every frame, and if they are of the same branch, object and copy, as
+    far as the source tells these. Vertices that stay within `most_error` of each other, and would not make two corners
+    of a face meet, are put at one place, too, if that takes away at least 2 % of the places: programs compute or print
+    the position of a place more than once, with different roundings.
 
     Parameters
     ----------
@@ -126,8 +129,11 @@ def find_places(
 
 
 def _in_order_of_stems(clip: MotionClip, places: Places) -> Places:
-    """Return places that keep the order along stems that a source states: vertices share one only where they follow
-    each other there as they do in the source."""
+    """Divide places whose vertices do not follow each other along a stem, so that the order along stems that the source
+    states (`stem_index`) can be kept. Vertices of one of the given `places` stay together only where they are
+    consecutive in the order of branch and stem index, and their numbers ascend there. Return the divided places, or
+    `places` itself if the clip states no such order.
+    """
     if clip.stem_index is None or clip.vertex_branch is None:
         return places
     order = np.lexsort((clip.stem_index, clip.vertex_branch))
@@ -139,7 +145,9 @@ def _in_order_of_stems(clip: MotionClip, places: Places) -> Places:
 
 
 def clip_of_places(clip: MotionClip, places: Places) -> MotionClip:
-    """Return the clip with the first vertex of each place."""
+    """Return a clip that has one vertex for each of `places`: the first vertex of the place in `clip`. Its frames are
+    read from `clip` when they are asked for.
+    """
     first, of_vertex = places.first, places.of_vertex
     positions = Frames(
         lambda start, stop: np.take(clip.block(start, stop), first, axis=1), clip.frame_count, len(first), clip.dtype
@@ -171,7 +179,10 @@ def clip_of_places(clip: MotionClip, places: Places) -> MotionClip:
 
 
 def _attributes(clip: MotionClip, places: Places) -> dict[str, np.ndarray]:
-    """Return the arrays of a clip with a row for each place in the stead of each vertex."""
+    """Return the attributes of a clip by name, where arrays of one row per vertex are replaced by arrays of one row per
+    place, that of its first vertex. Corners of polygons and counts of vertices of parts are renumbered for places
+    likewise.
+    """
     domains = clip.metadata.get("domains")
     domains = domains if isinstance(domains, dict) else {}
     arrays = {}
@@ -196,7 +207,10 @@ def _labels(clip: MotionClip) -> list[np.ndarray]:
 
 
 def _edge_parts(clip: MotionClip) -> list[np.ndarray]:
-    """Return the connected part of each vertex of centre lines, which may cross at a point and yet be no one's fork."""
+    """Return a list of one label array, (N,), that keeps apart centre lines that cross at a point without a fork: the
+    number of the connected part of each vertex. The list is empty unless the clip consists of centre lines without
+    cycles and without branches, whose edges would close cycles if coinciding vertices were joined.
+    """
     if clip.edges is None or clip.has_branches or clip.polygons is not None:
         return []
     if not is_forest(clip.edges, clip.vertex_count):
@@ -208,7 +222,9 @@ def _edge_parts(clip: MotionClip) -> list[np.ndarray]:
 
 
 def _parts_of_edges(edges: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Return (N,) the smallest vertex of the connected part that each vertex belongs to, from edges (E, 2)."""
+    """Return the connected part of each vertex, (N,), named by the smallest vertex in it. `edges`: (E, 2) pairs of
+    vertices that are connected.
+    """
     label = np.arange(vertex_count)
     ends = edges.astype(np.int64)
     while (label[ends[:, 0]] != label[ends[:, 1]]).any():
@@ -219,7 +235,10 @@ def _parts_of_edges(edges: np.ndarray, vertex_count: int) -> np.ndarray:
 
 
 def _leaders_of_first_frame(clip: MotionClip, labels: Sequence[np.ndarray], zeros_differ: bool) -> np.ndarray:
-    """Return for each vertex the first one with its labels and its positions in rest pose and first frame, (N,)."""
+    """Return for each vertex its leader, (N,): the first vertex that has the same labels, and the same position both in
+    the rest pose and in the first frame. `labels`: arrays (N,); `zeros_differ`: whether 0.0 and -0.0 are different
+    coordinates.
+    """
     every = np.arange(clip.vertex_count, dtype=np.int32)
     hashes = np.zeros(clip.vertex_count, np.uint64)
     numbers = [np.unique(label, return_inverse=True)[1].reshape(-1) for label in labels]
@@ -240,7 +259,12 @@ def _leaders_of_first_frame(clip: MotionClip, labels: Sequence[np.ndarray], zero
 
 
 def _split(block: np.ndarray, leader: np.ndarray, followers: np.ndarray, zeros_differ: bool) -> np.ndarray:
-    """Give vertices that differ from their leaders in a block of frames others, and return those that follow still."""
+    """Give new leaders, in `leader` (N,), to those followers whose position differs from their leader's in a block of
+    frames. Return the vertices that still have a leader other than themselves.
+
+    `block`: (k, N, 3) positions; `followers`: vertices whose leader is another vertex; `zeros_differ`: whether 0.0 and
+    -0.0 are different coordinates.
+    """
     apart = _are_apart(block, followers, leader[followers], zeros_differ)
     if not apart.any():
         return followers
@@ -276,7 +300,9 @@ def _mix(block: np.ndarray, vertices: np.ndarray, hashes: np.ndarray, zeros_diff
 
 
 def _are_apart(block: np.ndarray, vertices: np.ndarray, others: np.ndarray, zeros_differ: bool) -> np.ndarray:
-    """Return whether each vertex differs from another in any frame of a block."""
+    """Return for each i whether vertices[i] and others[i] have different positions in any frame of a block, (K,) bool.
+    `block`: (k, N, 3) positions; `zeros_differ`: whether 0.0 and -0.0 are different coordinates.
+    """
     block, apart = np.ascontiguousarray(block), np.zeros(len(vertices), np.uint8)
     lib.ath_find_apart(
         *(len(vertices), address(vertices, np.int32, len(vertices)), address(others, np.int32, len(vertices))),
@@ -287,7 +313,10 @@ def _are_apart(block: np.ndarray, vertices: np.ndarray, others: np.ndarray, zero
 
 
 def _join_near(clip: MotionClip, leader: np.ndarray, labels: Sequence[np.ndarray], most_error: float) -> Places:
-    """Return the places of vertices that have leaders, and of those that stay near others."""
+    """Return the places of a clip in which leaders that stay within `most_error` of each other in every frame are
+    joined, too. `leader`: (N,) the first vertex at the place of each vertex; `labels`: arrays (N,) that are equal for
+    vertices of one place.
+    """
     some = np.flatnonzero(leader == np.arange(len(leader))).astype(np.int32)
     label = np.zeros(len(some), np.int32)
     if labels:
@@ -312,8 +341,10 @@ def _join_near(clip: MotionClip, leader: np.ndarray, labels: Sequence[np.ndarray
 
 
 def _share_a_face(clip: MotionClip, leader: np.ndarray, some: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Return which of `some` would meet another corner of a face of theirs, which has no area then, if each were at the
-    place of `near`."""
+    """Return which vertices of `some` must not be moved, (K,) bool: if each some[i] were put at the place of near[i],
+    these would coincide with another corner of one of their faces, which would then have no area. `leader`: (N,) the
+    first vertex at the place of each vertex.
+    """
     if clip.polygons is None:
         return np.zeros(len(some), bool)
     counts, corners = clip.polygons
@@ -336,7 +367,9 @@ def _typical_poses(clip: MotionClip) -> np.ndarray:
 
 
 def _near_leaders(poses: np.ndarray, label: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return for each point of some poses, (k, N, 3), the first one that is near it in all, (N,)."""
+    """Return for each point the first point that is within `tolerance` of it in every pose and has the same label, (N,)
+    int32. `poses`: (k, N, 3) positions; `label`: (N,) int32.
+    """
     points, count = np.ascontiguousarray(poses.transpose(1, 0, 2)), poses.shape[1]
     table, leaders = 1 << count.bit_length(), np.empty(count, np.int32)
     work = np.empty(table + count, np.int32)
@@ -354,7 +387,10 @@ def _numbered(leader: np.ndarray, error: float = 0.0) -> Places:
 
 
 def _alike_in_copies(clip: MotionClip, places: Places) -> Places:
-    """Return places such that the copies of a shape have as many, by joining only what is at one place in all."""
+    """Divide places so that all copies of one shape join the same vertices: two vertices of a copy stay at one place
+    only if their counterparts are at one place in every other copy. Return the new places, or `places` if the clip has
+    no copies.
+    """
     copy, label = copies_of(clip), places.of_vertex.astype(np.int64)
     if not copy.any():
         return places

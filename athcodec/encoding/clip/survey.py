@@ -293,6 +293,10 @@ class Ath:
         return _file_order_frames(positions, self.hierarchy, self.rest.mean(axis=0))
 
     def _path(self, node: int) -> tuple[Pieces, int]:
+        """Return the subtrees of the nodes from the root down to `node`, as pieces of which each hangs on the one
+        before it, and the number of the last piece, which is that of `node`. Raises IndexError for a node that does not
+        exist.
+        """
         if not 0 <= (node := whole("ATH node", node)) < self.node_count:
             raise IndexError(f"ATH node: got {node}, expected 0 to {self.node_count - 1}")
         path = [node]
@@ -303,7 +307,10 @@ class Ath:
         return Pieces.subtrees(self.hierarchy, self.rest, branches, order - 1, order), len(path) - 1
 
     def _cut_pieces(self, level: int) -> tuple[Pieces, np.ndarray, np.ndarray]:
-        """Return all pieces that the cut's maps depend on, those of the cut by first vertex, and which are stems."""
+        """Return three things about the cut at a level: all pieces that its affine maps depend on; the numbers of the
+        pieces that are in the cut, ordered by first vertex; and for each of these whether it is a stem, and not a
+        subtree. Raises ValueError for a negative level.
+        """
         if (level := whole("level of a cut", level)) < 0:
             raise ValueError(f"level of a cut: got {level}, expected 0 to {self.height}")
         hierarchy = self.hierarchy
@@ -418,7 +425,10 @@ class Survey:
         return self.largest_gads[eta] <= thresholds.distances[0]
 
     def _keeps_xi(self, thresholds: Thresholds) -> np.ndarray:
-        """Return whether TAM's second condition holds: in every frame at most lam vertices are beyond xi."""
+        """Return for each surveyed branch, (C,) bool, whether its subtree meets TAM's second condition: in every frame
+        at most `lam` of its vertices are further than `xi` from where the base pose has them. Raises ValueError for
+        thresholds that were not surveyed.
+        """
         lam, (_, xi) = thresholds.lam, thresholds.distances
         if lam == 0:
             return self.largest_distance <= xi
@@ -578,6 +588,9 @@ def build_ath(
 def _thresholds(
     epsilon: LengthLike | None, eta: int, xi: LengthLike | None, lam: int, max_error: LengthLike | None
 ) -> Thresholds:
+    """Return the four thresholds of TAM from a caller's options, where `max_error` stands for both epsilon and xi.
+    Raises ValueError if thresholds are missing, or if `max_error` is given beside epsilon or xi.
+    """
     if max_error is not None:
         if epsilon is not None or xi is not None:
             raise ValueError("ATH thresholds: got max_error beside epsilon or xi, expected one or the other")
@@ -609,6 +622,7 @@ class _Extent:
         return cls(low, high, frames.shape[1], float(moved.sum()), ways)
 
     def __or__(self, other: _Extent) -> _Extent:
+        """Return the extent of the frames of both."""
         return _Extent(
             np.minimum(self.low, other.low),
             np.maximum(self.high, other.high),
@@ -652,7 +666,10 @@ def _tested_pieces(hierarchy: Hierarchy, rest: np.ndarray, branches: np.ndarray)
 
 
 def _prune(hierarchy: Hierarchy, thresholds: Thresholds, rest: np.ndarray, accepted: np.ndarray, max_depth: int) -> Ath:
-    """Keep the branches above which no subtree was accepted."""
+    """Make the ATH whose nodes are the root branches and every branch whose ancestors all failed TAM, so that no
+    subtree around it moves as one affine map. `accepted`: (B,) bool, whether TAM accepts the subtree of each branch as
+    moving by one affine map; `rest`: the base pose, (N, 3) in file order; `max_depth`: no node is deeper than this.
+    """
     depth, parent = hierarchy.branch_depth, hierarchy.branch_parent
     kept = depth == 0
     for level in range(1, min(int(depth.max()), max_depth) + 1):
@@ -673,7 +690,9 @@ def _file_order_frames(
 
 
 def _portions(positions: MotionClip | np.ndarray, vertex_count: int) -> Iterator[np.ndarray]:
-    """Yield frames in working portions as they are, (k,N,3)."""
+    """Yield the frames of `positions` in portions small enough to work on, (k, N, 3) each, in source order and in the
+    dtype that they have. `positions`: a clip, or an array (T, N, 3); raises ValueError for an array of another shape.
+    """
     at_once = max(1, _WORK_VERTICES // vertex_count)
     blocks: Iterator[np.ndarray]
     if hasattr(positions, "blocks"):

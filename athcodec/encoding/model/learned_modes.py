@@ -36,8 +36,9 @@ class Components:
 
 
 def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
-    """Return the components of segments that were analysed with a fine step and without learned modes, so that they
-    describe the motion and not its rounding."""
+    """Return the components of the motion of pieces, from which modes are learned. `segments`: analysed with a fine
+    step and without learned modes, so that the components describe the motion and not its rounding.
+    """
     sizes = np.minimum(plan.ranks, SHAPE_MODES)
     groups = [
         (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
@@ -75,8 +76,9 @@ def _mode_weights(pieces: np.ndarray) -> np.ndarray:
 
 
 def _products(plan: Plan, segment: SegmentMotion, pieces: np.ndarray, count: int) -> np.ndarray:
-    """Return products of the tracks of pieces' first modes with each other, (pieces, count, count), in squared scene
-    units."""
+    """Return for each piece the products of the tracks of its first modes with each other, summed over frames, (P,
+    count, count) in squared scene units. `pieces`: (P,) numbers of pieces; `count`: how many tracks of each are taken.
+    """
     products, first = np.empty((len(pieces), count, count)), plan.first_rows[pieces]
     rows = address(segment.coefficients, np.int32, 0)
     lib.ath_row_products(len(pieces), first.ctypes.data, count, segment.frames, rows, products.ctypes.data)
@@ -93,7 +95,9 @@ def _across(pieces: np.ndarray, size: int) -> np.ndarray:
 
 
 def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None = None) -> LearnedModes:
-    """Return the modes that a motion step makes worth storing, of the pieces `wanted`, (P,) bool, or of all."""
+    """Return the learned modes that are large enough to be worth storing at a step of motion. `seen`: the components of
+    the motion; `wanted`: the pieces that get modes, (P,) bool, or None for all.
+    """
     counts, learned = np.zeros(len(plan.pieces), np.int32), []
     least = step * np.sqrt(seen.frames)
     wanted = np.ones(len(counts), bool) if wanted is None else wanted
@@ -122,8 +126,9 @@ def learn(plan: Plan, seen: Components, step: float, wanted: np.ndarray | None =
 
 
 def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> LearnedModes:
-    """Return the modes of the pieces `wanted`, (P,) bool, with so many binary digits less. Those of a piece end before
-    the first that vanishes."""
+    """Return learned modes for a coarser layer: those of the pieces `wanted`, (P,) bool, whose integers have `digits`
+    fewer binary digits. The modes of a piece end before the first one that vanishes.
+    """
     piece = np.repeat(np.arange(len(modes.counts)), modes.counts)
     integers = np.sign(modes.integers) * (np.abs(modes.integers) + (1 << digits - 1) >> digits)
     dropped = np.cumsum(~(integers.any(axis=1) & wanted[piece]))
@@ -134,8 +139,9 @@ def nested(plan: Plan, modes: LearnedModes, wanted: np.ndarray, digits: int) -> 
 
 
 def _with_duals(counts: np.ndarray, integers: np.ndarray) -> LearnedModes:
-    """Return learned modes from their integers (K, LEARNED_NUMBERS): with their unit vectors, and the duals that
-    project on them."""
+    """Return learned modes with their unit vectors and the duals that project on these. `counts`: the number of modes
+    of each piece, (P,); `integers`: those of the modes, (K, LEARNED_NUMBERS).
+    """
     (units, duals), first = np.zeros((2, *integers.shape)), np.cumsum(counts, dtype=np.int64) - counts
     lib.ath_unit_shapes(len(integers), address(integers, np.int32, 0), address(units, np.float64, 0))
     for count in np.unique(counts[counts > 0]).tolist():

@@ -106,6 +106,11 @@ class Plan:
         predicted: bool = False,
         layer: int = 0,
     ):
+        """Divide branches into pieces and nodes. `branches`: (B,) of _native.BRANCH in file order; `refined`: whether
+        all pieces are of one stage, as in a refinement; `predicted`: whether stems have no streams, as in predicted
+        motion; `layer`: the number of the layer, which decides what is rigid. Raises ValueError if the branches form no
+        hierarchy.
+        """
         self.branches, self.pool, self.predicted = branches, pool, predicted
         self.vertex_count = vertex_count
         piece_count = lib.ath_count_pieces(address(branches, BRANCH, 1), len(branches), vertex_count)
@@ -148,8 +153,9 @@ class Plan:
         return 0 if self.bases is None else self.bases.nbytes
 
     def set_rest(self, rest: np.ndarray, bases: bool = True, like: Plan | None = None) -> None:
-        """Set the decoded rest pose, (N, 3) float64, and build the bases on it, if they are wanted. like: a plan whose
-        bases serve if it has the same pose and pieces."""
+        """Take `rest` as the decoded rest pose, (N, 3) float64, and build the bases of the pieces on it if `bases` is
+        true. `like`: a plan whose bases are used again if it has the same rest pose and the same pieces.
+        """
         vertices, pieces = self.vertex_count, len(self.pieces)
         self.rest = np.ascontiguousarray(rest, np.float64)
         self.core.rest = at = address(self.rest, np.float64, 3 * vertices)
@@ -183,9 +189,10 @@ class Plan:
 
     @cached_property
     def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
-        """Ranges of pieces with large subtrees, in order, and ranges that several threads may process after these:
-        whole subtrees of branches with at most a RANGES-th of the vertices. The last ranges are of trees that stand
-        still, and in none of the others."""
+        """Return three lists of ranges (start, stop) of pieces, which have no piece in common: branches with large
+        subtrees, to be processed first and in order; whole small subtrees, of which threads may then process several at
+        a time; and trees that stand still.
+        """
         most = max(LEAST_RANGE, self.vertex_count // RANGES)
         vertices = np.append(self.branches["first"], self.vertex_count).tolist()
         after = (np.arange(len(self.branches)) + self.branches["subtree"]).tolist()
@@ -221,7 +228,7 @@ class Plan:
         return list(zip(bounds, [*bounds[1:], len(self.nodes)]))
 
     def sample(self, part: int) -> PlanSample:
-        """Return one of so many parts of the pieces, in short runs all along the plant."""
+        """Return a sample of about one piece in `part`, in short runs all along the plant."""
         if part in self._samples:
             return self._samples[part]
         pieces = self.pieces[self.pieces["first"] % PERIOD < PERIOD // part]
@@ -348,6 +355,11 @@ class SegmentMotion:
         *,
         periodic: bool = False,
     ):
+        """Make room for the integers of a segment of `frames` frames, all 0. `streams`: how those of each stage are
+        read; `before`: the integers of the layer that this one refines, or None; `ratio`: the step of that layer over
+        the step of this one; `periodic`: whether waves go on from the last frame to the first. Raises ValueError for
+        wrong numbers of frames or streams.
+        """
         if not 1 <= frames <= SEGMENT_FRAMES or len(streams) != plan.stage_count:
             raise ValueError(
                 f"segment of {frames} frames, {len(streams)} streams: expected 1 to {SEGMENT_FRAMES} "
@@ -450,10 +462,12 @@ class SegmentMotion:
         positions: np.ndarray | None = None,
         bent: bool = False,
     ) -> None:
-        """Fill coefficients and tracks from positions, (N, 3, frames) float64 less the origin, in closed loop.
+        """Quantise the motion of the segment into its coefficients and tracks, in closed loop: each piece is fitted to
+        what a decoder makes of those before it. Trees that stand still keep the rest pose, whatever their positions
+        are.
 
-        positions: filled with what `pose` returns at the last stage, which the closed loop has at hand. bent: leave
-        out rigid pieces on which nothing hangs. Trees that stand still keep the rest pose, whatever the positions are.
+        `source`: (N, 3, frames) float64 less the origin; `positions`: an array to be filled with what `pose` returns at
+        the last stage, which needs `origin`, too, or None; `bent`: leave out rigid pieces on which nothing hangs.
         """
         at, out, place = self._source(source), NO_OUTPUT, None
         if positions is not None and origin is not None:
@@ -469,9 +483,9 @@ class SegmentMotion:
     def analyse_nodes(
         self, source: np.ndarray, stage_steps: np.ndarray, rounding: Rounding, stage: int | None = None
     ) -> None:
-        """Fill the maps of the nodes, or those of one stage, after `analyse` or `pose` unless it is stage 0.
-
-        A map's step is that of its stage, (stage_count,) float64 in scene units, over the root of its vertex count.
+        """Quantise the affine maps of all nodes, or of those of one stage, after `analyse` or `pose` was called (not
+        needed for stage 0). `source`: (N, 3, frames) float64 less the origin; `stage_steps`: (stage_count,) float64 in
+        scene units. A map's step is that of its stage over the root of its vertex count.
         """
         at, steps = self._source(source), address(stage_steps, np.float64, self.plan.stage_count)
         self._nodewise(
@@ -489,8 +503,9 @@ class SegmentMotion:
     def _piecewise(
         self, call: Callable[[Motion, int, int], None], of_still: Callable[[Motion, int, int], None] | None
     ) -> None:
-        """Call with a motion and each range of pieces, those that others hang on first. of_still: called for ranges
-        that stand still instead; None: nothing is."""
+        """Call `call` with a motion and each range of pieces that may move, so that pieces come after those that they
+        hang on. `of_still` is called likewise for ranges that stand still, unless it is None.
+        """
         if self._attach_caches is None:
             self._attach_caches = zeros((lib.ath_attach_cache_size(self.plan.core.attach_cache_rows, self.frames),))
             self.motion.attach_caches = self._attach_caches.ctypes.data
@@ -516,7 +531,9 @@ class SegmentMotion:
         plan.pool.map(self._with_scratch(call), plan.node_ranges if stage is None else of_stage)
 
     def _with_scratch(self, call: Callable[[Motion, int, int], None]) -> Callable[[int, int], None]:
-        """Return the call with scratch memory of its own."""
+        """Return a function of a range of pieces or nodes that calls `call` with this motion and the range, and gives
+        it scratch memory that no other thread uses.
+        """
 
         def run(first: int, stop: int) -> None:
             motion = Motion.from_buffer_copy(self.motion)
@@ -532,8 +549,10 @@ class SegmentMotion:
         return address(source, np.float64, self.plan.vertex_count * 3 * self.frames)
 
     def pose(self, stage: int, origin: np.ndarray, dtype: DTypeLike, room: np.ndarray | None = None) -> np.ndarray:
-        """Return positions at `stage` without corrections, (N, 3, frames) float32 or float64, origin added. room: as
-        many float64, whose memory is to hold them."""
+        """Return the positions that a decoder shows at `stage`, without corrections: (N, 3, frames) of `dtype`, float32
+        or float64, with the origin added. `room`: an array of as many float64, whose memory the result takes; None: new
+        memory is taken.
+        """
         shape = self.plan.vertex_count, 3, self.frames
         if room is None:
             positions = zeros(shape, dtype)
@@ -551,13 +570,16 @@ class SegmentMotion:
 
 
 def gather(block: np.ndarray, vertex_source: np.ndarray, origin: np.ndarray, pool: ThreadPool = SERIAL) -> np.ndarray:
-    """Return source positions, (T, M, 3) float32 or float64 in source order, as (N, 3, T) float64 less the origin.
-    vertex_source: (N,) int32, the N of its M vertices that are wanted."""
+    """Return the positions of some vertices less the origin, as (N, 3, T) float64. `block`: (T, M, 3) float32 or
+    float64 positions in source order; `vertex_source`: (N,) int32, which of the M vertices are wanted, in the order of
+    the result.
+    """
     frames, vertices = len(block), len(vertex_source)
     block = np.ascontiguousarray(block)
     out = zeros((vertices, 3, frames))
 
     def fill(start: int, stop: int) -> None:
+        """Fill the rows of some vertices."""
         lib.ath_gather(
             stop - start,
             frames,
@@ -579,8 +601,9 @@ def _output(origin: np.ndarray, positions: np.ndarray) -> CoreOutput:
 
 
 def squared_bends(positions: np.ndarray) -> np.ndarray:
-    """Return the sums of the squared second differences over time of positions, (N, 3, T), at each frame but the first
-    and the last, (T - 2,)."""
+    """Return for each frame but the first and the last the sum over vertices of the squared second difference over
+    time, (T - 2,). `positions`: (N, 3, T).
+    """
     positions, sums = np.ascontiguousarray(positions), np.zeros(max(positions.shape[2] - 2, 0))
     lib.ath_add_bends(
         3 * len(positions),
@@ -602,13 +625,20 @@ def position_errors(
     *,
     rounding: float = 0.0,
 ) -> tuple[float, float, float]:
-    """Return the distance of decoded positions from the source by each of MEASURES, the second rounded up for files.
-    shown: how many frames of the clip show each frame, (T,) int32; shares: how many vertices of the source are at each
-    place, (N,) int32; None: one. rounding: added for a decoder that rounds to the other side."""
+    """Return the largest, the 99th percentile and the RMS distance of decoded positions, (N, 3, T), from those of the
+    source, as MEASURES names them; the percentile is rounded up to a number that files can hold.
+
+    `source`: (N, 3, T) less the origin; `shown`: how many frames of the clip show each frame, (T,) int32, or None for
+    1; `shares`: how many vertices of the source are at each place, (N,) int32, or None for 1; `rounding`: a distance
+    that is added for decoders that round otherwise.
+    """
     vertices, _, frames = positions.shape
     shown = np.ones(frames, np.int32) if shown is None else shown
 
     def measured(start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return two things for a range of vertices: their largest distance and sum of squares, and a histogram of
+        distances.
+        """
         result, histogram, part = np.empty(2), np.zeros(SHORT_FLOATS, np.uint32), positions[start:stop]
         lib.ath_error(
             stop - start,

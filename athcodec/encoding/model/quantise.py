@@ -34,7 +34,9 @@ STRAIGHT_END_WEIGHTS = (20.0, 600.0, 50.0)  # Weights then, in place of the larg
 
 
 def end_weights(usual_change: float) -> tuple[float, ...]:
-    """Return the weights for a change of velocity in a usual frame, in bounds; infinite: no segments meet."""
+    """Return the weights of errors at the ends of segments, which are larger the less a usual frame hides.
+    `usual_change`: the change of velocity in a usual frame, in bounds, infinite if no segments meet.
+    """
     if usual_change < STRAIGHT:
         return STRAIGHT_END_WEIGHTS
     scale = usual_change**-2
@@ -68,7 +70,10 @@ def least_bound(low: np.ndarray, high: np.ndarray, dtype: np.dtype) -> float:
 
 
 def check_bound(bound: float, low: np.ndarray, high: np.ndarray, dtype: np.dtype, extent: float) -> None:
-    """Raise BoundError for a bound below least_bound, or too small for the file's integers to span `extent`."""
+    """Raise BoundError for a bound that is smaller than least_bound, or so small that the integers of a file cannot
+    span `extent`, the distance of the furthest positions. `low`, `high`: (3,) corners of the bounding box; `dtype`:
+    that of the clip.
+    """
     least = least_bound(low, high, dtype)
     if not (np.isfinite(bound) and bound >= least):
         reason = (
@@ -142,8 +147,10 @@ SHORT_STEM = 16  # Vertices up to which many stems are likely to be alike, which
 
 
 def rest_lags(stems: np.ndarray, attach: np.ndarray | None, step: float) -> np.ndarray:
-    """Return the lags, 1 or more, that leave the least of stems' rest poses, (B, n, 3), to code (FORMAT.md, Lag).
-    attach: (B, 3) attach points; None: there are none."""
+    """Return for each stem the lag, 1 or more, with which its rest pose takes the fewest bits (FORMAT.md, Lag), (B,).
+    `stems`: (B, n, 3) rest positions; `attach`: (B, 3) attach points, or None for stems without; `step`: of the rest
+    pose.
+    """
     none = min(stems.shape[1], MOST_LAG)  # No step, or hardly any, is that many vertices ago.
     chains = stems if attach is None else np.concatenate([attach[:, None], stems], axis=1)
     is_mesh = chains.shape[1] > MESH

@@ -55,6 +55,7 @@ class EncodingOptions:
         return self.exact_rest or self.host_rest
 
     def __post_init__(self) -> None:
+        """Check the options, and raise ValueError for a value that is not among those expected."""
         set_numbers(self, wholes=("segment_frames", "jobs", "predicted_frames"))
         if self.segment_frames is not None and not MIN_SEGMENT <= self.segment_frames <= MAX_SEGMENT:
             raise ValueError(f"segment_frames: got {self.segment_frames}; expected {MIN_SEGMENT} to {MAX_SEGMENT}")

@@ -39,6 +39,9 @@ class RestPrecision:
 
     @classmethod
     def of(cls, option: LengthLike | None) -> RestPrecision:
+        """Return the option `rest_error` checked. Raises BoundError for a length or fraction that is not finite and
+        above 0.
+        """
         if option is None:
             return cls()
         if isinstance(option, str) and option == OF_BOUND:
@@ -93,7 +96,10 @@ def rest_steps(branches: np.ndarray, step: float) -> np.ndarray:
 def shape_steps(
     polygons: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float
 ) -> np.ndarray:
-    """Return the largest step at which the faces of each branch keep their shape, (B,) in file order."""
+    """Return for each branch the largest step of positions at which its faces keep their shape, (B,) in file order;
+    infinite without faces. `polygons`: the number of corners of each face, and the corners of all; `rest`: (N, 3)
+    positions in source order; `diagonal`: in scene units.
+    """
     steps = np.full(hierarchy.branch_count, np.inf)
     if polygons is None or not len(polygons[0]):
         return steps
@@ -112,7 +118,10 @@ def shape_steps(
 def _heights(
     edges: np.ndarray, lengths: np.ndarray, faces: np.ndarray, count: int, corners: np.ndarray, points: np.ndarray
 ) -> np.ndarray:
-    """Return the area of every corner's face over its longest edge."""
+    """Return for each corner the height of its face: the face's area over its longest edge. `edges`, `lengths`: the
+    edge that starts at each corner; `faces`: the face of each corner; `count`: the number of faces; `points`: (N, 3)
+    positions.
+    """
     doubled, longest = np.zeros((count, 3)), np.zeros(count)
     centre = np.zeros((count, 3))
     np.add.at(centre, faces, points[corners])
@@ -123,7 +132,9 @@ def _heights(
 
 
 def _low_quantiles(group: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """Return the value that a small share of each group's finite values fall short of, (count,); infinite: none."""
+    """Return for each of `count` groups the value below which a small share of its finite values lies, (count,);
+    infinite for a group without any. `group`: the group of each of `values`.
+    """
     group, values = group[np.isfinite(values)], values[np.isfinite(values)]
     order = np.lexsort((values, group))
     numbers = np.bincount(group, minlength=count)

@@ -21,7 +21,8 @@ class ErrorWeights:
 
     @classmethod
     def of(cls, clip: MotionClip, weights: str | npt.ArrayLike) -> ErrorWeights:
-        """Return the weights that an attribute of the clip has, by its name, or those of an array.
+        """Return factors on the bound for the vertices of a clip, which the attribute of the clip named `weights`
+        holds, or the array `weights` itself.
 
         Raises ClipError unless there is a number above 0 for each vertex.
         """

@@ -33,6 +33,9 @@ class BoundOption:
     lossless: bool = False
 
     def __post_init__(self) -> None:
+        """Check the options. Raises ValueError if there is more than one bound, and BoundError for one that is not
+        finite and above 0.
+        """
         names = ("max_error", "rel_error", "target_size")
         options = {name: value for name in names if (value := getattr(self, name)) is not None}
         if len(options) > 1:
@@ -45,8 +48,8 @@ class BoundOption:
             object.__setattr__(self, "target_size", int(self.target_size))
 
     def in_scene_units(self, source: Source, file_size: Callable[[float], float], filled: float = 0.97) -> float:
-        """Return the bound for a clip. Fractions are of the diagonal of all frames, or with the rest pose if these have
-        no extent.
+        """Return the bound of a file in scene units. A fraction is one of the diagonal of all frames; if that is 0, of
+        the extent together with the rest pose.
 
         file_size: returns the bytes of the file at a bound; filled: share of a target size that the file is to fill.
         """
@@ -62,8 +65,9 @@ class BoundOption:
         return fraction * diagonal if diagonal > 0 else max(fraction * extent, least)
 
     def objection(self, bound: float, diagonal: float, unit: JsonValue) -> str:
-        """Return a sentence on why a bound is coarse for a clip of this diagonal and unit, empty if it is not. A bound
-        passed as a fraction gets none."""
+        """Return a sentence that says why a bound is coarse, or an empty text if it is not, or was passed as a
+        fraction. `bound`, `diagonal`: in scene units; `unit`: the clip's unit, as its metadata state it.
+        """
         if self.max_error is None and self.target_size is None or not bound > COARSE_SHARE * diagonal > 0:
             return ""
         of_unit, share = f" {unit}" if isinstance(unit, str) else "", bound / diagonal
@@ -75,8 +79,9 @@ class BoundOption:
         return f"max_error: got {bound:g}{of_unit}, {of_plant}; {expected}: a length may have a unit, such as 1mm"
 
     def least(self, clip: MotionClip) -> float:
-        """Return a lower estimate of the bound in scene units, from some of the clip's frames; 0 if they do not
-        tell."""
+        """Return a bound in scene units that the clip's bound will not be below, from a few of its frames; 0 if they do
+        not tell.
+        """
         if self.max_error is not None:
             return self.max_error
         if self.target_size is not None or self.lossless:
@@ -94,10 +99,12 @@ def least_bound(source: Source) -> float:
 
 
 def _bound_for_size(source: Source, file_size: Callable[[float], float], target: int, filled: float) -> float:
-    """Return a bound whose file fills a share from `filled` on of `target` bytes, or the finest that fits:
-    sizes of small files jump by some percent from one bound to the next. Raises BoundError.
+    """Return the bound whose file fills at least the share `filled` of `target` bytes, or else the finest one found
+    whose file is not larger than that: sizes of small files jump by some percent from one bound to the next. Raises
+    BoundError if no file is small enough.
 
-    Between two known sizes the size is interpolated in logarithms. Elsewhere it falls about as the square root.
+    `file_size`: returns the bytes of the file at a bound. Between two known sizes the size is interpolated in
+    logarithms; elsewhere it is taken to fall about as the square root of the bound.
     """
     diagonal = source.seen.diagonal or 1.0
     # Files at `low` are too large; `high` fits once it has been tried.
@@ -117,7 +124,9 @@ def _bound_for_size(source: Source, file_size: Callable[[float], float], target:
 
 
 def _next_guess(low: float, high: float, sizes: dict[float, float], target: int) -> float:
-    """Return where in [low, high] the size is expected to be just below the target."""
+    """Return the bound, from `low` to `high`, at which the file is expected to be just smaller than `target` bytes.
+    `sizes`: the bytes of the files at bounds that were tried.
+    """
     goal = math.log(0.985 * target)
     if low in sizes and high in sizes and math.isfinite(sizes[low]):
         a, b = math.log(sizes[low]), math.log(sizes[high])

@@ -35,8 +35,10 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 def best_branches(
     clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False, is_compared: bool = False
 ) -> tuple[Found, float]:
-    """Return the branches that make the smallest file, as `_best_candidate` finds them. What stands still has branches
-    of its own, which no frame is tried for, unless the source names branches."""
+    """Find the branches on which a clip makes the smallest file. Return them, and about the bytes of that file, which
+    may be infinite unless `is_compared` is true. Unless the source names branches, those of what stands still are found
+    apart from the others, without trials on frames. `host_rest`: whether the rest pose is left out of the file.
+    """
     least = option.least(clip)
     is_named = clip.skin is not None or named_labels(clip) is not None
     still = None if is_named or host_rest else still_parts(clip, STILL_SHARE * least)
@@ -53,10 +55,13 @@ def best_branches(
 def _best_candidate(
     clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
 ) -> tuple[Found, float]:
-    """Return the candidate that makes the smallest file of a few frames at the bound, of those that fit the work, and
-    about its bytes, infinite where nothing had to be tried; of those that are about as small the one of the lowest
-    order, but roots alone last, which have no stages. Predicted motion hardly depends on branches: if two
-    candidates have it, no others are tried. is_compared: whether the bytes are wanted in any case."""
+    """Try ways to divide a clip into branches on a few frames, as many as the work allows. Return the branches that
+    make the smallest file, and about its bytes, which are infinite if there was nothing to compare and `is_compared` is
+    false.
+
+    Of candidates of about the same size the one of lowest order wins, but one of roots alone, which has no stages,
+    comes last. Predicted motion hardly depends on branches: trials end if the first two candidates have it.
+    """
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
     best, least, predicted = next(proposals), math.inf, 0
@@ -94,6 +99,9 @@ class Trial:
     """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
 
     def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):
+        """Read a few frames from the middle of a clip. `option`: the bound of the files; `host_rest`: whether the rest
+        pose is left out of them; `work`: counts the work of the trials.
+        """
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
         self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
@@ -103,8 +111,9 @@ class Trial:
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
     def size(self, branches: Found) -> tuple[float, bool]:
-        """Return about the bytes of the whole clip's file on these branches, and whether its motion is predicted;
-        infinite if the bound cannot be kept."""
+        """Return two things about the file of the whole clip on these branches: about its bytes, infinite if the bound
+        cannot be kept; and whether its motion is predicted.
+        """
         clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
         hierarchy = hierarchy_on(branches, clip.rest, clip.edges)
         self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
@@ -128,7 +137,9 @@ class Trial:
             return decisions.tried(bound, self._work, self._frames_ratio)
 
     def _bound_of_target(self, decisions: FileDecisions) -> BoundOption:
-        """Return the bound at which the branches tried first meet the target size; all are tried at it."""
+        """Return the bound at which the file on these branches has the target size. Other branches are then tried at
+        this bound.
+        """
         work = Work()
 
         def size(bound: float) -> float:

@@ -37,8 +37,9 @@ MOST_LOST = 0.4  # Share of points that are far from their neighbours above whic
 def placed_clip(
     clip: MotionClip, options: EncodingOptions, bound: float = 0.0, places: Places | None = None
 ) -> PlacedClip:
-    """Return the clip with a vertex for each place. bound: the largest error at least; places: as they were found
-    before. Raises ClipError."""
+    """Return the clip with one vertex for each place. `bound`: a length that the bound will not be below, for joining
+    vertices that differ by roundings; `places`: the places if they are known already. Raises ClipError.
+    """
     weights = None if options.weights is None else ErrorWeights.of(clip, options.weights)
     if places is None:
         labels = [] if weights is None else [weights.values]
@@ -51,7 +52,9 @@ def placed_clip(
 def prepared(
     placed: PlacedClip, option: BoundOption, options: EncodingOptions, report: Progress
 ) -> tuple[Source, Work | None]:
-    """Read a clip and return its source, and the work of finding branches, None for a clip that has them."""
+    """Read all frames of a clip and find its branches if it has none. Return the source that is coded, and the work
+    that finding branches took, or None for a clip that had them.
+    """
     clip = placed.source
     if clip.has_branches:
         return surveyed(placed, None, options, report), None
@@ -64,7 +67,9 @@ def prepared(
 
 
 def surveyed(placed: PlacedClip, branches: Found | None, options: EncodingOptions, report: Progress) -> Source:
-    """Return the source of a clip, all of whose frames are read. branches: those found for a clip without."""
+    """Read all frames of a clip once, and return the source that is coded. `branches`: those that were found for a clip
+    without branches, or None.
+    """
     hierarchy, pose = hierarchy_and_pose(placed, branches, options)
     _check_limits(placed.source.vertex_count, placed.source.frame_count, hierarchy)
     clip, pool = CodedClip.of(placed, branches, hierarchy, pose, options), ThreadPool(options.jobs or default_jobs())
@@ -75,7 +80,9 @@ def surveyed(placed: PlacedClip, branches: Found | None, options: EncodingOption
 
 
 def resumed(clip: MotionClip, draft: Draft, jobs: int | None = None) -> tuple[Source, EncodingOptions]:
-    """Return the source that a draft was made of, and its options. Raises ClipError."""
+    """Return two things: the source that a draft was made of, from the same clip, and the options of the draft with
+    `jobs` in place of its own. Raises ClipError for a clip of other frames or vertices.
+    """
     seen = draft.seen
     got, expected = (clip.frame_count, clip.vertex_count), (seen.frame_count, draft.places.vertex_count)
     if got != expected:
@@ -87,7 +94,9 @@ def resumed(clip: MotionClip, draft: Draft, jobs: int | None = None) -> tuple[So
 
 
 def _warn_of_odd_points(clip: MotionClip) -> None:
-    """Warn of hidden parts that are far away, and of frames that seem to list other points."""
+    """Warn if hidden parts are so far away that they enlarge the diagonal, and if frames seem to list different
+    points.
+    """
     for far in (parts_hidden_far_away(part) for part in split(clip).values()):
         if far:
             warnings.warn(
@@ -107,7 +116,7 @@ def _warn_of_odd_points(clip: MotionClip) -> None:
 
 
 def _check_limits(vertices: int, frames: int, hierarchy: Hierarchy) -> None:
-    """Raise ClipError for counts that decoders refuse."""
+    """Raise ClipError if a file would have more vertices, frames or branches than decoders take."""
     limits = ct.Limits()
     for name, value, limit in (
         ("vertices", vertices, limits.vertices),
@@ -128,8 +137,10 @@ def _grown(placed: PlacedClip, options: EncodingOptions) -> MotionClip:
 def _best_places(
     placed: PlacedClip, option: BoundOption, options: EncodingOptions, work: Work
 ) -> tuple[PlacedClip, Found]:
-    """Return the clip with the places that make the smallest file, as far as there is work for trials, and the branches
-    of its places. Parts that touch at a point are joined there or apart; like objects may be joined alike."""
+    """Return two things, chosen to make the smallest file as far as the work allows trials: the clip with its places,
+    and the branches of these places. Parts of a mesh that touch at a point may share a place there or not, and objects
+    of as many vertices may have the same vertices joined.
+    """
     apart = placed.apart()
     first = placed if apart is None else apart
     regular = first.regular()

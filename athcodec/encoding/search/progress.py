@@ -93,7 +93,9 @@ class Work:
 
     @contextmanager
     def trying(self, choice: str, share: float = 1.0) -> Iterator[None]:
-        """Name the choice that is tried, which may take a share of the work that is left."""
+        """Return a context in which the choice that is tried is reported by its name, and may take at most `share` of
+        the work left.
+        """
         before = self._choice, self.allowed
         self._choice, self.allowed = choice, min(self.allowed, self.done + share * max(0.0, self.allowed - self.done))
         try:
@@ -142,8 +144,10 @@ def phase_weights(
     motion: bool,
     layers: int,
 ) -> dict[str, float]:
-    """Return the estimated work of each phase. samples: segments that a trial codes; branches: whether they have to be
-    found; sizes: whether a target size is to be met; motion: whether motion is coded too."""
+    """Return the estimated work of each phase of an encoding, as {phase: work}. `samples`: how many segments a trial
+    codes; `branches`: whether branches have to be found; `sizes`: whether a target size is to be met; `motion`: whether
+    segments are coded, too; `layers`: the number of layers.
+    """
     longest, frames = max(stop - start for start, stop in segments), segments[-1][1]
     small = is_small(vertices, segments, effort)
     some = vertices if (part := sample_vertices(vertices, len(segments), longest, effort)) is None else part

@@ -35,6 +35,9 @@ class PlantSample:
     """
 
     def __init__(self, source: Source, ath: Ath, branches: np.ndarray, with_faces: bool = False):
+        """Take the sampled `branches`, ascending, which include the parents of each, out of `source` and `ath`.
+        `with_faces`: whether the sample has the faces of its vertices.
+        """
         whole = source.hierarchy
         kept = np.zeros(whole.branch_count, bool)
         kept[branches] = True
@@ -58,7 +61,9 @@ class PlantSample:
         return sample
 
     def like(self, settings: Settings) -> Settings:
-        """Return the settings of the whole plant for the sample, with copies of its own branches."""
+        """Return settings for the sample that agree with those of the whole plant. Which branches copy others is found
+        anew.
+        """
         some = replace(
             settings,
             **{name: getattr(settings, name)[self.branches] for name in OF_BRANCHES},
@@ -71,8 +76,9 @@ class PlantSample:
         return replace(some, shape_of=streams.find_copies(branches, some.rest_step, self.source.rest, some.rest_slack))
 
     def _hierarchy(self, whole: Hierarchy, vertex_source: np.ndarray) -> Hierarchy:
-        """Return the hierarchy of the sampled branches, renumbered. vertex_source: the places of its vertices in the
-        sampled clip."""
+        """Return the hierarchy of the sampled branches, numbered within the sample. `whole`: the plant's hierarchy;
+        `vertex_source`: the number of each vertex of the sample in the order of the sampled clip.
+        """
         parent, attach = whole.branch_parent[self.branches], whole.attach[self.branches]
         number_of_vertex = np.zeros(whole.vertex_count, np.int64)
         number_of_vertex[self.vertices] = np.arange(len(self.vertices))
@@ -85,7 +91,7 @@ class PlantSample:
         )
 
     def _ath(self, whole: Ath) -> Ath:
-        """Return the nodes of the sampled branches, renumbered."""
+        """Return the part of the ATH `whole` whose nodes are sampled branches, numbered within the sample."""
         chosen = np.flatnonzero(np.isin(whole.node_branch, self.branches))
         parent = whole.node_parent[chosen]
         return Ath(
@@ -133,8 +139,10 @@ def _counts(plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sample_plant(source: Source, ath: Ath, effort: str, with_faces: bool = False) -> PlantSample | None:
-    """Return a sample of a large plant with a branch of every stage; None: the plant is small, or effort is "best". The
-    sample grows with the clip, so that the search keeps its share of the work."""
+    """Return a sample of a large plant that includes a branch of every stage. Its size grows with the clip, so that the
+    search keeps its share of the work. Return None if the plant is small, if `effort` is "best", or if the sample would
+    be half of it.
+    """
     frames = -(-source.coded_frames // len(source.segments))
     wanted = sample_vertices(source.clip.vertex_count, len(source.segments), frames, effort)
     if wanted is None:
@@ -159,7 +167,9 @@ def sample_vertices(vertices: int, segments: int, frames: int, effort: str) -> i
 
 
 def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
-    """Return branches with about `wanted` vertices in all, `deepest` among them."""
+    """Return the numbers of branches that are spread evenly over the plant and have about `wanted` vertices in all. The
+    branch `deepest` and the ancestors of each chosen branch are among them.
+    """
     vertices = np.append(hierarchy.first_vertex, hierarchy.vertex_count).tolist()
     after = (np.arange(hierarchy.branch_count) + hierarchy.subtree_branches).tolist()
     kept = np.zeros(hierarchy.branch_count, bool)

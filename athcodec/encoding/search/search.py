@@ -47,8 +47,10 @@ Choose = Callable[[Settings, Trials], Settings]
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
-    """Return settings that no other choice of one kind makes smaller, each with steps of its own. Earlier choices were
-    made at other steps, and sizes jump from bound to bound if the worse one of two stays."""
+    """Return the settings after single choices were made again at the steps found so far, each followed by a search for
+    its own best steps, until none of them saves bytes. Earlier choices were made at other steps, and a wrong one among
+    them lets sizes jump from bound to bound.
+    """
     saving = settings.learned_saving
     while True:
         plain = replace(settings, learned_pieces=None)
@@ -132,7 +134,9 @@ class Search:
         *,
         ratios: Sequence[int] = (1,),
     ) -> Search:
-        """Return the search for a whole plant."""
+        """Return the search for settings of a whole plant, at `bound` and within the allowed `work`. `jobs`: threads
+        that try settings at a time; `ratios`: the step of each layer over that of the last.
+        """
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
         everything = ExtrapolationFactors.everything(start.stages)
@@ -151,10 +155,11 @@ class Search:
         return search
 
     def shorter_segments(self) -> list[tuple[int, float]]:
-        """Return the numbers of frames of shorter segments that may make the file smaller, each with its bytes at first
-        settings. What jumps is seen in all waves of its segment, so segments are halved as long as that makes waves
-        smaller. What is learned may do as well in longer ones: the last half is the smallest with it, too, and stands
-        before the power of two that is next to it."""
+        """Return pairs of a number of frames and the estimated bytes at first settings, for shorter segments that may
+        make the file smaller. Segments are halved as long as that makes motion in waves smaller, since a jump is seen
+        in all waves of its segment. The list ends where learned time bases, too, make the file smallest, and with the
+        power of two next to that.
+        """
         trials = (self.of_sample or self).trials
         lengths = [max(stop - start for start, stop in trials.source.segments)]
         tried = [trials.in_segments(trials.source, spread_samples(trials.source))]
@@ -219,7 +224,9 @@ class Search:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
 
     def decide(self) -> tuple[list[Choice], CodedPrelude]:
-        """Return settings to choose from, and hierarchy and poses as coded with them."""
+        """Search, and return two things: the settings to choose from, best first, and the hierarchy and poses as coded
+        with them.
+        """
         of_first_layer = FIRST_LAYER_TRIALS * self.trials.is_layered
         with self.trials.work.trying("reference pose", (self.of_sample or self)._share_beside(of_first_layer)):
             search = self.about_best_reference()
@@ -234,8 +241,10 @@ class Search:
         return choices, prelude
 
     def candidates(self) -> tuple[Settings, list[Settings]]:
-        """Return the settings of the first layer, and those to choose from for refinements; the best settings alone if
-        there is a single layer. For a large plant they are those of a sample of it."""
+        """Return two things: the settings of the first layer, and the settings to choose from for refinements, which
+        are the best settings alone if the file has a single layer. Those of a large plant come from a search on a
+        sample of it.
+        """
         if self.of_sample:
             first, candidates = self._candidates_of_sample(self.of_sample)
         else:
@@ -253,7 +262,9 @@ class Search:
 
     @cached_property
     def at_first_step(self) -> Settings:
-        """Bases, rotations and modes of a file of one layer, at the step that the search starts with."""
+        """Return settings of a file of one layer, with time bases, rotations and modes chosen at the step that the
+        search starts with.
+        """
         if self.effort == "fast":
             fast = [best_stage_steps, rotations.fast_rotations, learned_bases.best_waves]
             return self._after(fast, self.trials.start)
@@ -271,7 +282,7 @@ class Search:
 
     @cached_property
     def best(self) -> Settings:
-        """Settings of a file of one layer."""
+        """Return the best settings found for a file of one layer."""
         names = () if self.effort == "fast" else order.AFTER_STEPS
         choices = [BY_NAME[name] for name in names if self.makes_all_again or name != settled.__name__]
         if self.effort == "best" and self.trials.source.weights is None:
@@ -301,7 +312,10 @@ class Search:
         return self._after([*choices, best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
-        """Yield settings that may suit refinements, each of which has one stream: with rotations and without."""
+        """Yield settings that may suit the layers after the first, each of which has one stream: first with rotations,
+        then without, leaving out what trials show to be much larger. Without rotations or with a single layer, the best
+        settings are yielded.
+        """
         settings, trials = self.best, self.trials
         if not trials.is_layered or not any(settings.rotation_step_factors):
             yield settings
@@ -339,9 +353,10 @@ class Search:
         return not source.keeps_shape.any()  # The mean of what turns is smaller than what turns.
 
     def about_best_reference(self) -> Search:
-        """Return the search about the rest pose or the mean pose of the motion, whichever makes the smaller file: the
-        mean pose if it is far ahead at first moves, else it is tried with what was chosen about the rest pose, and
-        goes on from there. In small clips both are searched up to their steps."""
+        """Return this search, or one about the mean pose of the motion if that makes a smaller file than the rest pose
+        does. The mean pose is taken at once if it is far better at first moves. Else both are compared by what was
+        chosen about the rest pose or, in small clips, by separate searches up to their steps.
+        """
         if not self._may_have_mean_pose:
             return self
         work, tried = self.trials.work, (self.of_sample or self).trials
@@ -368,7 +383,7 @@ class Search:
         return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
 
     def about_mean_pose(self) -> Search:
-        """Return a search about the mean pose of the motion, which has chosen nothing yet."""
+        """Return a search whose motion is coded about its mean pose, and which has made no choices yet."""
         trials = self.trials
         source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
         ath = replace(trials.ath, rest=source.rest + source.origin)
@@ -378,7 +393,9 @@ class Search:
         return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
 
     def _like(self, other: Search, settings: Settings) -> Settings:
-        """Return settings for this reference pose from those that another search chose about its own."""
+        """Return settings about this search's reference pose that follow the choices in `settings`, which the search
+        `other` made about its own reference pose.
+        """
         trials, start = self.trials, self.trials.start
         like = replace(
             settings,
@@ -398,7 +415,7 @@ class Search:
 
     @cached_property
     def of_sample(self) -> Search | None:
-        """The search on a sample of a large plant."""
+        """Return a search on a sample of the plant, or None if the plant is small enough to be searched whole."""
         trials, start = self.trials, self.trials.start
         sample = sample_plant(trials.source, trials.ath, self.effort)
         if sample is None:
@@ -421,8 +438,9 @@ class Search:
         return self._from_sample(sample, sample.first_layer(), start.coarser(self.ratios[0])), candidates
 
     def _from_sample(self, sample: Search, chosen: Settings, start: Settings) -> Settings:
-        """Return the settings for the whole plant, given those chosen for a sample of it. start: settings that no
-        sample decides."""
+        """Return settings for the whole plant that follow the settings `chosen` by the search `sample` on a part of it.
+        `start`: the source of those settings that no sample decides.
+        """
         trials, of_sample = self.trials, sample.trials
         inner, all_inner = (inner_nodes(some.source, some.ath, some.stages) for some in (of_sample, trials))
         fewer = np.sqrt(of_sample.extrapolation.vertices * inner / np.maximum(all_inner, 1))

@@ -53,8 +53,9 @@ def samples_of(source: Source) -> list[SegmentSample]:
 
 
 def typical_segments(source: Source) -> list[tuple[int, int]]:
-    """Return the middle segment of a clip, or those of a few of several clips, from calm to wild. Each has the number
-    of frames of the file that it stands for."""
+    """Return pairs of a segment and the number of frames of the file that it stands for: the middle segment of a single
+    clip, or segments of a few of several clips, from calm to wild.
+    """
     ranges = source.clip_range_segments
     middles = [start + len(segments) // 2 for start, segments in zip(source.clip_range_starts, ranges)]
     if len(middles) == 1:
@@ -75,8 +76,10 @@ def spread_samples(source: Source) -> list[SegmentSample]:
 
 
 def spread_segments(source: Source) -> list[tuple[int, int | float]]:
-    """Return the segments of the middle SPAN frames of a clip, or of a few of several clips. Each has the number of
-    frames of the file that it stands for. Other lengths of segments are compared on these frames, nearly all alike."""
+    """Return pairs of a segment and the number of frames of the file that it stands for: the segments of the middle
+    SPAN frames of a clip, or of a few of several clips. They serve to compare lengths of segments on nearly the same
+    frames.
+    """
     spread: list[tuple[int, int | float]] = []
     for middle, frames in typical_segments(source):
         starts, segments = np.array(source.clip_range_starts), source.segments

@@ -28,8 +28,9 @@ STILL_STEP = 1024.0  # Quantisation step, in bounds, that rounds every coefficie
 def first_settings(
     source: Source, ath: Ath, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int] = (1,)
 ) -> Settings:
-    """Return the settings that a search for the last layer starts with. ratios: of the layers' steps to that of the
-    last, descending to 1."""
+    """Return the settings that a search for the last layer starts with. `bound`: in scene units; `ratios`: the step of
+    each layer over that of the last, descending to 1.
+    """
     is_layered, (rigid, turn_step) = len(ratios) > 1, first_rigid(source, bound, samples, ratios)
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), source.rest_limit(bound) * qz.rest_step_ratio(relative)
@@ -48,8 +49,11 @@ def first_settings(
 
 
 def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> Settings:
-    """Return the settings for layers: each refines the rest pose of the one before, or all have that of the last layer
-    if that is much smaller, or if an error is asked for that holds at the last layer alone. ratios: of their steps."""
+    """Return settings for a file in layers, of two kinds whichever is better: either each layer refines the rest pose
+    of the layer before, or all layers have the rest pose of the last one. The latter is taken if it makes the file much
+    smaller, or if an error of the rest pose is asked for that only the last layer can hold. `ratios`: the step of each
+    layer over that of the last.
+    """
     at_once = rest.with_best_rest(source, ath, replace(settings, coarsest_rest_step=0.0))
     if source.has_source_rest and source.rest_error < math.inf:
         return at_once
@@ -68,8 +72,9 @@ def _in_layers(source: Source, ath: Ath, settings: Settings, ratios: Sequence[in
 
 
 def still_choice(source: Source, ath: Ath, bound: float, ratio: int) -> Choice:
-    """Return the choice for a clip all of whose frames are the rest pose: no motion, and a rest pose of the bound's
-    precision. ratio: of the first layer's step to that of the last."""
+    """Return the choice for a clip all of whose frames are the rest pose: no motion, and a rest pose as precise as the
+    bound asks. `ratio`: the step of the first layer over that of the last.
+    """
     step, least = STILL_STEP * source.smallest_bound(bound), 0.5 * source.rest_limit(source.smallest_bound(bound))
     settings = first_settings(source, ath, bound, [SegmentSample(source.positions(0), source.coded_frames)])
     slack = source.rest_limit(float(np.min(settings.limit))) - float(np.spacing(source.largest_number))

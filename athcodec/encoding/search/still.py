@@ -46,7 +46,9 @@ class SplitSource:
 
     @classmethod
     def of(cls, source: Source, ath: Ath, bound: float) -> SplitSource | None:
-        """Return the moving and the still part of a source; None if nothing stands still, or everything does."""
+        """Divide a source into branches that move and branches that stand still within `bound`, and return both. Return
+        None if nothing stands still or everything does, or if the moving part alone would have fewer stages.
+        """
         if source.still or source.still_branches is not None or source.reference_is_exact:
             return None
         still = still_branches(source, bound)
@@ -67,7 +69,7 @@ class SplitSource:
         return replace(self, ath=self.source.seen.ath(thresholds))._choice(chosen, bound)
 
     def _choice(self, chosen: Choice, bound: float) -> Choice:
-        """Return a choice for all branches from one for those that move."""
+        """Extend a choice that was made for the branches that move to all branches, and return it."""
         stillness, source = self._still_settings(bound), self.about(chosen.reference)
         may_be_coarser = not chosen.predicted
         settings = self._settings(chosen.settings, stillness, may_be_coarser)
@@ -99,7 +101,9 @@ class SplitSource:
         return still_choice(source, ath, (1 - STILL_SHARE) * bound, 1).settings
 
     def _settings(self, moving: Settings, still: Settings, may_be_coarser: bool) -> Settings:
-        """Return the settings of both. may_be_coarser: whether the rest pose of what stands still may be coarser."""
+        """Join the settings of the branches that move and of those that stand still to settings of all branches.
+        `may_be_coarser`: whether the rest pose of what stands still may be coded with a larger step than the rest.
+        """
         details, step, slack = self._joined(moving.details, still.details), moving.rest_step, moving.rest_slack
         own_step = qz.single(step)
         is_coarser = still.rest_slack > 0 and slack == 0 and still.rest_step > step
@@ -172,7 +176,9 @@ class SplitSource:
 
 
 def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
-    """Return some branches of a source, and all branches below them, as a source of their own."""
+    """Return a source that consists of some trees of `source` alone. `branches`: the numbers of their branches,
+    ascending.
+    """
     sample = PlantSample(source, ath, branches, with_faces=True)
     part = replace(
         sample.source,
@@ -186,7 +192,7 @@ def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
 
 
 def _seen(seen: Survey, sample: PlantSample) -> Survey:
-    """Return the survey for the branches of a sample, with the bounding box of the whole plant."""
+    """Return the survey `seen` reduced to the branches of a sample, but with the bounding box of the whole plant."""
     chosen = np.isin(seen.branches, sample.branches)
     roots = np.flatnonzero(seen.hierarchy.branch_parent < 0)
     return replace(

@@ -127,8 +127,10 @@ class Trials:
         return self._tried(settings)[1]
 
     def costs(self, candidates: Sequence[Settings]) -> list[float]:
-        """Return what each candidate costs; several are tried at once. What no longer fits the work that is allowed
-        costs infinitely much."""
+        """Return the estimated bytes of the file with each candidate, in their order; several are tried at once on
+        threads. The cost is infinite for a candidate that does not keep the bound, or whose trial the allowed work has
+        no room for.
+        """
         keys = [settings.key for settings in candidates]
         fitting = self._fitting(keys)
         tried = list({key: settings for settings, key in zip(candidates, keys) if key in fitting}.values())
@@ -158,7 +160,9 @@ class Trials:
         return candidates[int(np.argmin(self.costs(candidates)))]
 
     def prelude(self, settings: Settings) -> CodedPrelude:
-        """Return hierarchy and rest pose as coded, from an earlier trial if there was one. Raises BoundError."""
+        """Return the hierarchy and the rest pose as coded under some settings; they are coded now unless they are kept
+        from an earlier trial. Raises BoundError if the rest pose cannot keep the bound.
+        """
         key = settings.prelude_key
         with self._lock:
             prelude = self._preludes.pop(key, None)
@@ -233,8 +237,9 @@ class Trials:
         return self._known[key]
 
     def _try(self, settings: Settings) -> tuple[float, np.ndarray]:
-        """Code the samples under some settings, and return the estimated bytes of the whole file, and of each stage's
-        streams."""
+        """Code the samples under some settings. Return two things: the estimated bytes of the whole file, and those of
+        each stage's streams, (stages,). All are infinite if the bound cannot be kept.
+        """
         try:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)
@@ -262,7 +267,9 @@ class Trials:
             self._work_done += int(work)
 
     def _stage_bytes(self, coded: Coded, sample: SegmentSample) -> np.ndarray:
-        """Return the bytes of the streams of all that a sample stands for, (stages,)."""
+        """Return the estimated bytes of each stage's streams, (stages,), in all segments of the whole plant that a
+        sample stands for. `coded`: the coded sample.
+        """
         stages, heads = np.zeros(self.stages), np.zeros(self.stages)
         for stage, stream in coded.stems.items():
             stages[stage], heads[stage] = len(stream), coded.heads[stage]
@@ -275,7 +282,9 @@ class Trials:
         return stages * sample.scale
 
     def _keeps_bound(self, settings: Settings) -> bool:
-        """Return whether a rest pose keeps the bound; its prelude is there for later calls, if there is room for it."""
+        """Return whether the rest pose under some settings keeps the bound. The coded pose is kept for later calls if
+        there is room.
+        """
         if settings.prelude_key in self._seen_preludes:
             return True
         try:
@@ -293,8 +302,10 @@ class Trials:
         return stage_bases(plan, settings, learned[number], basis_ratio(plan, settings, settings.step / step))
 
     def _learn_time(self, settings: Settings) -> tuple[float, TimeComponentsOfSamples]:
-        """Return the components of the samples over time, of each stage and of all, and the step of the trial that
-        asked first for them: they hardly depend on the step."""
+        """Return two things for trials of learned time bases: the step at which the components were measured, which is
+        that of the first trial to ask for them; and the components over time of each sample, by stage, with None for
+        all stages together.
+        """
         only_common = self.is_layered and settings.common_basis
         key = *_before_modes(settings), settings.stage_steps.tobytes(), settings.periodic, only_common
         if key not in self._time_components:
@@ -317,7 +328,9 @@ class Trials:
         return uncoded_plan(self.source, self.ath, settings)
 
     def _learn_modes(self, settings: Settings) -> Components:
-        """Return the components of segments spread over the clip, in the steps of the trial that asked first."""
+        """Return the components from which modes of pieces are learned, measured on segments spread over the clip, at
+        the steps of the first trial to ask for them.
+        """
         coded, count = settings.learned_coded, len(self.source.segments)
         key = _before_modes(settings) + (settings.prelude_key if coded else ())
         if key not in self._components:

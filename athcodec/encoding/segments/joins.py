@@ -71,8 +71,13 @@ def end_of(
 
 
 def end_corrections(away: np.ndarray, limit: float | np.ndarray, step: float, frame: int) -> np.ndarray:
-    """Return corrections (K, 6) of `frame`, the last one, for vertices beyond their limits there or right before, of as
-    few axes as possible. away: (N, 3, 4) errors in the last frames."""
+    """Return corrections of a segment's last frame, (K, 6) rows (vertex, frame, x, y, z, width), for those vertices
+    that are beyond their limits in the last two frames. Each moves along as few axes as it can. A vertex that none of
+    the tried corrections brings within its limit in all four frames gets no row.
+
+    `away`: (N, 3, 4) decoded less source positions of the last four frames; `limit`: one length or (N,); `step`: the
+    length of 1 in a correction; `frame`: the number of the last frame.
+    """
     limits = np.broadcast_to(limit, len(away))
     vertices = np.flatnonzero((_squares(away[:, :, -2:]) > limits[:, None] ** 2).any(axis=1))
     away, limits = away[vertices], limits[vertices]
@@ -159,6 +164,9 @@ class _Moved:
     def __init__(
         self, vectors: Callable[[slice], np.ndarray], jump: np.ndarray, slope: np.ndarray, are_means: bool = False
     ):
+        """Measure the vectors that `vectors` returns for a slice of the vertices, and how far they point along the ways
+        `jump` and `slope`, (N, 3) each. `are_means`: keep the means over all vertices, and not the numbers of each.
+        """
         rows: list[list[np.ndarray]] = []
         for part in _parts(len(jump), max(WIDTHS)):
             of_part, ways = vectors(part), (jump[part], slope[part])
@@ -221,9 +229,13 @@ class SourceStart:
 def best_join(
     end: End, positions: np.ndarray, start: SourceStart, price: ErrorPrice | CorrectionPrice, largest: float
 ) -> int:
-    """Return how to join a stage of a segment to the end of the one before: over how many frames, SLOPED more if slopes
-    are joined too; 0: not at all. positions: (N, 3, T) of those vertices that are `seen`, as in the other arguments.
-    largest: the largest error that costs nothing."""
+    """Choose how a stage of a segment is joined to `end`, the end of that stage in the segment before. Return the
+    number of frames over which the join is spread, with SLOPED added if slopes are joined too, or 0 for no join.
+
+    `positions`: (N, 3, T) of the vertices that `seen` names, which the other arguments hold alone as well; `start`: the
+    source's first frames; `price`: the cost of errors that a join changes; `largest`: the largest error that costs
+    nothing.
+    """
     decoded, of_source = _changes(positions), start.usual
     usual = max(0.5 * (end.usual + _usual(decoded)), STILL * of_source)  # One side alone may move in straight lines.
     wanted = _changes(np.concatenate([end.source, start.frames(slice(None), END_FRAMES + 1)], axis=2))
@@ -241,6 +253,7 @@ def best_join(
     changes = _Moved(bends, *ways, are_means=True)
 
     def cost(join: int) -> float:
+        """Return the cost of a join."""
         shares = _shares(join)
         joined = np.sqrt(changes.by(*_bends_of(join)))
         tick = float((joined / natural[: len(joined)]).max()) if usual > 0 else 0.0

@@ -129,8 +129,11 @@ class Layers:
 
 
 def step_factors(source: Source, ladder: Sequence[float], bound: float) -> tuple[float, float]:
-    """Return the steps of the first layer and of others before the last, over those of files of their errors. Plants
-    side by side move little for the diagonal of all: at the usual step of the first layer they hardly would."""
+    """Return two factors: the step of the first layer, and that of the other layers before the last, each over the step
+    of a file whose bound is the error that the layer holds. The first factor is smaller for many plants side by side,
+    which move little compared with the diagonal of them all: rounded at the usual step, they would hardly move.
+    `ladder`: the largest errors of the layers over the diagonal, descending; `bound`: in scene units.
+    """
     has_leaves = source.sheet_like.any()
     first, others = LEAVES_STEP_FACTORS if has_leaves else STEP_FACTORS
     coarsest = max(_in_bounds(ladder, bound, source.seen.diagonal), default=0.0)
@@ -144,10 +147,11 @@ def step_factors(source: Source, ladder: Sequence[float], bound: float) -> tuple
 def layer_ratios(
     ladder: Sequence[float], bound: float, diagonal: float, factors: tuple[float, float] = STEP_FACTORS
 ) -> list[int]:
-    """Return the ratio of the step of each layer to that of the last, descending to 1.
+    """Return for each layer the ratio of its step to the step of the last layer, descending to 1.
 
-    ladder: largest errors over the diagonal, descending. Those close to the bound or to each other make no layer of
-    their own. Layers that are too far apart for one to refine the other have more between them. factors: step_factors.
+    `ladder`: the largest errors that layers are to hold, over the diagonal, descending. An error that is close to the
+    bound or to another error makes no layer of its own. Where two layers are too far apart for one to refine the other,
+    layers are added between them. `bound`, `diagonal`: in scene units; `factors`: what `step_factors` returns.
     """
     errors: list[float] = []  # In bounds.
     for bounds in _in_bounds(ladder, bound, diagonal):
@@ -188,7 +192,10 @@ def layers_of(
     factors: tuple[float, float],
     hold_errors: bool,
 ) -> Layers:
-    """Return the layers for a choice; prelude: of the last layer; factors: step_factors; hold_errors: as in Layer."""
+    """Return the layers of a file for a choice of settings. `prelude`: hierarchy and rest pose as coded for the last
+    layer; `ratios`: the step of each layer over that of the last; `factors`: what `step_factors` returns;
+    `hold_errors`: whether the layers before the last hold their errors in any case (`Layer.holds_error`).
+    """
     settings = choice.settings
     rest, stage_0, rests = _rests(source, prelude, ratios, settings)
     layers: list[Layer] = []
@@ -229,7 +236,9 @@ def _binary_digits(ratio: int) -> int:
 
 
 def _uniform(plan: Plan, settings: Settings) -> Settings:
-    """Return settings for the single stream of a refinement: of the stage with the most rows, at the finest step."""
+    """Return settings for a refinement, whose motion is one stream: they have the rotation factor and the kind of time
+    basis of the stage with the most rows, and the finest step of all stages that have stems.
+    """
     main, factors = plan.main_stage, settings.rotation_step_factors
     finest = min(settings.stage_steps[stage] for stage in range(plan.stage_count) if plan.has_stems(stage))
     return replace(
@@ -243,8 +252,11 @@ def _uniform(plan: Plan, settings: Settings) -> Settings:
 def _rests(
     source: Source, prelude: CodedPrelude, ratios: Sequence[int], settings: Settings
 ) -> tuple[writing.Rest, np.ndarray | None, list[tuple[np.ndarray, streams.CodedRest | None]]]:
-    """Return the content of REST, what it decodes to if the first layer refines it, and of each layer the decoded pose
-    and what refines the pose before."""
+    """Return three things about the rest poses of the layers: the content of the chunk REST; the pose that REST decodes
+    to if the first layer refines it, else None; and for each layer its decoded rest pose with the stream that refines
+    the pose of the layer before into it, None if both are the same. `ratios`: the step of each layer over that of the
+    last.
+    """
     rest = prelude.rest_chunk
     at_once: list[tuple[np.ndarray, streams.CodedRest | None]] = [(prelude.plan.rest, None)] * len(ratios)
     if source.exact_rest or len(ratios) == 1 or Feature.REFINED_REST in source.without:
@@ -271,7 +283,9 @@ def _rests(
 
 
 def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Sequence[int]) -> float:
-    """Return the bytes of hierarchy and rest poses of layers; infinite if the last pose cannot keep the bound."""
+    """Return the bytes that the hierarchy and the rest poses of all layers take, or infinity if the last pose cannot
+    keep the bound. `ratios`: the step of each layer over that of the last.
+    """
     try:
         prelude = CodedPrelude(source, ath, settings, bases=False)
     except BoundError:
@@ -282,7 +296,9 @@ def layered_poses_size(source: Source, ath: Ath, settings: Settings, ratios: Seq
 
 
 def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: Settings) -> list[streams.CodedRest]:
-    """Return the rest pose at the step of the first layer, and before it that of stage 0 if that takes few bytes."""
+    """Return the rest poses that the first layer needs: its own at `step`, and before it a coarser one for stage 0 if
+    both together take few bytes more than the first layer's alone.
+    """
     plan, mesh = prelude.plan, prelude.rest_chunk.mesh
 
     def encode(step: float, before: streams.CodedRest | None = None) -> streams.CodedRest:
@@ -301,7 +317,9 @@ def _first_rests(prelude: CodedPrelude, step: float, source: Source, settings: S
 
 
 def layer_chunks(layers: Layers) -> dict[tuple[int, int], bytes]:
-    """Return what all segments share of the layers: {(stage, kind): payload}."""
+    """Return the chunks of learned modes and of refined rest poses, which all segments share, as {(stage, kind):
+    payload}.
+    """
     first, *finer = layers.each
     chunks = {
         (stage, ct.SHAPES): stream for stage, stream in streams.encode_learned_modes(first.plan, first.modes).items()
@@ -337,7 +355,10 @@ class _TimeBases:
         return bases
 
     def refined(self, layer: Layer, stream: int, stage: int) -> dict[int, StreamBasis]:
-        """Return the basis of a stream of the layer's settings, which stands at a stage of the file."""
+        """Return the learned time basis of one stream of a layer as {stream: basis}, or {} if the stream learns none.
+        From then on it is the basis that the next call extends. `stream`: the stage whose settings in the layer say how
+        the stream is coded; `stage`: the stage of the file that holds the stream.
+        """
         if self._components is None or not layer.settings.learned_bases[stream]:
             return {}
         # Rigid parts of a coarse layer may need more rows than a finer one where they are not rigid.
@@ -370,7 +391,9 @@ class Ends:
 
     @contextmanager
     def failing(self) -> Iterator[None]:
-        """Return a context in which an error also ends the segment that waits for these ends."""
+        """Return a context in which an error is also passed on to the next segment, which would wait for these ends for
+        ever.
+        """
         try:
             yield
         except BaseException as error:
@@ -430,7 +453,9 @@ class CodedMotion:
             self._segment = self._first(layers.each[0])
 
     def finish(self) -> None:
-        """Code the refinements. The first layer is coded when the object is made."""
+        """Code the refinements of the segment, and its exact numbers if these are wanted. The first layer was coded
+        when the object was made.
+        """
         segment = self._segment
         del self._segment
         with self._failing():
@@ -448,7 +473,9 @@ class CodedMotion:
         return nullcontext() if self._after is None else self._after.failing()
 
     def _first(self, layer: Layer) -> SegmentMotion:
-        """Code the stages of the branch hierarchy."""
+        """Code the first layer: all stages of the branch hierarchy, their maps and corrections. Return the layer's
+        integers, which the next layer refines.
+        """
         plan, settings = layer.plan, layer.settings
         if self._bases:
             bases = self._bases.first(layer)
@@ -476,7 +503,10 @@ class CodedMotion:
         return segment
 
     def _keep_last_stage_best(self, layer: Layer, stage: int, decoded: np.ndarray) -> None:
-        """Add cheap corrections if the exact stems are worse than the maps before them."""
+        """Tighten the corrections of the first layer's last `stage` while its RMS error exceeds that of the stage
+        before, which is shown by affine maps, and while the corrections take few bytes. `decoded`: positions of the
+        stage without corrections.
+        """
         before, known = self.errors[stage - 1][RMS], len(self.chunks.get((stage, ct.CORRECTIONS), b""))
         most = known + EVEN_SHARE * (self._bytes_up_to(stage) + known)
         for factor in TIGHTER_LIMITS:
@@ -506,7 +536,10 @@ class CodedMotion:
         return shown
 
     def _refine(self, layer: Layer, before: SegmentMotion, ratio: int, stage: int) -> SegmentMotion:
-        """Code one further stage; ratio: the step of the layer before over that of this one."""
+        """Code a layer after the first one, which is one stage of the file, and return its integers. `before`: the
+        integers of the layer that it refines; `ratio`: the step of that layer over the step of this one; `stage`: the
+        stage that it makes.
+        """
         settings, last = layer.settings, layer.plan.stage_count - 1
         self._corrected.clear()  # Stages before are finished.
         release_memory()
@@ -542,7 +575,9 @@ class CodedMotion:
         return self._set_last(layer, stage, decoded, self._corrections(decoded, layer))
 
     def _set_last(self, layer: Layer, stage: int, decoded: np.ndarray, corrections: Corrections) -> tuple[float, ...]:
-        """Set the corrections of the stage that a layer ends with; return its errors. decoded: positions without."""
+        """Store the corrections of the stage that a layer ends with, in place of any earlier ones, and return the
+        errors of the corrected stage by each of MEASURES. `decoded`: positions of the stage without corrections.
+        """
         self.chunks.pop((stage, ct.CORRECTIONS), None)
         self._corrected.pop(stage, None)
         if corrections.chunk:
@@ -571,8 +606,10 @@ class CodedMotion:
         self._met = streams.MetEnds(self._met.closed | streams.FIRST, ordered)
 
     def _finish(self, stage: int, positions: np.ndarray, layer: Layer | None = None) -> None:
-        """Add a stage's end, join the stage to the segment before if that is better, and add its flaws. positions: not
-        corrected, which change; layer: the one that ends with the stage."""
+        """Pass the end of a stage on to the next segment, join the stage to the segment before if that is better, and
+        note its flaws. `positions`: those of the stage without corrections, which a join changes in place; `layer`: the
+        layer that ends with the stage, or None.
+        """
         if layer is not None and layer.ratio > 1:
             self._keep_smooth(layer, stage, positions)
         if self._after is not None:
@@ -600,7 +637,7 @@ class CodedMotion:
         return SourceStart(self.positions[seen(len(self.positions))], self._origin)
 
     def _join_stage(self, stage: int, end: End, positions: np.ndarray, layer: Layer | None) -> None:
-        """Join one stage, whose positions change; layer: the one that ends with it."""
+        """Join a stage to `end` in place if that is better. `layer`: the layer that ends with the stage, or None."""
         some = seen(len(positions))
         price: ErrorPrice | CorrectionPrice
         if layer is None:
@@ -628,7 +665,7 @@ class CodedMotion:
             self._keep_last_stage_best(layer, stage, positions)
 
     def _corrections(self, decoded: np.ndarray, layer: Layer, factor: float = 1.0) -> Corrections:
-        """Return corrections that bring the positions within the limit times a factor."""
+        """Return corrections that bring `decoded` positions within the limit of the layer times `factor`."""
         settings = replace(layer.settings, limit=layer.settings.limit * factor)
         met = self._met if factor == 1.0 else replace(self._met, decided=NO_CORRECTIONS)
         met = met if layer.ratio == 1 else streams.FREE_ENDS
@@ -676,6 +713,9 @@ class _EvenStages:
     """
 
     def __init__(self, coder: CodedMotion, shown: list[SegmentMotion], settings: Settings):
+        """Measure the errors of the stages, and move the steps of maps until the errors do not grow from stage to
+        stage. `coder`: the segment, whose last stage is measured already; `settings`: those of the first layer.
+        """
         self._coder, self._shown, self._steps = coder, shown, settings.node_steps.copy()
         self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
         self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
@@ -694,8 +734,10 @@ class _EvenStages:
         return sum(float(np.maximum(after - STAGE_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
 
     def _move(self, stage: int, worse: int, last: int, factor: float, most: int) -> None:
-        """Move the steps of the maps of a stage while `worse` exceeds the stage before it and all stages from there to
-        `last` gain."""
+        """Multiply the step of the maps of `stage` by `factor`, at most `most` times, while the errors of the stage
+        `worse` exceed those of the stage before it. Stop, and take the last change back, as soon as it does not reduce
+        by how much the stages from `worse` to `last` exceed those before them.
+        """
         if not self._shown[stage].plan.has_affines(stage):
             return
         for _ in range(most):
@@ -710,8 +752,9 @@ class _EvenStages:
                 return
 
     def _set(self, moved: int, factor: float) -> None:
-        """Multiply the step of a stage's maps by a factor, and measure the errors of the stages that these maps
-        move."""
+        """Multiply the step of the maps of the stage `moved` by `factor`, and measure anew the errors of all stages
+        that show these maps.
+        """
         nodes = self._shown[moved].plan.nodes
         last = int(nodes["last_stage"][nodes["stage"] == moved].max())
         self._steps, self.errors = self._steps.copy(), [*self.errors]

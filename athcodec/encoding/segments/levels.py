@@ -63,10 +63,14 @@ class SourceFrames:
         return np.maximum(np.max(windows, axis=0), self.bound / 2)
 
     def _bends(self, positions: np.ndarray, before: np.ndarray | None) -> np.ndarray:
-        """Return the RMS over vertices of the second difference at each frame that has one."""
+        """Return for each frame that has two neighbours the RMS over vertices of the second difference of positions
+        there. `positions`: (N, 3, T); `before`: the last positions of the segment before, which the frames follow, or
+        None.
+        """
         shown = np.repeat(np.arange(len(self.shown_times)), self.shown_times)
 
         def squares(start: int, stop: int) -> np.ndarray:
+            """Return the sums of squares, at each frame, over a range of vertices."""
             frames = positions[start:stop]
             frames = frames if len(shown) == frames.shape[2] else frames[:, :, shown]
             bends = squared_bends(frames)
@@ -86,13 +90,15 @@ def chosen_levels(
     exact: bool,
     first_held: int,
 ) -> list[int]:
-    """Return the stages that become levels: the best chain of them up to the last in which no RMS and no largest error
-    of any clip exceeds that before. It is the one with most stages that hold errors, of those the longest, of those the
-    one that begins with a coarser stage.
+    """Return the numbers of the stages that become levels, ascending. They form a chain that ends with the last stage,
+    in which neither the RMS nor the largest error of any clip grows from a stage to the next. Of all such chains it is
+    the one with most stages that hold an error; of those the longest; and of those the one that begins with the
+    coarsest stage.
 
-    errors: (stages, segments, 3). clip_frames: the frames of each segment of each clip of the file. flaws: (stages,
-    segments, 2) of SourceFrames.flaws. exact: whether the last stage is the source, which goes on from the stage
-    before. first_held: the first stage that ends a layer of precision, and so holds an error, as all after it do.
+    `errors`: (stages, segments, 3) by each of MEASURES; `clip_frames`: the frames of each segment of each clip of the
+    file; `flaws`: (stages, segments, 2), as SourceFrames.flaws returns them; `diagonal`: in scene units; `exact`:
+    whether the last stage is the source itself, which always follows the stage before; `first_held`: the first stage
+    that ends a layer, from which on each stage holds an error.
     """
 
     def rank(chain: list[int]) -> tuple[int, int, int]:

@@ -94,6 +94,9 @@ class Source:
     _only: list[np.ndarray] = field(init=False, repr=False, compare=False)  # Those of an only segment, once read.
 
     def __post_init__(self) -> None:
+        """Derive from the clip and its survey what no setting changes: origin, rest pose, forms, precision of branches,
+        and segments.
+        """
         stays_in_place = self.exact_rest and bool(self.seen.repeats[1:].all())
         is_exact = self.clip.dtype == np.float64 or stays_in_place  # Then the error may be 0 to the last bit.
         first = self.clip.rest[self.hierarchy.vertex_source[0]]  # The rest pose of a rooted plant begins at 0.
@@ -187,8 +190,9 @@ class Source:
         return self._changed(segment_frames=frames, whole=None)
 
     def holding(self, tolerance: float) -> Source:
-        """Return the source without the frames that differ from the last coded one by at most `tolerance` at each
-        vertex."""
+        """Return the source in which a frame repeats the last coded one if no vertex differs by more than `tolerance`
+        there, so that the frame is not coded.
+        """
         nearly = (self.seen.steps > 0) & (self.seen.steps <= tolerance)
         if not nearly.any() or self.still or Feature.REPEATS in self.without:
             return self
@@ -358,7 +362,9 @@ class Source:
         return gather(block, self.hierarchy.vertex_source, self.origin, self.pool)
 
     def positions(self, segment: int) -> np.ndarray:
-        """Return the positions of a segment less the origin, (N, 3, T) float64; all callers share them."""
+        """Return the positions of a segment less the origin, (N, 3, T) float64. All callers get the same array, which
+        is read-only.
+        """
         positions = self._held.get(segment)
         if positions is None:
             if self.whole is not None and (of_plant := self.whole[0]._held.get(segment)) is not None:
@@ -380,7 +386,7 @@ class Source:
 
 
 def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.ndarray:
-    """Return the branches as the core reads them, (B,) of _native.BRANCH."""
+    """Return the branches as the C core reads them under some settings, (B,) of _native.BRANCH."""
     branches = np.zeros(hierarchy.branch_count, BRANCH)
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
@@ -395,7 +401,9 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
 
 
 def plain_settings(source: Source, stages: int, bound: float, step: float, rest_step: float) -> Settings:
-    """Return settings without rotations, learned bases, rigid parts or other choices, at these steps."""
+    """Return settings without rotations, learned bases, rigid parts or other choices. `bound`: the bound of the file;
+    `step`, `rest_step`: the quantisation steps of motion and of the rest pose; all in scene units.
+    """
     none = np.zeros(source.hierarchy.branch_count, np.int32)
     return Settings(
         bound=bound,
@@ -427,6 +435,9 @@ class CodedPrelude:
     """Hierarchy and rest pose as the decoder will have them, for one choice of settings."""
 
     def __init__(self, source: Source, ath: Ath, settings: Settings, predicted: bool = False, bases: bool = True):
+        """Code hierarchy and rest pose. `predicted`: whether motion is predicted, so that stems have no streams;
+        `bases`: whether the bases of pieces are built. Raises BoundError if the rest pose cannot keep the bound.
+        """
         hierarchy = source.hierarchy
         self.origin, self.dtype = source.origin, np.dtype(source.clip.dtype)
         self.shares, self._of = source.clip.shares, (source, ath, settings)
@@ -453,7 +464,9 @@ class CodedPrelude:
 
 
 def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tuple[writing.Rest, np.ndarray]:
-    """Return REST, and the rest pose as decoded."""
+    """Return two things: the content of the chunk REST, and the rest pose that it decodes to, (N, 3) float64 less the
+    origin.
+    """
     head = writing.Rest(source.origin, settings.rest_step, source.clip.rest_dtype)
     if source.host_rest:
         head.is_host, head.step, head.stream = (
@@ -473,7 +486,9 @@ def _coded_rest(source: Source, branches: np.ndarray, settings: Settings) -> tup
 
 
 def _rest_within(source: Source, branches: np.ndarray, settings: Settings) -> streams.CodedRest:
-    """Return the rest pose at the step of the settings, or at the first finer one that keeps the bound."""
+    """Return the rest pose coded at the step that the settings have, or at the first finer step that keeps the bound.
+    Raises BoundError if none does.
+    """
 
     def encode(step: float) -> streams.CodedRest:
         mesh = source.mesh_for(settings)
@@ -517,7 +532,9 @@ def prelude_size(source: Source, ath: Ath, settings: Settings) -> float:
 
 
 def code_source_rest(source: Source, branches: np.ndarray, reference: np.ndarray, bound: float) -> bytes:
-    """Return SOURCE_REST about the reference pose as decoded, (N, 3) float64 less the origin; empty if not needed."""
+    """Return the payload of the chunk SOURCE_REST, which is empty if the rest pose in REST serves. `reference`: the
+    reference pose as decoded, (N, 3) float64 less the origin, about which the source's rest pose is coded.
+    """
     if not source.has_source_rest:
         return b""
     if source.exact_rest:
@@ -560,7 +577,9 @@ class StreamBasis:
 
 
 def stage_streams(settings: Settings, stages: int, bases: dict[int, StreamBasis]) -> list[StageStream]:
-    """Return how the integers of each stage are read under some settings. bases: learned time bases by stage."""
+    """Return how the integers of each stage are read, a list of one stream description per stage. `bases`: the learned
+    time basis of each stage that has one; the other stages are in waves.
+    """
     stage_streams = []
     for stage in range(stages):
         factor = float(settings.rotation_step_factors[stage])
@@ -572,8 +591,10 @@ def stage_streams(settings: Settings, stages: int, bases: dict[int, StreamBasis]
 
 
 def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarray, int]:
-    """Return the second moments over time, (T, T), of those tracks of one stage's stream, or of all, that do not
-    quantise to nothing, in units of their steps, and the number of these tracks. The segment was analysed finely."""
+    """Return two things about a segment that was analysed with fine steps: the second moments over time, (T, T) in
+    units of steps, of the tracks in the stream of `stage`, or of all tracks if it is None; and the number of these
+    tracks. Tracks that quantise to nothing do not count.
+    """
     if stage is None:
         return _moments(segment, [segment.coefficients, segment.tracks])
     pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
@@ -587,8 +608,9 @@ def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarra
 
 
 def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
-    """Return second moments over time (T, T) of the rows of some parts, in squared steps, and the number of rows that
-    count."""
+    """Return two things about the rows of integers in `parts`: the sum of their second moments over time, (T, T) in
+    squared steps; and the number of rows that count, because they do not quantise to nothing.
+    """
     lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
     for part in parts:
         rows = part.reshape(-1, segment.frames)
@@ -623,8 +645,11 @@ def time_components(
 def stage_bases(
     plan: Plan, settings: Settings, components: dict[int | None, TimeComponents], ratio: float = 1.0
 ) -> dict[int, StreamBasis]:
-    """Return the time bases of the stages that learn theirs, for steps `ratio` times those of the components: each
-    stage's own, or that of all, which lies with the first of them."""
+    """Return the learned time basis of each stage that has one, as {stage: basis}. If the settings ask for a common
+    basis, all stages use that of all motion, which the stream of the first of them holds. `components`: what time bases
+    are learned from, by stage, None for all motion; `ratio`: the steps of the settings over those that the components
+    were measured at.
+    """
     stages = [stage for stage in settings.learning_stages if plan.has_stems(stage)]
     if not settings.common_basis:
         bases = {stage: components[stage].basis(ratio, ratio) for stage in stages}
@@ -675,8 +700,10 @@ class Corrections:
         return writing.pack_corrections(self.step, streams.encode_corrections(self.rows, self.shape[0], self.shape[2]))
 
     def without_twitches(self, parts: tuple[np.ndarray, np.ndarray], most: float) -> Corrections:
-        """Return the corrections of the parts and vertices that no second difference of them moves by more than `most`.
-        parts: first vertices and numbers of vertices that move together."""
+        """Return these corrections without those of vertices that they make twitch: the second difference of a vertex's
+        corrections over frames exceeds `most`. If one vertex of a part that moves together twitches, the corrections of
+        the whole part go. `parts`: first vertices of such parts, and numbers of their vertices.
+        """
         vertices, number = np.unique(self.rows[:, 0], return_inverse=True)
         rows = np.column_stack([number, self.rows[:, 1:]]).astype(np.int32)
         twitches = np.zeros(self.shape[0], bool)
@@ -734,8 +761,13 @@ def analyse(
     before: SegmentMotion | None = None,
     ratio: int = 1,
 ) -> tuple[SegmentMotion, np.ndarray]:
-    """Return the integers of the stems, and the positions at the last stage without corrections; output: origin and
-    type of the positions. bases: of the stages that learn theirs; before, ratio: as SegmentMotion has them."""
+    """Quantise the motion of a segment. Return two things: its integers, and the positions that they decode to at the
+    last stage without corrections, (N, 3, T).
+
+    `output`: the origin and the dtype of decoded positions; `positions`: (N, 3, T) of the source less the origin;
+    `bases`: the learned time basis of each stage that has one; `before`: the integers of the layer that this one
+    refines, or None; `ratio`: the step of that layer over the step of this one.
+    """
     stages = stage_streams(settings, plan.stage_count, bases)
     segment = SegmentMotion(plan, positions.shape[2], stages, learned_modes, before, ratio, periodic=settings.periodic)
     origin, dtype = output
@@ -747,7 +779,9 @@ def analyse(
 
 
 def stems_head(settings: Settings, stage: int, bases: dict[int, StreamBasis]) -> writing.StemsHead:
-    """Return the head of the stems of a stage, whose time basis is among `bases` if it is learned."""
+    """Return the head of the chunk STEMS of a stage: its steps and its time basis, which is learned if `bases` has the
+    stage.
+    """
     head = writing.StemsHead(
         settings.step_of(stage), settings.rotation_step_factors[stage], turn=qz.turn_of(settings.turn_step)
     )
@@ -761,7 +795,9 @@ def stems_head(settings: Settings, stage: int, bases: dict[int, StreamBasis]) ->
 def stem_streams(
     segment: SegmentMotion, settings: Settings, bases: dict[int, StreamBasis]
 ) -> tuple[dict[int, bytes], dict[int, int]]:
-    """Return STEMS of the stages of a first layer, and the bytes of their time bases."""
+    """Return two things about the stages of a first layer that have stems: the payloads of their chunks STEMS, as
+    {stage: payload}; and how many bytes of each its time basis takes, as {stage: bytes}.
+    """
     plan = segment.plan
 
     def stem_stream(stage: int) -> tuple[bytes, int]:
@@ -787,8 +823,10 @@ def find_corrections(
     plan: Plan | PlanSample,
     ends: streams.MetEnds = streams.FREE_ENDS,
 ) -> Corrections:
-    """Return corrections that keep the limit. If it serves, they move all of a rigid part or of a ring. ends: what they
-    meet, in correction_step. Raises BoundError."""
+    """Return corrections that bring the `decoded` positions within the limit of the settings. A rigid part or a ring is
+    moved as a whole if that suffices. `ends`: the corrections of neighbouring segments that these have to go on from,
+    at the usual step. Raises BoundError if no step keeps the limit.
+    """
     factor, is_narrow = 1.0, Feature.WIDE in settings.without
     parts = parts_that_keep_their_shape(plan)
     while True:
@@ -818,7 +856,9 @@ def find_corrections(
 
 
 def parts_that_keep_their_shape(plan: Plan | PlanSample) -> tuple[np.ndarray, np.ndarray]:
-    """Return first vertices and numbers of vertices of rigid pieces, and of the rings of others."""
+    """Return two arrays about the parts whose vertices corrections move together, which are rigid pieces and the rings
+    of tubes: the first vertex of each, and its number of vertices.
+    """
     is_rigid = plan.pieces["flags"] & RIGID > 0
     rigid, tubes = plan.pieces[is_rigid], plan.pieces[~is_rigid & (plan.pieces["ring"] > 0)]
     count = -(-tubes["count"] // np.maximum(tubes["ring"], 1))
@@ -845,7 +885,9 @@ def code_stems(
 def _some_corrections(
     prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray
 ) -> tuple[Corrections, np.ndarray]:
-    """Return the corrections of a sample, and its vertices: fewer if many frames lie beyond the limit."""
+    """Return two things: the corrections of a sample of the vertices, and the vertices of the sample. The sample is all
+    of a small plant, and smaller the more positions lie beyond the limit.
+    """
     plan, count, part = prelude.plan, len(decoded), 1 if len(decoded) < SAMPLED else 2
     if count >= LEAST_SAMPLED:
         spread = slice(0, None, -(-count // SPREAD))

@@ -17,8 +17,10 @@ def decoding_bytes(vertex_count: int, frames: int) -> int:
 def split_segments(
     frame_count: int, vertex_count: int, limit: int | None = None, memory: int = 2 << 30
 ) -> list[tuple[int, int]]:
-    """Return balanced runs of at most `limit` frames, fewer if a run's float32 positions exceed 128 MiB or a decoder
-    needs more than `memory` bytes. None: MAX_SEGMENT if such a run is small, else DEFAULT_SEGMENT."""
+    """Return segments as pairs (start, stop) of frames, all of about the same length, at most `limit` frames. They are
+    shorter if the float32 positions of one exceed 128 MiB, or if a decoder would need more than `memory` bytes. If
+    `limit` is None, it is MAX_SEGMENT if such a segment is small, else DEFAULT_SEGMENT.
+    """
     if limit is None:
         longest = -(-frame_count // -(-frame_count // MAX_SEGMENT))
         limit = MAX_SEGMENT if 12 * vertex_count * longest <= SMALL_BYTES else DEFAULT_SEGMENT

@@ -130,7 +130,7 @@ class Settings:
         return replace(self, learned_bases=(False,) * self.stages, common_basis=False)
 
     def coarser(self, ratio: int) -> Settings:
-        """Return the settings of a first layer whose step is `ratio` times as large."""
+        """Return these settings for a first layer whose step is `ratio` times that of the last layer."""
         return replace(
             self,
             bound=ratio * self.bound,

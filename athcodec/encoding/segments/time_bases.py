@@ -53,7 +53,7 @@ class InWaves:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """The rows with a decoder's bits, (rank, frames) float64."""
+        """Return the rows of the time basis, (rank, frames) float64, with the very bits that a decoder computes."""
         rank, frames = self.integers.shape
         rows = np.empty((rank, frames))
         lib.ath_add_basis_rows(

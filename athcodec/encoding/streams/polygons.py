@@ -21,8 +21,9 @@ PLACES_IN_ROWS = (1, 3, 4, 6)  # Columns of PLACES that are tried: faces with ve
 
 
 def pack(polygons: Polygons, places: Places, has_sides: bool = True) -> bytes:
-    """Return FACES or EDGES. Raises ClipError if no reader would accept that many. has_sides: guesses of open sides are
-    used."""
+    """Return the payload of a chunk FACES or EDGES. `has_sides`: whether guesses of corners from open sides are used.
+    Raises ClipError if there are more polygons than readers take.
+    """
     count = polygons.face_count + len(polygons.corners)
     if count > ct.Limits.corners:
         raise ClipError(f"faces: got {count} faces and corners; the limit is {ct.Limits.corners}")
@@ -62,6 +63,9 @@ class Mesh:
     """Connectivity in the memory of the core, and the order in which it has vertices coded. One coding at a time."""
 
     def __init__(self, polygons: Polygons, vertex_source: np.ndarray):
+        """Build the connectivity of polygons in memory of the C core. `vertex_source`: the number of each vertex in the
+        source, (N,), in file order.
+        """
         vertex_count = len(vertex_source)
         vertex_of = np.argsort(vertex_source).astype(np.int32)
         self.memory = np.zeros(lib.ath_mesh_size(vertex_count, len(polygons.corners)) // 8 + 2, np.uint64)

@@ -18,7 +18,9 @@ from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
-    """Return HIERARCHY. branches: (B,) of _native.BRANCH; sources: the int32 permutations of hierarchy.Hierarchy."""
+    """Code the hierarchy, and return the stream of the chunk HIERARCHY. `branches`: (B,) of _native.BRANCH;
+    `branch_source`, `vertex_source`: the int32 permutations of Hierarchy, from file order to the source's.
+    """
     return encode_stream(
         "ath_encode_hierarchy",
         1024 + 16 * len(branches) + 4 * len(vertex_source),
@@ -52,10 +54,11 @@ def encode_rest(
     mesh: Mesh | None = None,
     shape_of: np.ndarray | None = None,
 ) -> CodedRest:
-    """Code a rest pose, (N, 3) float64 less the origin, about that of the layer before, if there is one.
+    """Code the rest pose of a layer, and return its stream with what it decodes to. `rest`: (N, 3) float64 less the
+    origin; `coarse`: the rest pose of the layer before, about which it is coded, or None.
 
-    slack: how far from its place a vertex may be put to save bits. mesh: faces that the pose goes by. shape_of: as
-    find_copies returns it; copies that are too far off are coded like other branches.
+    `slack`: how far from its place a vertex may be put to save bits; `mesh`: faces by which positions are predicted;
+    `shape_of`: what find_copies returns; copies that differ by too much are coded like other branches.
     """
     decoded, steps, moved = np.zeros_like(rest), np.zeros(rest.shape, np.int32), np.empty_like(rest)
     with nullcontext() if mesh is None else mesh.lock:
@@ -79,8 +82,10 @@ def encode_rest(
 
 
 def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: float) -> np.ndarray | None:
-    """Return the branch that each branch copies, (B,) int32: itself if others copy it, or -1. None: there are no
-    copies."""
+    """Return for each branch the branch whose shape it repeats, (B,) int32: its own number if others repeat it, or -1
+    if it is coded alone. Return None if there are no copies. `rest`: (N, 3) float64; `slack`: how far off a vertex may
+    be put.
+    """
     shape_of, uses = np.empty((2, len(branches)), np.int32)
     copies = lib.ath_find_copies(
         address(branches, BRANCH, 1),
@@ -95,7 +100,9 @@ def find_copies(branches: np.ndarray, step: float, rest: np.ndarray, slack: floa
 
 
 def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray, rest: np.ndarray) -> CodedRest:
-    """Code the source's rest pose about the reference pose as decoded, both (N, 3) float64 less the origin."""
+    """Code the source's rest pose about the reference pose, and return its stream with what it decodes to. `reference`,
+    `rest`: both poses, (N, 3) float64 less the origin, the first one as decoded.
+    """
     decoded, turns, moved = np.zeros_like(rest), np.empty((len(branches), 9)), np.empty_like(rest)
     data = encode_stream(
         "ath_encode_source_rest",
@@ -113,7 +120,9 @@ def encode_source_rest(branches: np.ndarray, step: float, reference: np.ndarray,
 
 
 def encode_exact_rest(branches: np.ndarray, pose: np.ndarray, mesh: Mesh | None = None) -> bytes:
-    """Code a rest pose that comes back bit for bit, (N, 3) float32 or float64 with the origin. mesh: its faces."""
+    """Code a rest pose so that it comes back bit for bit, and return the stream. `pose`: (N, 3) float32 or float64,
+    with the origin; `mesh`: its faces, by which positions are predicted, or None.
+    """
     numbers = pose.astype(np.float64, order="C")
     return encode_stream(
         "ath_encode_exact_rest",
@@ -140,8 +149,9 @@ def encode_temporal(steps: np.ndarray) -> bytes:
 
 
 def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
-    """Code rows of a learned time basis in waves: half octaves of their steps, (rows,) int32, and integers,
-    (rows, frames) int32."""
+    """Code the rows of a learned time basis as sums of waves, and return the stream. `exponents`: the step of each row
+    in half octaves, (rows,) int32; `integers`: the rows in these steps, (rows, frames) int32.
+    """
     rank, frames = integers.shape
     padded = np.concatenate([integers, np.zeros((-rank % 3, frames), np.int32)])
     return encode_stream(
@@ -155,7 +165,7 @@ def encode_basis(exponents: np.ndarray, integers: np.ndarray) -> bytes:
 
 
 def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict[int, bytes]:
-    """Return the streams of learned modes by stage."""
+    """Return the streams of learned modes as {stage: stream}, empty without learned modes."""
     if learned_modes is None:
         return {}
     capacity, arrays = 4096 + 8 * learned_modes.integers.size, _addresses(plan, learned_modes)
@@ -166,6 +176,9 @@ def encode_learned_modes(plan: Plan, learned_modes: LearnedModes | None) -> dict
 
 
 def _addresses(plan: Plan, modes: LearnedModes | None) -> tuple[int | None, int | None, int | None]:
+    """Return the addresses of three arrays of learned modes: counts, first modes and integers of the pieces. All are
+    None without learned modes.
+    """
     if modes is None:
         return None, None, None
     return (
@@ -219,8 +232,10 @@ def encode_corrections(corrections: np.ndarray, vertex_count: int, frames: int) 
 def encode_predicted(
     plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype: np.dtype
 ) -> tuple[bytes, np.ndarray] | None:
-    """Code predicted motion of a segment; return it and the positions that it decodes to, (T, N, 3) of `dtype`. None:
-    steps so large cannot keep the limits. source: (T, N, 3) float64 less the origin; limits: (N,)."""
+    """Code the motion of a segment by prediction. Return two things: the stream, and the positions that it decodes to,
+    (T, N, 3) of `dtype`. Return None if a step so large cannot keep the limits. `source`: (T, N, 3) float64 less the
+    origin; `limits`: the largest error of each vertex, (N,).
+    """
     frames, vertices, _ = source.shape
     memory = np.empty(lib.ath_predicted_memory(vertices) // 16 + 1, np.complex128)
     positions = np.empty(source.shape, dtype)
@@ -248,7 +263,9 @@ def encode_predicted(
 
 
 def encode_exact(positions: np.ndarray, source: np.ndarray) -> bytes:
-    """Code what turns decoded positions, (N, 3, T) float32 or float64, into those of the source, bit for bit."""
+    """Code by what decoded positions differ from those of the source, so that the source comes back bit for bit, and
+    return the stream. `positions`, `source`: (N, 3, T), both float32 or both float64.
+    """
     vertices, _, frames = positions.shape
     return encode_stream(
         "ath_encode_exact",
@@ -301,14 +318,19 @@ def find_corrections(
     narrow: np.ndarray | bool = False,
     ends: MetEnds = FREE_ENDS,
 ) -> np.ndarray | None:
-    """Return corrections, (K, 6) int32, that bring every vertex of (N, 3, T) positions within its limit of the source;
-    None: this step cannot express them. narrow: vertices, (N,) bool, whose corrections are to be of one frame. ends:
-    how corrections meet those of the segments beside this one."""
+    """Return corrections that bring every vertex within its limit of the source, (K, 6) int32 rows (vertex, frame, x,
+    y, z, width); None if this step cannot express them.
+
+    `positions`: decoded, (N, 3, T); `source`: (N, 3, T) less the origin; `limit`: one length or (N,); `narrow`:
+    vertices, (N,) bool, whose corrections may move one frame only; `ends`: how corrections go on from those of
+    neighbouring segments.
+    """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     of_one_frame = np.array(np.broadcast_to(narrow, vertices), np.uint8)
 
     def find(start: int, stop: int) -> np.ndarray | None:
+        """Return the corrections of a range of vertices, or None if this step cannot express them."""
         met, part = ends.of_vertices(start, stop), positions[start:stop]
         decided = np.ascontiguousarray(met.decided, np.int32)
         rows = _rows(
@@ -338,7 +360,9 @@ def find_corrections(
 
 
 def apply_corrections(positions: np.ndarray, corrections: np.ndarray, step: float) -> None:
-    """Move (N, 3, T) positions by corrections of a step."""
+    """Add corrections to decoded positions, (N, 3, T), in place. `corrections`: (K, 6) int32; `step`: the length of 1
+    in them.
+    """
     lib.ath_apply_corrections(
         positions.shape[2],
         positions.dtype == np.float64,
@@ -361,14 +385,19 @@ def find_rigid_corrections(
     narrow: bool = False,
     closed: int = 0,
 ) -> np.ndarray:
-    """Return corrections, (K, 6), ascending, each of which moves all vertices of a part together, if one of `positions`
-    is beyond its limit and this brings all within. parts: first vertices and numbers of vertices; narrow: corrections
-    are to be of one frame; closed: as MetEnds has it."""
+    """Return corrections, (K, 6) int32 sorted by vertex and frame, that move all vertices of a part alike. A part gets
+    one where a vertex of it is beyond its limit of the source, if that brings the whole part within the limits.
+
+    `parts`: the first vertex of each part, and its number of vertices; `positions`: decoded, (N, 3, T); `source`: (N,
+    3, T) less the origin; `narrow`: whether corrections may move one frame only; `closed`: the ends as MetEnds has
+    them.
+    """
     vertices, _, frames = positions.shape
     limits = np.array(np.broadcast_to(limit, vertices), np.float64)
     first, counts = (np.ascontiguousarray(numbers, np.int32) for numbers in parts)
 
     def find(start: int, stop: int) -> np.ndarray:
+        """Return the corrections of a range of parts."""
         rows = _rows(
             int(counts[start:stop].sum()) * frames,
             lambda rows, capacity: lib.ath_find_rigid_corrections(

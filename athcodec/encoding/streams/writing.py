@@ -101,7 +101,7 @@ class ChunkStore:
         return header.file_length
 
     def write(self, out: BinaryIO, header: Header, errors: np.ndarray) -> list[Chunk]:
-        """Write the whole file in its order, and return its chunks."""
+        """Write the whole file to `out`, its chunks in the order that files have, and return the chunks."""
         entries = sorted(self.entries, key=lambda entry: _order(entry[0]))
         out.write(pack_front(header, [chunk for chunk, _ in entries], errors))
         chunks = []
@@ -177,8 +177,10 @@ def pack_clips(
     seams: Sequence[Sequence[float] | None],
     periodic: bool = False,
 ) -> bytes:
-    """Return CLIPS. seams: for a loop the error at the seam of each level, in scene units. periodic: whether loops of
-    one segment are coded by periodic waves."""
+    """Return the payload of the chunk CLIPS. `segment_counts`: how many segments each clip has; `seams`: for each clip
+    that loops the error at its seam at each level, in scene units, None for other clips; `periodic`: whether loops of
+    one segment are coded by periodic waves.
+    """
     entries = []
     for clip_range, segments, errors in zip(clip_ranges, segment_counts, seams):
         name = clip_range.name.encode()
@@ -259,7 +261,9 @@ def pack_derived_edges(index_type: int) -> bytes:
 
 
 def pack_array(name: str, array: np.ndarray) -> bytes:
-    """Return ATTRIBUTE of an array of numbers, booleans or texts. Raises ClipError for what no reader would accept."""
+    """Return the payload of a chunk ATTRIBUTE that holds an array of numbers, booleans or texts under a name. Raises
+    ClipError if readers would refuse it.
+    """
     subject, limits = f"array {brief(name)}", Limits()
     if array.nbytes > limits.decoded_chunk_bytes:  # Refused before it is compressed.
         raise ClipError(f"{subject}: got {array.nbytes} bytes; the limit is {limits.decoded_chunk_bytes}")

@@ -44,8 +44,11 @@ def arranged(
     parent: np.ndarray | None = None,
     names: Sequence[Sequence[str]] = (),
 ) -> Found:
-    """Return a tree over the labels, whose vertices run from base to tip. names: words of each label's name, of which
-    relatives share the first."""
+    """Arrange branches as a forest, and order the vertices of each from base to tip. `label`: the branch of each
+    vertex, (N,); `root`: a vertex of the branch that is to be the root, or None; `method`: the name of the method, kept
+    in the result; `parent`: the parent of each branch where it is known, else it is found; `names`: the words of each
+    branch's name, whose first ones related branches share.
+    """
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
         arrange = _joints_by_price if seen.by_price else _joints_by_contact
@@ -73,8 +76,10 @@ class _Contacts:
 
 
 def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
-    """Return the forest of branches that takes the fewest bits: each hangs where it costs least, or is a root. root: a
-    vertex of the only root, as far as contacts lead to it."""
+    """Return the forest of branches that takes the fewest bits: each branch hangs on the one where it costs least, or
+    is a root. `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `contacts`: where branches may
+    hang on each other; `root`: a vertex of the only root, as far as contacts lead to it, or None.
+    """
     prices, count = Prices(frames, label), int(label.max()) + 1
     vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
     child, parent = label[vertices].T
@@ -96,8 +101,10 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
 
 
 def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
-    """Return a tree of branches of the least total cost, from a root outwards, for each part that contacts join: what
-    grows on what, as far as a mesh shows it."""
+    """Return a tree for each set of branches that contacts connect: the tree whose contacts have the least total cost,
+    hung on its root. `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `root`: a vertex of the
+    branch that is to be a root, or None.
+    """
     count = int(label.max()) + 1
     branch, other = label[contacts.vertices].T
     sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
@@ -126,7 +133,9 @@ def _bases(
 
 
 def _joints_of(rest: np.ndarray, frames: np.ndarray, label: np.ndarray, parent: np.ndarray) -> _Joints:
-    """Return where branches touch the parents that they are known to have."""
+    """Return where each branch hangs on its parent, for branches whose `parent`, (B,), is known. `rest`: (N, 3)
+    positions; `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,).
+    """
     tree_of: dict[int, ScipyObject] = {}
     base, order = _stillest(frames, label), np.argsort(label, kind="stable")
     bounds = np.searchsorted(label[order], np.arange(len(parent) + 1))
@@ -146,7 +155,11 @@ def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
-    """Return the branch of each part, among the large ones, of which some vertex moves least."""
+    """Return the root branch of each connected part: of its large branches, the one with the vertex that moves least.
+    `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `still`: the vertex of each branch that
+    moves least, (B,); `parts`: the connected part of each branch, (B,); `root`: a vertex of the branch that is to be a
+    root in any case, or None.
+    """
     size = sizes_of_each(frames[0], label)
     largest = np.zeros(parts.max() + 1)
     np.maximum.at(largest, parts, size)
@@ -159,8 +172,11 @@ def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.n
 
 
 def _contacts(frames: np.ndarray, label: np.ndarray, names: Sequence[Sequence[str]]) -> _Contacts:
-    """Return the pair of vertices of every two near branches that best keeps its distance: they may hang together
-    there."""
+    """Return for every two branches that are near each other the pair of vertices, one of each, at which they most
+    likely hang together: a pair that is near, and keeps its distance over the frames, costs little. `frames`: (F, N, 3)
+    positions, the rest pose first; `label`: the branch of each vertex, (N,); `names`: the words of each branch's name,
+    or none.
+    """
     pairs = _near_pairs(frames[0], label)
     gap = np.linalg.norm(frames[0, pairs[:, 0]] - frames[0, pairs[:, 1]], axis=1)
     near = gap <= sizes_of_each(frames[0], label)[label[pairs]].max(axis=1)
@@ -181,7 +197,9 @@ def _contacts(frames: np.ndarray, label: np.ndarray, names: Sequence[Sequence[st
 
 
 def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return vertices and the nearest one to each on every branch that is near it, (C, 2)."""
+    """Return pairs of near vertices of different branches, (C, 2): each vertex with the nearest one on every branch
+    that is near it. `rest`: (N, 3) positions; `label`: the branch of each vertex, (N,).
+    """
     cKDTree, count = scipy_module("spatial").cKDTree, int(label.max()) + 1
     near_pairs = [np.zeros((0, 2), np.int64), *_others_nearby(cKDTree(rest), rest, label, min(NEIGHBOURS, len(rest)))]
     part = components(np.concatenate([label[pairs] for pairs in near_pairs]), count)
@@ -195,7 +213,10 @@ def _near_pairs(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _others_nearby(tree: ScipyObject, rest: np.ndarray, label: np.ndarray, near: int) -> Iterator[np.ndarray]:
-    """Yield pairs of vertices and those among their `near` nearest that are of other branches, one of each branch."""
+    """Yield arrays of pairs of vertices, (K, 2), of different branches: each vertex with those of its `near` nearest
+    vertices that are of other branches, the nearest one for each branch. `tree`: a search tree of `rest`, (N, 3);
+    `label`: the branch of each vertex, (N,).
+    """
     length = max(1, QUERY // near)
     for start in range(0, len(rest), length):
         some = np.arange(start, min(start + length, len(rest)))

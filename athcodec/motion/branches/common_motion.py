@@ -31,8 +31,11 @@ FLAT = 0.05  # Extent of feet across their line, over that along it, that turns 
 
 
 def without_common_motion(frames: np.ndarray) -> np.ndarray | None:
-    """Return the frames, (1 + F, N, 3), of which the first is the rest pose, each moved so that most of what keeps its
-    distances is where it is in the rest pose; None where that takes off little of the motion."""
+    """Return frames from which the rotation and translation that the whole plant shares is removed: each frame is moved
+    so that the vertices that keep their distances from each other come as close as possible to where the rest pose has
+    them. Return None if that removes little of the motion. `frames`: (1 + F, N, 3) positions, of which the first is the
+    rest pose.
+    """
     some = slice(None, None, max(1, frames.shape[1] // VERTICES))
     rest, poses = frames[0, some], frames[1:, some]
     diagonal = float(np.linalg.norm(np.ptp(rest, axis=0)))
@@ -69,8 +72,10 @@ def _fit(rest: np.ndarray, poses: np.ndarray, weight: np.ndarray) -> tuple[np.nd
 
 
 def _steady(frames: np.ndarray, most: float) -> np.ndarray | None:
-    """Return weights, (N,), of the largest set of vertices that keep their distances to one of them, within `most`;
-    None where the set is small, or lies along a line, as on a stiff branch, and so tells no rotation."""
+    """Return weights of the vertices, (N,), 1 for those of the largest set whose distances from one vertex of the set
+    change by at most `most` over the frames, (F, N, 3), and 0 for the others. Return None if the set is small, or lies
+    along a line, as on a stiff branch, from which no rotation can be told.
+    """
     count = frames.shape[1]
     some = np.arange(0, count, max(1, count // PAIRED))
     least, largest = np.full((2, len(some), count), np.inf)
@@ -90,8 +95,10 @@ def _steady(frames: np.ndarray, most: float) -> np.ndarray | None:
 
 
 def carried(branches: Found, frames: np.ndarray) -> Found | None:
-    """Return branches with one that all roots hang on, of vertices of theirs that stand still in frames without common
-    motion; None where too few do, or along a line."""
+    """Return branches with one more, on which all roots hang: it consists of some first vertices of roots, which stand
+    still in `frames`, from which the common motion was removed. Return None if there are too few such vertices, or if
+    they lie along a line.
+    """
     label, parent = branches.vertex_branch.astype(np.int64), branches.branch_parent.astype(np.int64)
     roots = parent < 0
     if np.count_nonzero(roots) < 2:

@@ -48,8 +48,7 @@ FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
 def find_branches(clip: MotionClip, method: str = "auto", root: int | None = None) -> Found:
-    """Find branches for a clip: `athcodec.find_branches`, which documents the methods, of a clip. Raises ClipError,
-    MissingExtra, ValueError."""
+    """Find branches for a clip, as `athcodec.find_branches` documents. Raises ClipError, MissingExtra or ValueError."""
     if method != "auto" and method not in METHODS:
         raise ValueError(f"method: got {method!r}, expected auto or one of {', '.join(METHODS)}")
     root = None if root is None else whole("root", root)
@@ -73,8 +72,9 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
 
 
 def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
-    """Yield the ways to divide a clip into branches that are worth comparing, the likeliest first. by_points: whether
-    runs of points may be sought."""
+    """Yield the ways to divide a clip into branches whose files are worth comparing, the likeliest one first.
+    `by_points`: whether runs of points that nothing joins may be sought.
+    """
     clip = seen.clip
     single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
@@ -112,7 +112,9 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
 
 
 def _distinct(proposals: Iterable[Found]) -> Iterator[Found]:
-    """Yield branches that differ from all before them: a mesh may leave nothing to arrange in another way."""
+    """Yield those of some proposals that differ from all before them: two ways to arrange a mesh may give the same
+    branches.
+    """
     before: list[tuple[np.ndarray, ...]] = []
     for branches in proposals:
         index = source_stem_index(branches.vertex_branch) if branches.stem_index is None else branches.stem_index
@@ -134,7 +136,10 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
 
 
 def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
-    """Yield other branches for connected pieces: without parents, in another order, or joined where they touch."""
+    """Yield other branches than `first`, for a mesh whose connected pieces `first` takes as branches: pieces without
+    parents, with vertices in the order of the source, hung where they touch, of the parts of the source, or apart where
+    they were joined.
+    """
     roots = np.count_nonzero(first.branch_parent < 0)
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
@@ -162,9 +167,11 @@ def _in_order(seen: Seen) -> Iterator[Found]:
 
 
 def _labels_in_order(seen: Seen) -> list[np.ndarray]:
-    """Return labels of such parts, (N,) each. The next vertex belongs to another part where the two do not keep their
-    distance, or are far from each other, too: what stands in the ground keeps its distance from the feet around it.
-    Where these are of one size, as copies are, there is no doubt of them."""
+    """Return up to two ways to divide points that nothing joins into parts that follow each other in the order of the
+    source, as labels (N,) each; a part begins at a point that does not keep its distance from the one before it. The
+    second way also begins a part at a point that is far from the one before it, since things that stand in the ground
+    keep their distances. If this way gives parts of one size, as copies are, it alone is returned.
+    """
     frames, count = seen.frames[1:], seen.clip.vertex_count
     if len(seen.mesh) or count < 2:
         return []
@@ -233,8 +240,9 @@ def _first_found(seen: Seen, methods: Sequence[str], root: int | None) -> Found 
 
 
 def _by_attributes(seen: Seen, root: int | None) -> Found | None:
-    """Find branches by labels under a usual name, for vertices or faces, and their parents if the source has those
-    too."""
+    """Return branches from labels that the source has for vertices or faces under a usual name, with their parents if
+    it has these too, or None without such labels. `root`: a vertex of the branch that is to be the root, or None.
+    """
     clip = seen.clip
     source = _plain_names(clip)
     named = {name: clip.attributes[original] for name, original in source.items()}
@@ -266,7 +274,9 @@ def named_labels(clip: MotionClip) -> np.ndarray | None:
 
 
 def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | None:
-    """Return whole numbers from 0 on, one per vertex, of an array per vertex or per face; None if it is neither."""
+    """Return a label for each vertex, (N,) whole numbers from 0 on, from an array of labels of vertices or of faces, or
+    None if the array is neither.
+    """
     if array is None or array.size not in (len(array), 0) or array.dtype.kind not in "iuf":
         return None
     values = np.round(array.reshape(-1)).astype(np.int64) if array.size else array
@@ -281,8 +291,10 @@ def _vertex_labels(clip: MotionClip, array: np.ndarray | None) -> np.ndarray | N
 
 
 def _by_skeleton(seen: Seen, root: int | None) -> Found | None:
-    """Find branches by chains of joints: the vertices whose strongest weights are theirs. An object that no joint moves
-    hangs on the nearest one."""
+    """Return branches from chains of joints of a skeleton: a branch consists of the vertices that the same joint moves
+    most. An object that no joint moves hangs on the nearest branch. Return None if the clip has no joint that moves a
+    vertex.
+    """
     clip = seen.clip
     if clip.skin is None or (clip.skin.vertex_joint >= 0).sum() == 0:
         return None
@@ -327,7 +339,9 @@ def _unlabelled_parts(clip: MotionClip, label: np.ndarray) -> np.ndarray:
 
 
 def _by_edges(seen: Seen, root: int | None) -> Found | None:
-    """Find branches by a graph of centre lines; not for meshes, whose edges close cycles."""
+    """Return branches from edges that form centre lines, or None if there are none. Edges of meshes, which close
+    cycles, are not used.
+    """
     clip = seen.clip
     if clip.edges is None or not len(clip.edges) or clip.polygons is not None:
         return None
@@ -340,7 +354,9 @@ def _by_edges(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_objects(seen: Seen, root: int | None) -> Found | None:
-    """Find branches by objects of a scene, most of which move by one affine map each."""
+    """Return each object of a scene as a branch, or None unless most vertices are of objects that move by one affine
+    map each.
+    """
     clip = seen.clip
     label = parts_of(clip)
     if label is None or label.max() == 0 or label.max() > COMPONENTS_AT_MOST * len(label):
@@ -355,7 +371,9 @@ def _by_objects(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_components(seen: Seen, root: int | None) -> Found | None:
-    """Find branches by pieces of a mesh that hang together: bark tubes, leaf cards."""
+    """Return each connected piece of a mesh, such as a bark tube or a leaf card, as a branch. Return None if there is
+    no mesh, a single piece, or too many pieces of few vertices.
+    """
     if not len(seen.mesh):
         return None
     vertex_count = seen.clip.vertex_count
@@ -367,8 +385,9 @@ def _by_components(seen: Seen, root: int | None) -> Found | None:
 
 
 def _by_runs(seen: Seen, root: int | None) -> Found | None:
-    """Find branches of points that nothing joins by linking those that keep their distance: blades, needles,
-    strands."""
+    """Return branches such as blades, needles and strands, for points that nothing joins, by linking points that keep
+    their distance; None if the points form no such runs.
+    """
     if len(seen.mesh):
         return None
     frames = seen.frames[1:]  # The rest pose may have links of other lengths.

@@ -13,10 +13,11 @@ from athcodec.motion.hierarchy import branch_orders
 
 
 def cheapest_forest(count: int, child: np.ndarray, parent: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return the number of the edge that each of `count` nodes takes, (count,).
+    """Return the cheapest forest that arcs from children to parents can form: for each of `count` nodes the number of
+    the arc that leads to its parent, (count,).
 
-    child, parent, cost : (E,) arrays
-        Of edges; a node of parent `count` is a root, which every node needs to be able to be.
+    `child`, `parent`, `cost`: (E,) arrays, one row for each arc: two nodes, and what it costs to take it. An arc whose
+    parent is the number `count` makes its child a root; every node needs one such arc.
     """
     rounds: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     while True:
@@ -37,8 +38,10 @@ def cheapest_forest(count: int, child: np.ndarray, parent: np.ndarray, cost: np.
 
 
 def _cycles(above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which nodes are in cycles, and names, (count + 1,), which the nodes of a cycle share. above: of each node,
-    the last of which is its own."""
+    """Return two things: which nodes lie in cycles, (count + 1,) bool; and a name for each node, (count + 1,), which
+    the nodes of one cycle share. `above`: the parent of each node, where the last node is the parent of itself and of
+    all roots.
+    """
     every, step = np.arange(len(above)), above
     least = every
     for _ in range(len(above).bit_length()):
@@ -53,9 +56,11 @@ def _cycles(above: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def without_needless_orders(
     child: np.ndarray, parent: np.ndarray, cost: np.ndarray, chosen: np.ndarray, price: float, each: float
 ) -> np.ndarray:
-    """Return the choice of arcs, (B,), without the highest orders whose branches cost little more at lower ones: at
-    most `each` in the mean, and all together at most the price of a level. Arcs are as in `cheapest_forest`, and every
-    branch has one as a root, whose parent is the number of branches."""
+    """Return the arcs chosen for the branches, (B,), after branches of the highest order were moved to parents of lower
+    order, as often as that costs little: at most `each` for a branch in the mean, and at most `price`, that of a level,
+    for all of the order. The arcs `child`, `parent`, `cost` are those of `cheapest_forest`; `chosen`: (B,) what it
+    returned.
+    """
     chosen, count = chosen.copy(), len(chosen)
     while True:
         order = np.append(branch_orders(np.where(parent[chosen] == count, -1, parent[chosen])), -1)

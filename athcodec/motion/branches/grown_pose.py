@@ -30,8 +30,10 @@ def with_grown_pose(clip: MotionClip) -> MotionClip:
 
 
 def grown_pose(clip: MotionClip) -> np.ndarray | None:
-    """Return the frame in which a clip is most grown, (N, 3) in its dtype, if more of the rest pose is small than of
-    another frame: links between vertices that are much shorter than their largest length; None: the rest pose does."""
+    """Return the frame in which the links between vertices are longest, (N, 3) in the clip's dtype, if the plant is
+    more grown in the frames than in the rest pose: a frame has fewer links that are much shorter than at their longest.
+    Return None if the rest pose serves as well.
+    """
     if clip.frame_count == 1 or clip.vertex_count == 1:
         return None
     links = links_of(clip)
@@ -54,8 +56,9 @@ def grown_pose(clip: MotionClip) -> np.ndarray | None:
 
 
 def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy) -> np.ndarray:
-    """Return a pose of a clip, (N, 3), in which branches that are much smaller there than in some frame have the shape
-    of the frame where they are largest. Such a branch hangs on its parent as it does in that frame."""
+    """Return `pose`, (N, 3), in which each branch that is much smaller than in some frame has the shape of the frame
+    where it is largest. Such a branch hangs on its parent as it does in that frame.
+    """
     if clip.frame_count == 1:
         return pose
     frames, source, first = _some_frames(clip.frame_count), hierarchy.vertex_source, hierarchy.first_vertex

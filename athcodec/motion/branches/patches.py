@@ -13,9 +13,11 @@ CRUMB = 12  # Vertices below which a patch joins a neighbour.
 
 
 def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) -> np.ndarray:
-    """Return labels of connected patches whose vertices one affine map per frame carries well, (N,): seeds spread over
-    the mesh, then maps and memberships in turn (Lloyd's iteration), in which vertices change to neighbouring patches
-    only."""
+    """Return the patch of each vertex, (N,): connected parts of a mesh, each of which one affine map per frame carries
+    well. They grow from seeds spread over the mesh; then maps are fitted to patches, and vertices change to
+    neighbouring patches whose maps fit better, in turn (Lloyd's iteration). `frames`: (F, N, 3) positions, the rest
+    pose first; `links`: (L, 2) pairs of neighbours; `patch_vertices`: about how many vertices a patch is to have.
+    """
     links = np.concatenate([links, links[:, ::-1]])
     label = _spread(frames[0], links, int(np.clip(frames.shape[1] / patch_vertices, 1, MOST_PATCHES)))
     for _ in range(PATCH_ROUNDS):
@@ -34,8 +36,10 @@ def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) ->
 
 
 def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
-    """Return the nearest seed of each vertex over the links, (N,), of `count` seeds that are far apart; every part has
-    one."""
+    """Return for each vertex the number of the seed that is nearest over the links, (N,). The seeds are about `count`
+    vertices that are far apart, at least one in each connected part. `rest`: (N, 3) positions; `links`: (L, 2) pairs of
+    neighbours.
+    """
     length = np.maximum(np.linalg.norm(rest[links[:, 0]] - rest[links[:, 1]], axis=1), 1e-30)
     graph = scipy_module("sparse").coo_matrix((length, links.T), (len(rest),) * 2).tocsr()
     dijkstra = scipy_module("sparse.csgraph").dijkstra
@@ -50,8 +54,10 @@ def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
 
 
 def _maps(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return least-squares affine maps from the rest pose, (B, F, 4, 3); translations if vertices do not determine
-    more."""
+    """Return for each patch and frame the least-squares affine map, (B, F, 4, 3), from rest positions to how far the
+    vertices have moved from there; it is a translation if the vertices do not determine more. `frames`: (F, N, 3)
+    positions, the rest pose first; `label`: the patch of each vertex, (N,).
+    """
     order = np.argsort(label, kind="stable")
     first = np.searchsorted(label[order], np.arange(label.max() + 1))
     rest = np.concatenate([frames[0], np.ones((len(label), 1))], axis=1)[order]
@@ -74,7 +80,9 @@ def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.
 
 
 def _without_crumbs(label: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Merge patches of few vertices into a neighbour."""
+    """Return the patch of each vertex, (N,), after patches of few vertices were merged into larger neighbours. `label`:
+    the patches before; `links`: (L, 2) pairs of neighbours.
+    """
     for _ in range(PATCH_ROUNDS):
         size = np.bincount(label)
         leaves = (size[label[links[:, 0]]] < CRUMB) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])

@@ -33,9 +33,8 @@ PAIRS_AT_ONCE = 1 << 13  # Pairs of points whose distances are computed at once,
 
 
 def run_links(frames: np.ndarray) -> np.ndarray | None:
-    """Return pairs of neighbours along runs, (L, 2), which close no cycles; None if the points are no runs.
-
-    frames: (F, N, 3) positions in a few frames.
+    """Return the links between points that lie next to each other on a run, such as a blade or a strand, (L, 2) without
+    cycles; None if the points form no runs. `frames`: (F, N, 3) positions in a few frames.
     """
     frames = np.ldexp(frames, -np.frexp(np.abs(frames).max())[1])  # Squares of tiny or huge positions would be lost.
     count, steady = frames.shape[1], _Steady(frames)
@@ -54,8 +53,10 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
 
 
 def base_points(frames: np.ndarray, links: np.ndarray, root: int | None) -> np.ndarray:
-    """Return, of each thing that links join, the end that moves least; of ends that move alike, the first. `root` is
-    the base of its thing."""
+    """Return the base of each connected set of points: the end of a run that moves least, or the first of those that
+    move alike. `frames`: (F, N, 3) positions; `links`: (L, 2) pairs of points; `root`: a point that is the base of its
+    set, or None.
+    """
     count = frames.shape[1]
     way = np.sqrt(((frames - frames[0]) ** 2).sum(axis=(0, 2)))
     part, is_inner = _parts(links, count), _degrees(links, count) > 1
@@ -71,6 +72,7 @@ class _Steady:
     """Pairs of points that keep their distance."""
 
     def __init__(self, frames: np.ndarray):
+        """Begin without pairs, for points with the positions `frames`, (F, N, 3)."""
         self._start, self._count = frames[0], frames.shape[1]
         self._tracks = (frames - frames[0].mean(axis=0)).transpose(1, 0, 2).astype(np.float32)
         low, high = frames.min(axis=(0, 1)), frames.max(axis=(0, 1))
@@ -80,7 +82,9 @@ class _Steady:
         self._pairs, self._change, self._length = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0)
 
     def add(self, pairs: np.ndarray) -> None:
-        """Add those of some pairs, (P, 2), that keep their distance."""
+        """Keep those of the given pairs of points, (P, 2), that keep their distance over the frames, beside the pairs
+        kept before.
+        """
         change, length = self._measured(pairs)
         for end in pairs.T:
             np.minimum.at(self._best, end, change)
@@ -93,8 +97,9 @@ class _Steady:
         self._length = np.concatenate([self._length, length[is_steady]])[once]
 
     def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the change of the distance of each pair, as a share of the motion of one point relative to the other,
-        and the mean distance."""
+        """Return two things for each pair of points, (P,): how much their distance changes over the frames, as a share
+        of the motion of one point relative to the other; and their mean distance.
+        """
         change, length = np.empty(len(pairs)), np.empty(len(pairs))
         for start in range(0, len(pairs), PAIRS_AT_ONCE):
             some = slice(start, start + PAIRS_AT_ONCE)
@@ -107,7 +112,9 @@ class _Steady:
         return change, length
 
     def distinct(self, pairs: np.ndarray, links: np.ndarray) -> np.ndarray:
-        """Return pairs of a point without links that are much steadier than any other pair of either end, (L, 2)."""
+        """Return those of the given pairs, (L, 2), of which a point has no links yet, and whose distance is much
+        steadier than that of any other pair with one of the two points. `links`: (L, 2) links that exist already.
+        """
         degree, part = _degrees(links, self._count), _parts(links, self._count)
         pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
         change, _ = self._measured(pairs)
@@ -139,7 +146,10 @@ class _Steady:
 
 
 def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) -> np.ndarray:
-    """Return the links, and those to points that do not move, if they stand behind an end that does not move either."""
+    """Return the links with more links added: points that do not move, and have no link, are linked to the end of a run
+    that does not move either, if they stand where the run would go on. `frames`: (F, N, 3); `links`: (L, 2);
+    `precision`: the length below which a motion is rounding.
+    """
     count = frames.shape[1]
     still = np.sqrt(((frames - frames[0]) ** 2).sum(axis=2)).max(axis=0) <= 4 * precision
     cKDTree = scipy_module("spatial").cKDTree
@@ -163,7 +173,9 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
 
 
 def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
-    """Return pairs of near points, (P, 2), the smaller number first, each once."""
+    """Return pairs of points that are near each other, (P, 2), each once, the smaller name first. `points`: (K, 3)
+    positions; `names`: (K,) the numbers by which the pairs name them.
+    """
     if len(names) < 2:
         return np.zeros((0, 2), np.int64)
     count = min(len(names), 1 + int(np.clip(PAIRS // len(names), *NEAR)))

@@ -32,6 +32,9 @@ class Prices:
     """Bits of the motion of labelled branches in a few frames, (1 + F, N, 3), of which the first is the rest pose."""
 
     def __init__(self, frames: np.ndarray, label: np.ndarray):
+        """Take a few frames, (1 + F, N, 3), of which the first is the rest pose, and the branch of each vertex, `label`
+        (N,).
+        """
         self._frames, self._rest, self._label = frames, frames[0], label
         self._ways = (frames[1:] - frames[0]).transpose(1, 2, 0)  # (N, 3, F)
         self._shown = _far_vertices(self._rest, label)
@@ -55,7 +58,9 @@ class Prices:
         return bits + self._of_sizes(*self._label[vertices].T)
 
     def _on(self, vertices: np.ndarray) -> np.ndarray:
-        """Return the bits (C,) of branches that hang on others, by pairs (C, 2) of a vertex of each."""
+        """Return for each pair of vertices, (C, 2), the bits that the first vertex's branch takes if it hangs on the
+        second one's branch there, (C,).
+        """
         child, attach = self._label[vertices[:, 0]], vertices[:, 1]
         left = self._ways[self._shown[child]] - self._ways[attach][:, None]
         arm = self._rest[self._shown[child]] - self._rest[attach][:, None]
@@ -72,7 +77,9 @@ class Prices:
         return SMALLER * ((larger < smaller).astype(float) + (larger < 2 * smaller))
 
     def _turns_at(self, vertices: np.ndarray) -> np.ndarray:
-        """Return the rotations about vertices, (K,), of what is near them on their branches, as `_turns` has them."""
+        """Return the rotations of the surroundings of each vertex on its own branch, as `_turns` returns them.
+        `vertices`: (K,).
+        """
         near = self._tree.query(self._apart[vertices], k=min(AROUND, len(self._rest)), distance_upper_bound=APART / 2)[
             1
         ]
@@ -98,7 +105,9 @@ class Prices:
 
 
 def _far_vertices(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return vertices of each branch that are far from its centre and from each other, (B, SHOWN)."""
+    """Return for each branch SHOWN of its vertices that are far from its centre and from each other, (B, SHOWN).
+    `rest`: (N, 3) positions; `label`: the branch of each vertex, (N,).
+    """
     away = np.square(_centred(rest, label)).sum(axis=1)
     shown: list[np.ndarray] = []
     for _ in range(SHOWN):

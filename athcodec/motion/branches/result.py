@@ -48,6 +48,7 @@ class Found:
         return f"<Found: {self}>"
 
     def __str__(self) -> str:
+        """Return a line that says how many branches were found, and how."""
         orders = branch_orders(self.branch_parent)
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
@@ -64,7 +65,9 @@ def checked_branches(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: 
 
 
 def hierarchy_on(branches: Found, rest: np.ndarray, edges: np.ndarray | None) -> Hierarchy:
-    """Return the hierarchy of branches that were found for a clip with a rest pose, (N, 3), and edges."""
+    """Return the hierarchy of a clip on branches that were found for it. `rest`: the clip's rest pose, (N, 3); `edges`:
+    its edges, (E, 2), or None.
+    """
     links = [pairs for pairs in (edges, branches.links) if pairs is not None]
     return build_hierarchy(
         branches.vertex_branch,

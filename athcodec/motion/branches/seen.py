@@ -81,7 +81,9 @@ class Seen:
 
 
 def links_of(clip: MotionClip) -> np.ndarray:
-    """Return pairs of vertices that edges or sides of faces join, (L, 2)."""
+    """Return pairs of vertices that belong together, (L, 2): joined by an edge or a side of a face, or next to each
+    other in a copy of a shape.
+    """
     pairs = [np.zeros((0, 2), np.int64)]
     if clip.edges is not None:
         pairs.append(clip.edges.astype(np.int64))
@@ -94,8 +96,10 @@ def links_of(clip: MotionClip) -> np.ndarray:
 
 
 def _parts(clip: MotionClip) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the vertices of each object of the scene and its copies, of one shape each; None where the clip does not
-    say. Copies that do not fit count as one."""
+    """Return two arrays about the objects of a scene: how many vertices each has, and of how many copies of one shape
+    it consists, 1 for all objects if the numbers of copies do not fit. Return None if the clip does not name its
+    objects.
+    """
     counts, copies = (clip.attributes.get(f"part_{name}") for name in ("vertex_counts", "copies"))
     if counts is None or counts.ndim != 1 or counts.dtype.kind not in "iu":
         return None
@@ -118,8 +122,10 @@ def parts_of(clip: MotionClip) -> np.ndarray | None:
 
 
 def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
-    """Return the share of the vertices whose parts, (N,) labels, move by one affine map in each of the frames,
-    (k, N, 3), from that in which the part is largest."""
+    """Return which share of the vertices, 0 to 1, belongs to parts that move by one affine map in each of the frames.
+    The maps start from the frame in which the part is largest. `frames`: (k, N, 3) positions; `label`: the part of each
+    vertex, (N,).
+    """
     size = np.bincount(label)
     centred = np.stack([pose - sums_of_each(pose, label)[label] / size[label, None] for pose in frames])
     spreads = np.array([sums_of_each((pose**2).sum(axis=1)[:, None], label)[:, 0] for pose in centred])
@@ -167,8 +173,10 @@ def copies_of(clip: MotionClip) -> np.ndarray:
 
 
 def parts_by_sides(clip: MotionClip, places: Places) -> np.ndarray | None:
-    """Return labels of the parts of a mesh whose faces join each other along sides, (N,), and not just at a point. A
-    vertex of several parts is of the largest. None: it is no mesh of faces alone."""
+    """Return the part of the mesh that each vertex is of, (N,), where a part is what faces with common sides make:
+    faces that touch at a point alone are of different parts. A vertex of several parts counts for the largest. Return
+    None for a clip that does not consist of faces alone, or that has copies.
+    """
     if clip.polygons is None or clip.edges is not None or copies_of(clip).any():
         return None
     counts, corners = (array.astype(np.int64) for array in clip.polygons)
@@ -194,7 +202,9 @@ def faces_by_sides(counts: np.ndarray, side: np.ndarray) -> np.ndarray:
 
 
 def _pairs_at_one_place(clip: MotionClip) -> np.ndarray:
-    """Return pairs of vertices that stay at the same place, (L, 2): seams of a mesh split for its normals."""
+    """Return pairs of vertices that are at the same place in the rest pose, the middle frame and the last one, (L, 2),
+    as where a mesh is split to have two normals.
+    """
     rest = clip.rest
     last = clip.block(clip.frame_count - 1, clip.frame_count)[0].astype(np.float64)
     middle = clip.block(clip.frame_count // 2, clip.frame_count // 2 + 1)[0].astype(np.float64)

@@ -51,9 +51,11 @@ def still_parts(clip: MotionClip, most: float) -> np.ndarray | None:
 
 
 def _are_feet(rest: np.ndarray, points: np.ndarray, moves: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return which points that stand still are feet of plants, (K,) bool. In the group of a foot many points have a
-    moving one right above them that is nearest to no other, or beside them in the order of the source; few points of
-    the ground are next to any plant. moves: (N,) bool; label: (K,) group of each point."""
+    """Return for each of `points`, (K,) vertices that stand still and have no links, whether it is in a group of feet
+    of plants, and not of the ground, (K,) bool. Next to many of the feet in a group there is a moving vertex: right
+    above it and nearest to no other point, or beside it in the order of the source. `rest`: (N, 3) positions; `moves`:
+    (N,) bool; `label`: the group of each point, (K,).
+    """
     if not len(points):
         return np.zeros(0, bool)
     count = np.bincount(label)
@@ -65,7 +67,9 @@ def _are_feet(rest: np.ndarray, points: np.ndarray, moves: np.ndarray, label: np
 
 
 def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
-    """Return which vertices stay within a distance of the rest pose, (N,) bool; frames are read until too few do."""
+    """Return which vertices stay within `most` scene units of their place in the rest pose, (N,) bool. Frames are read
+    only until too few such vertices are left to matter.
+    """
     rest = clip.source_rest
     still = np.ones(clip.vertex_count, bool)
     for _, block in clip.blocks():
@@ -82,8 +86,9 @@ def _still_vertices(clip: MotionClip, most: float) -> np.ndarray:
 
 
 def _links(clip: MotionClip) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs of vertices that belong together, (L, 2): over edges and faces, or by nearness where a vertex has
-    neither; and which vertices have edges or faces, (N,) bool."""
+    """Return two things: pairs of vertices that belong together, (L, 2), which edges or sides of faces join, or
+    nearness where a vertex has neither; and which vertices have edges or faces, (N,) bool.
+    """
     links = links_of(clip)
     bare = np.ones(clip.vertex_count, bool)
     bare[links] = False
@@ -94,7 +99,9 @@ def _links(clip: MotionClip) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Return which vertices that stand still are linked to one all of whose neighbours stand still too, (N,) bool."""
+    """Return which vertices are inside of what stands still, (N,) bool: they stand still, and they or a neighbour have
+    none but neighbours that stand still. `still`: (N,) bool; `links`: (L, 2) pairs of neighbours.
+    """
     core = still.copy()
     for here, there in (links.T, links.T[::-1]):
         core[here[~still[there]]] = False
@@ -105,7 +112,9 @@ def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
 
 
 def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -> MotionClip:
-    """Return some vertices of a clip, ascending, with what branches are found by; is_still: the rest pose alone."""
+    """Return a clip of some of a clip's vertices, with the edges, faces and attributes of theirs by which branches are
+    found. `vertices`: their numbers, ascending; `is_still`: whether the rest pose is to be the only frame.
+    """
     rest = clip.source_rest[vertices]
     if is_still:
         positions, time = rest[None].astype(clip.dtype), clip.time[:1]
@@ -134,7 +143,9 @@ def _among(rows: np.ndarray | None, vertices: np.ndarray) -> np.ndarray | None:
 
 
 def _attributes(clip: MotionClip, vertices: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the attributes by which branches are found, of some of the clip's vertices."""
+    """Return those attributes by which branches are found, such as polygons and parts, for some of the clip's vertices.
+    `vertices`: their numbers, ascending.
+    """
     polygons = Polygons.of_attributes(clip.attributes)
     kept = None if polygons is None else polygons.among(vertices)
     arrays = kept.attributes if kept is not None and kept.face_count else {}
@@ -149,7 +160,9 @@ def _attributes(clip: MotionClip, vertices: np.ndarray) -> dict[str, np.ndarray]
 
 
 def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) -> Found:
-    """Return the branches of what moves and of what stands still, (N,) bool, as those of one clip."""
+    """Put the branches of two parts of a clip together as branches of the whole clip. `still`: which vertices stand
+    still, (N,) bool; `moving`, `standing`: the branches of the other vertices, and of these.
+    """
     first = len(moving.branch_parent)
     label, place = np.empty((2, clip.vertex_count), np.int64)
     label[~still], label[still] = moving.vertex_branch, standing.vertex_branch + first

@@ -21,7 +21,9 @@ SHORT_STEM = 3  # Vertices of a median stem up to which learned modes can stand 
 
 
 def first_forms(source: Source, samples: Sequence[SegmentSample]) -> np.ndarray:
-    """Return the forms to start with, (B,) int32: tubes where rings move alike, else by how branches look."""
+    """Return the form of each branch that the search starts with, (B,) int32: a tube, by the vertices of its rings,
+    where these move alike in the samples, else a sheet or a beam by how the branch looks.
+    """
     hierarchy, sheets = source.hierarchy, source.sheet_like & (Feature.SHEETS not in source.without)
     if Feature.RINGS in source.without:
         return sheets.astype(np.int32)
@@ -32,7 +34,10 @@ def first_forms(source: Source, samples: Sequence[SegmentSample]) -> np.ndarray:
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
-    """Return the settings with all forms that branches may have. Tubes stay tubes where branches keep their shape."""
+    """Return copies of the settings, one for each way to give forms to the branches: all beams, all sheets, or by how
+    branches look, each with tubes where the search started with them, and without. The ways without tubes are left out
+    if the settings ask for the shape of such branches to be kept.
+    """
     looks, tubes = trials.source.sheet_like, np.where(trials.start.forms > SHEET, trials.start.forms, 0)
     plain = [np.full(looks.shape, BEAM, np.int32)]
     if not trials.without(Feature.SHEETS):
@@ -45,7 +50,10 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
 
 
 def best_forms(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with the best forms, judged without rotations and with some."""
+    """Return the settings with those forms of branches that cost fewest bytes. Settings without rotations are compared
+    with rotations, too, because these change which forms are best; the returned settings have the rotations that were
+    given.
+    """
     tried = plain = candidates(settings, trials)
     if not any(settings.rotation_step_factors) and not trials.without(Feature.ROTATIONS):
         costs = trials.costs(plain)

@@ -22,7 +22,9 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
 
 
 def best_bases(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with a learned time basis for all stages, or where it is shorter, or with waves."""
+    """Return the settings with the time basis that costs fewest bytes: learned ones for all stages, one for all
+    together, learned ones just for the stages that they make smaller, or waves.
+    """
     if trials.without(Feature.TIME_BASES):
         return settings
     waves = settings.in_waves()

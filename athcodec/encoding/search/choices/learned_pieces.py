@@ -22,7 +22,10 @@ HOPELESS_UNTURNED = 1.1  # Motion that is so many times larger without rotations
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
-    """Return the settings with learned modes for the pieces that take fewer bits with them."""
+    """Return copies of the settings with learned modes for the pieces that these save bits on, one copy for each factor
+    of REQUIRED_SAVINGS by which a piece's bits have to shrink. The list is empty if no piece gains so much or no work
+    is left.
+    """
     work = trials.work_of(2 * progress.ANALYSIS)
     if trials.without(Feature.SHAPES) or not trials.work.fits(work):
         return []
@@ -43,8 +46,10 @@ def best_pieces(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with learned modes beside what was chosen without them, or in its place: on stems of few
-    vertices learned modes serve the motion that rotations and affine functions serve."""
+    """Return the settings with learned modes, if these save bytes, and with the rotations, forms and time bases that
+    are best beside them. Choices made without learned modes are tried without again, because on short stems learned
+    modes describe the same motion as rotations and affine functions do.
+    """
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
@@ -73,8 +78,10 @@ def learned_about_other_pose(settings: Settings, trials: Trials) -> Settings:
 def pieces_that_save(
     plain: Settings, trials: Trials, required_savings: Sequence[float]
 ) -> list[tuple[np.ndarray, float]]:
-    """Return for each required saving the pieces whose estimated bits shrink by that factor, (P,) bool, and what share
-    of all bits they save."""
+    """Return for each required saving two things: which pieces have estimated bits, without learned modes, of more than
+    that factor times those with them, (P,) bool; and the share of all bits of the motion that learned modes on these
+    pieces save. `plain`: settings without learned modes.
+    """
     plan = trials.prelude(plain).plan
     modes = trials.learned_modes_everywhere(plan, plain)
     piece_count = len(modes.counts)

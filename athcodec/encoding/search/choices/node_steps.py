@@ -41,7 +41,9 @@ def work_of_steps(trials: Trials) -> float:
 
 
 def best_node_steps(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with maps that keep to their share of the file, no finer than the stages' errors ask for."""
+    """Return the settings with steps for the affine maps of nodes: the finest whose maps take at most their allowed
+    share of the file, or coarser ones as long as these hardly raise the errors of the stages that the maps show.
+    """
     prelude = trials.prelude(settings)
     errors = _stage_errors(trials, prelude.plan, settings.bound)
     sample = trials.samples[trials.middle].positions
@@ -71,8 +73,9 @@ def best_node_steps(settings: Settings, trials: Trials) -> Settings:
 
 
 def cost_with_maps(settings: Settings, trials: Trials) -> float:
-    """Return the bytes of a whole file with maps of nodes as fine as their stages' errors; of layers without, because
-    others choose their steps."""
+    """Return the estimated bytes of a whole file including its affine maps, whose steps are as large as the errors of
+    their stages. For a file in layers, whose maps get their steps from other choices, return its bytes without maps.
+    """
     if trials.is_layered:
         return trials.cost(settings)
     segment = _analysed(settings, trials)
@@ -104,8 +107,10 @@ def inner_nodes(source: Source, ath: Ath, stages: int) -> np.ndarray:
 
 
 def _stage_errors(trials: Trials, plan: Plan, bound: float) -> np.ndarray:
-    """Return the error in all vertices of a node together that would double the error of its stage, (stages,). A stage
-    errs by the RMS that independent least-squares maps leave in a few frames, or by the bound if that is more."""
+    """Return for each stage the step of its maps that would double the stage's error, (stages,) in scene units, as an
+    error of all vertices of a node together. The stage's own error is the RMS that independent least-squares maps leave
+    in a few frames, or `bound` if that is more.
+    """
     source, ath, sample = trials.source, trials.ath, trials.samples[trials.middle].positions
     some = spread(sample.shape[2], FRAMES)
     frames = np.empty((len(some), *sample.shape[:2]))

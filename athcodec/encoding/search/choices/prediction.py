@@ -79,8 +79,10 @@ class FoundPrediction:
 def best_prediction(
     source: Source, bound: float, most_bytes: float, work: Work, smoothness: str = "default", usual: bool = False
 ) -> FoundPrediction | None:
-    """Return the best prediction; None: it takes more than `most_bytes`, or cannot keep the bound. usual: the usual way
-    alone is tried."""
+    """Find the way to predict the motion that takes fewest bytes, and return it. Return None if it takes `most_bytes`
+    or more, or if no way keeps the bound. `smoothness`: how many more bytes a calmer motion may take, as the option of
+    `encode`; `usual`: try the usual way alone.
+    """
     ath = one_map_each(source.seen)
     limit = source.rest_limit(source.smallest_bound(bound))
     samples, vertices = _samples(source), source.clip.vertex_count
@@ -95,6 +97,9 @@ def best_prediction(
         return CodedPrelude(source, ath, by_ratio(ratio), predicted=True)
 
     def coded(way: Way) -> FoundPrediction:
+        """Return the prediction of one way, as coding the samples in it tells; its bytes are infinite if the bound is
+        not kept.
+        """
         settings = by_ratio(way.rest_ratio)
         stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
         choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
@@ -160,8 +165,11 @@ def _still_share(relative: float) -> float:
 
 
 def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | float) -> bool:
-    """Return whether second differences of the error over frames, (N, 3, T), are visibly above the limit: those of many
-    vertices in some frames only, or of vertices that hardly jerk themselves."""
+    """Return whether the error of `shown` positions about the source's `positions`, (N, 3, T) each, makes vertices
+    twitch visibly. An error twitches where its second difference over frames exceeds `limit`, one or (N,). It is
+    visible if many vertices twitch in few frames only, or if many twitch by more than the source's own second
+    differences.
+    """
     if positions.shape[2] < 3:
         return False
     limits, counts = np.broadcast_to(limit, len(positions)), np.zeros((2, positions.shape[2] - 2), np.int64)
@@ -197,7 +205,10 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """Return PREDICTED of a segment and its positions, (N, 3, T). Raises BoundError."""
+    """Code the motion of a segment by prediction. Return the payload of the chunk PREDICTED, and the positions that it
+    decodes to, (N, 3, T). Raises BoundError if no step keeps the limits. `positions`: (N, 3, T) of the source, less the
+    origin.
+    """
     settings = choice.settings
     source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
@@ -220,7 +231,14 @@ def code_predicted_segment(
     shown_times: np.ndarray,
     box: np.ndarray,
 ) -> tuple[dict[tuple[int, int], bytes], np.ndarray, np.ndarray, np.ndarray]:
-    """Return what CodedMotion.joined_to does. Predicted motion is not joined, and may jerk."""
+    """Code a segment by prediction. Return four things: its chunks as {(stage, kind): payload}; the errors of its
+    stages by each of MEASURES, (stages, 3); their joins, which are all 0; and their flaws, (stages, 2), as SourceFrames
+    measures them.
+
+    `positions`: (N, 3, T) of the source, less the origin; `exact`: the source's own numbers, to be coded as one more
+    stage, or None; `shown_times`: how many frames of the clip show each frame, (T,); `box`: corners of the source, (2,
+    3).
+    """
     plan, settings = prelude.plan, choice.settings
     payload, decoded = _predicted(prelude, choice, positions)
 
@@ -256,7 +274,9 @@ def _still(prelude: CodedPrelude, frames: int) -> SegmentMotion:
 
 
 def _with_maps(prelude: CodedPrelude, positions: np.ndarray, error: float) -> Iterator[SegmentMotion]:
-    """Yield segments with maps of the roots, from fine to coarse; error: RMS of the rest pose standing still."""
+    """Yield segments in which the rest pose is moved by one affine map of each root, with steps of the maps from fine
+    to coarse. `error`: the RMS error of the rest pose that stands still, which the steps are in proportion to.
+    """
     plan = prelude.plan
     for part in MAP_STEPS:
         moved = _still(prelude, positions.shape[2])

@@ -19,7 +19,9 @@ from athcodec.encoding.segments.settings import Settings
 
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:
-    """Return the mean pose, (N, 3) float64 less the origin, in file order. settings: the start of a search."""
+    """Return the mean pose of the motion, (N, 3) float64 less the origin, in file order. `settings`: those that a
+    search starts with.
+    """
     settings = replace(settings, forms=source.sheet_like.astype(np.int32), layer=0)
     plan = uncoded_plan(source, ath, settings)
     coefficients, tracks, frames = 0.0, 0.0, 0

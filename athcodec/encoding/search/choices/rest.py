@@ -27,7 +27,9 @@ REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a re
 
 
 def lags(source: Source, step: float, details: np.ndarray) -> np.ndarray:
-    """Return the predictors of the rest pose, (B,) int32: 0 for a beam's modes, or the lag that does best."""
+    """Return how the rest pose of each branch is predicted, (B,) int32: 0 for the modes of a beam, else the lag
+    (FORMAT.md, Lag) that leaves least to code. Only sheets and the branches with `details`, (B,), above 0 get lags.
+    """
     hierarchy = source.hierarchy
     first, count, attach = hierarchy.first_vertex, hierarchy.stem_count, hierarchy.attach
     lags = np.zeros(hierarchy.branch_count, np.int32)
@@ -88,7 +90,9 @@ def _slack(settings: Settings, slack: float) -> Settings:
 
 
 def best_slack(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with a rest pose as far off as the motion leaves room for, if it is much of the file."""
+    """Return the settings with a coarser rest pose, as far from the source's as the motion leaves room for, if this
+    saves bytes. It is tried only where the rest pose takes a large part of a file of one layer.
+    """
     source = trials.source
     limit = source.rest_limit(float(np.min(settings.limit)))
     if source.reference_is_exact or trials.is_layered:
@@ -110,8 +114,10 @@ def ring_lags(settings: Settings) -> np.ndarray:
 
 
 def _other_lags(source: Source, settings: Settings) -> list[Settings]:
-    """Return settings whose stems have other lags (FORMAT.md, Lag): at most 1, at least 1, 1 for all, for short stems
-    as many as they have vertices, so that each is coded about the one before it, or for tubes those of a ring."""
+    """Return copies of the settings with other lags of the stems (FORMAT.md, Lag): at most 1; at least 1; 1 for all;
+    for short stems as many as they have vertices, so that a stem is coded about the one before it; and for tubes the
+    vertices of a ring. Plants that stand still get some longer lags, too.
+    """
     if Feature.ADAPTIVE in source.without:
         return []
     best, count = settings.lags, source.hierarchy.stem_count

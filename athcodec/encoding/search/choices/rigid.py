@@ -35,8 +35,10 @@ CALM_SHARE = 1e-4  # Share of the vertices of small rigid parts, over all frames
 def first_rigid(
     source: Source, bound: float, samples: Sequence[SegmentSample], ratios: Sequence[int]
 ) -> tuple[np.ndarray, float]:
-    """Return in how many of the layers branches that are to keep their shape move rigidly, (B,) int32, and the largest
-    step of rotations. ratios: of the steps of the layers to that of the last."""
+    """Return two things: for each branch in how many of the layers it moves rigidly, (B,) int32; and the largest step
+    of rotations, 0 if it is not limited. Only leaves and branches that are to keep their shape may be rigid. `ratios`:
+    the step of each layer over that of the last.
+    """
     hierarchy, least = source.hierarchy, source.smallest_bound(bound)
     if Feature.RIGID in source.without:
         return np.zeros(hierarchy.branch_count, np.int32), 0.0
@@ -54,7 +56,9 @@ def best_freedom(settings: Settings, trials: Trials) -> Settings:
 
 
 def calm_parts(settings: Settings, trials: Trials) -> Settings:
-    """Return the settings with cheap finer steps, of all or of turns, if corrections twitch many small rigid parts."""
+    """Return the settings with a finer step, of all motion or of rotations alone, if corrections would make many small
+    rigid parts twitch, and if the finer step costs few bytes more.
+    """
     most, share = CALM_COST * trials.cost(settings), _corrected_parts(settings, trials)
     while share > CALM_SHARE:
         finer = (
@@ -70,7 +74,9 @@ def calm_parts(settings: Settings, trials: Trials) -> Settings:
 
 
 def _corrected_parts(settings: Settings, trials: Trials) -> float:
-    """Return the corrected share of the vertices of rigid parts whose turns are finer than their step asks for."""
+    """Return which share of the vertices of small rigid parts, over all frames, have to be corrected. A part is small
+    if the largest step of rotations moves its vertices by less than the step of motion.
+    """
     if not settings.turn_step:
         return 0.0
     plan = trials.prelude(settings).plan
@@ -90,8 +96,10 @@ def _finer_turn(turn_step: float) -> float:
 def _rigid_layers(
     source: Source, wanted: np.ndarray, samples: Sequence[np.ndarray], bounds: Sequence[float]
 ) -> np.ndarray:
-    """Return how many of the layers of such bounds, descending, see a branch as rigid, (B,) int32. wanted: (B,) which
-    may be; samples: (N, 3, T) each."""
+    """Return for each branch in how many layers it counts as rigid, (B,) int32: those at whose bound it bends little,
+    or is itself small. `wanted`: (B,) bool, which branches may be rigid; `samples`: arrays (N, 3, T) of positions;
+    `bounds`: the bounds of the layers, descending.
+    """
     first, count, rest = source.hierarchy.first_vertex, source.hierarchy.stem_count, source.rest
     layers, carries = np.zeros(len(count), np.int32), source.hierarchy.subtree_branches > 1
     for size in np.unique(count[wanted & (count > 2) & ((count <= PIECE_VERTICES) | carries)]).tolist():
@@ -107,8 +115,10 @@ def _rigid_layers(
 
 
 def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Return how far any vertex of a part is at most from where the nearest rigid motion takes it, (B,). shapes: (B, n,
-    3)."""
+    """Return for each part how far any of its vertices is at most from where the nearest rigid motion takes it, (B,),
+    in some frames of a sample. `shapes`: rest positions of the parts, (B, n, 3); `sample`: positions, (N, 3, T);
+    `vertices`: the vertices of the parts in it, (B, n).
+    """
     d = shapes - shapes.mean(axis=1, keepdims=True)
     worst = np.zeros(len(shapes))
     for t in spread(sample.shape[2]):

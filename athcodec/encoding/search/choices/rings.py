@@ -23,10 +23,10 @@ WITHIN = 0.1  # Largest share of the squared motion of a tube that is within its
 def ring_sizes(
     first: np.ndarray, count: np.ndarray, wanted: np.ndarray, rest: np.ndarray, samples: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """Return the vertices of the rings of each branch, (B,) int32; 0: it has no rings that move alike.
+    """Return how many vertices each ring of a branch has, (B,) int32, or 0 for a branch without rings that move alike.
 
-    first, count, wanted: (B,) vertices of the branches, and which may have rings; rest: (N, 3); samples: (N, 3, T)
-    each.
+    `first`, `count`: (B,) the first vertex of each branch and the number of its vertices; `wanted`: (B,) bool, which
+    branches may have rings; `rest`: (N, 3) positions; `samples`: arrays (N, 3, T) of positions.
     """
     rings = np.zeros(len(count), np.int32)
     for size in np.unique(count[wanted & (count >= LEAST_RINGS * LEAST_RING)]).tolist():
@@ -40,8 +40,9 @@ def ring_sizes(
 
 
 def _periods(stems: np.ndarray) -> np.ndarray:
-    """Return after how many vertices the steps of (B, n, 3) stems repeat best, (B,); 0: they do not, or the last ring
-    would have more than a tip and less than the others."""
+    """Return for each stem the number of vertices after which its steps from vertex to vertex repeat best, (B,), or 0
+    if they do not repeat, or if the last ring would be incomplete and more than a tip. `stems`: (B, n, 3) positions.
+    """
     size = stems.shape[1]
     steps = np.diff(stems, axis=1)
     unit = FINE * np.linalg.norm(np.ptp(stems, axis=1), axis=1)
@@ -59,7 +60,10 @@ def _cost(steps: np.ndarray, lag: int, unit: np.ndarray) -> np.ndarray:
 
 
 def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.ndarray], ring: int) -> np.ndarray:
-    """Return (B,) bool: whether the vertices of each ring almost move as one."""
+    """Return for each stem whether the vertices of each of its rings move almost as one, (B,) bool. `stems`: rest
+    positions, (B, n, 3); `vertices`: their numbers in the samples; `samples`: arrays (N, 3, T); `ring`: the vertices of
+    a ring.
+    """
     starts = np.arange(0, stems.shape[1], ring)
     sizes = np.diff(np.append(starts, stems.shape[1]))
     within, all_in_all = np.zeros(len(stems)), np.zeros(len(stems))

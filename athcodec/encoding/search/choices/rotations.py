@@ -38,7 +38,7 @@ def first_rotations(
 
 
 def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
-    """Return whether the trees that stand on roots turn by much more than they bend."""
+    """Return whether most of the plant belongs to trees that turn as a whole by much more than they bend."""
     roots = np.flatnonzero(source.hierarchy.branch_parent < 0)
     first = source.hierarchy.first_vertex[roots]
     rest = _about_centres(source.rest, first)
@@ -78,8 +78,10 @@ def _kinds(settings: Settings, trials: Trials) -> list[tuple[Settings, list[Sett
 
 
 def _first_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
-    """Return the cheapest settings in waves, and the cheapest of all, as far as the work allows: where it is short, no
-    other choice saves as much."""
+    """Return two settings: the cheapest in waves, and the cheapest of those in waves or learned time bases. Where
+    little work is left, both are the same, and waves alone are tried, because no other choice saves as much as this
+    one.
+    """
     kinds = _kinds(settings, trials)
     if kinds[1:] and trials.costs([kinds[1][0]])[0] > HOPELESS_STILL * trials.cost(settings):
         del kinds[1:]
@@ -125,7 +127,9 @@ def fast_rotations(settings: Settings, trials: Trials) -> Settings:
 
 
 def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] = ROTATION_FACTORS) -> Settings:
-    """Return the settings with the best factor: one for all stages, one for each stage, or one for the roots alone."""
+    """Return the settings with those rotation factors, of `factors`, that cost fewest bytes: one for all stages, one
+    for each stage, or one for the stages of the roots alone.
+    """
     if trials.without(Feature.ROTATIONS):
         return settings
     uniform = candidates(settings, factors)

@@ -42,7 +42,9 @@ def finer_steps(settings: Settings, trials: Trials) -> Settings:
 def walked(
     settings: Settings, trials: Trials, factor: float = STEP_FACTOR, rest_factor: float = REST_STEP_FACTOR
 ) -> Settings:
-    """Walk step and rest step in turn to the cheapest."""
+    """Return the settings with the steps of motion and of the rest pose that cost fewest bytes near those given. The
+    two steps are changed in turn, by powers of `factor` and of `rest_factor`, until neither changes any more.
+    """
     for again in range(WALKS):
         # Where the nearest steps do not pay, a much coarser step, or a much finer rest pose, still may.
         coarser, finer = ([], []) if again else ([2], [-4])
@@ -59,7 +61,10 @@ def walked(
 def _walk(
     settings: Settings, trials: Trials, name: Literal["step", "rest_step"], factor: float, cap: float, ahead: list[int]
 ) -> Settings:
-    """Walk one of the steps, up to a cap. ahead: exponents of the factor that are tried beside the nearest."""
+    """Return the settings with the cheapest value of the step called `name`, found by multiplying it by powers of
+    `factor` until both neighbours cost more. `cap`: the largest step; `ahead`: further exponents to try if neither
+    neighbour of the given step is cheaper.
+    """
 
     def moved(exponent: int) -> Settings:
         if name == "step":
