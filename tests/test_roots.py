@@ -7,6 +7,9 @@ import pytest
 
 import athcodec
 from athcodec import MotionClip
+from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.preparation.branch_trials import Trial, best_branches
+from athcodec.encoding.search.progress import Work
 from athcodec.motion.branches import finding
 from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
 from athcodec.motion.hierarchy import branch_orders
@@ -115,3 +118,15 @@ def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():
         for one in (clip, clip.replace(vertex_branch=None, branch_parent=None, stem_index=None))
     )
     assert found <= MOST * true
+
+
+def test_no_branches_are_tried_that_would_take_the_work_of_the_search(monkeypatch):
+    work, coded = Work(1e9), Trial.size
+
+    def costly(self, branches):
+        work.add(0.4 * work.allowed)
+        return coded(self, branches)
+
+    monkeypatch.setattr(Trial, "size", costly)
+    best_branches(fields.stems(seed=5, plants=2).without_faces().bare(), BoundOption(rel_error=1e-4), work)
+    assert 0.8 * work.allowed <= work.done <= work.allowed

@@ -72,17 +72,19 @@ def _best_candidate(
     if second is None:
         return best, trial.size(best)[0] if is_compared else least
     for number, branches in enumerate(chain([best, second], proposals), start=1):
+        before = work.done
         size, is_predicted = trial.size(branches)
+        next_trial = max(trial.least_work, work.done - before)  # Settings cost about as much on other branches.
         predicted += is_predicted
         tried.append((size, branches))
         if number > 1:
             work.add(finding)
-            if predicted == number or not work.fits(finding + trial.least_work):
+            if predicted == number or not work.fits(finding + next_trial):
                 break
     fewest = min(size for size, _ in tried)
     alike = [one for one in tried if one[0] <= ALIKE * fewest]
     least, best = min(alike, key=_order_and_size)
-    if best.stem_index is None or best.method != "motion" or not work.fits(trial.least_work):
+    if best.stem_index is None or best.method != "motion" or not work.fits(next_trial):
         return best, least
     unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
     size = trial.size(unordered)[0]
