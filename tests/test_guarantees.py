@@ -118,11 +118,10 @@ def test_every_kind_of_glb_that_athcodec_wrote_is_known_when_it_is_read(clip, tm
         assert back.not_read == {}
 
 
-@pytest.mark.parametrize("name", tiered(FORMATS))
+# The head of a PC2 states the number of frames, and a single one is a frame like any other.
+@pytest.mark.parametrize("name", tiered([name for name in FORMATS if name != "pc2"]))
 def test_encoding_a_file_of_one_frame_says_what_makes_it_a_motion(clip, tmp_path, name, capsys):
     path = tmp_path / FORMATS[name]
-    if name == "pc2":
-        pytest.skip("its frames are a number in the head, and one of them is a frame like any other")
     write(clip.replace(positions=clip.positions[:1], time=clip.time[:1]), path)
     path = path if path.exists() else next(tmp_path.glob(f"a*{path.suffix}"))
     with pytest.warns(GuessWarning, match="holds a single frame, so the plant stands still: .*--still"):
