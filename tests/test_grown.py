@@ -60,6 +60,30 @@ def test_chunks_of_many_frames_are_not_unpacked_for_each_frame_that_is_looked_at
     assert len(reads) == 3, "both chunks once, and the frame that is most grown"
 
 
+def test_no_more_frames_of_a_chunk_are_read_at_once_than_a_block_has(monkeypatch):
+    clip, runs = growing_organs(), []
+    monkeypatch.setattr("athcodec.motion.clip.BLOCK_BYTES", 5 * clip.positions[0].nbytes)
+    stored = athcodec.MotionClip(Chunked(clip.positions), clip.time, attributes=clip.attributes)
+    stored.block, read = lambda start, stop: runs.append(stop - start) or read(start, stop), stored.block
+    assert np.array_equal(grown_pose(stored), grown_pose(clip))
+    assert 1 < max(runs) <= 5
+
+
+class Chunked:
+    """Positions in one chunk of all frames."""
+
+    def __init__(self, positions: np.ndarray):
+        self.positions, self.shape, self.dtype, self.chunks = (
+            positions,
+            positions.shape,
+            positions.dtype,
+            positions.shape,
+        )
+
+    def __getitem__(self, index):
+        return self.positions[index]
+
+
 def test_no_pose_shows_points_grown_that_wander():
     positions = np.random.default_rng(3).random((40, 60, 3)).astype(np.float32)
     clip = athcodec.MotionClip(positions, np.arange(40) / 24, rest=positions[0])

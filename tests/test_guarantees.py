@@ -152,7 +152,7 @@ def test_a_failed_write_leaves_what_was_there(clip, tmp_path, name, older):
     positions = clip.block(0, 9).copy()
     positions[5, 0, 0] = np.nan
     broken = clip.replace(positions=positions)
-    broken._block_length = lambda most: 3  # so that some frames have been written before
+    broken.block_length = lambda most: 3  # so that some frames have been written before
     with pytest.raises(ClipError, match="frame 5"):
         write(broken, tmp_path / FORMATS[name])
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before

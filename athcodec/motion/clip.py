@@ -372,7 +372,7 @@ class MotionClip:
         ValueError
             For max_frames below 1.
         """
-        length = self._block_length(max_frames)
+        length = self.block_length(max_frames)
         for start in range(0, self.frame_count, length):
             yield start, self.block(start, min(start + length, self.frame_count))
 
@@ -381,7 +381,10 @@ class MotionClip:
         """Frames that the source unpacks together, 1 if it has no chunks."""
         return int(np.max((getattr(self.positions, "chunks", None) or (1,))[0]))  # dask names the size of each.
 
-    def _block_length(self, max_frames: int | None) -> int:
+    def block_length(self, max_frames: int | None = None) -> int:
+        """Return how many frames are read at once: as many as a block may have bytes for, at most `max_frames`, and
+        whole chunks of the source where one fits. Raises ValueError for max_frames below 1.
+        """
         if max_frames is not None and (max_frames := whole("max_frames", max_frames)) < 1:
             raise ValueError(f"max_frames: got {max_frames}, expected at least 1")
         length = max(1, BLOCK_BYTES // (self.vertex_count * 3 * self.dtype.itemsize))

@@ -85,10 +85,10 @@ def _some_frames(frame_count: int) -> np.ndarray:
 
 
 def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the positions (N, 3) float64 of the clip in each of these frames. Frames in one chunk of the source are
-    read together, so that it is unpacked once."""
-    chunk_frames = clip.chunk_frames
-    for _, chosen in itertools.groupby(frames.tolist(), lambda frame: frame // chunk_frames):
+    """Yield the positions (N, 3) float64 of the clip in each of these frames, which ascend. Frames in one chunk of the
+    source are read together, so that it is unpacked once, but never more of them than fit a block."""
+    length = min(clip.chunk_frames, clip.block_length())
+    for _, chosen in itertools.groupby(frames.tolist(), lambda frame: frame // length):
         run = list(chosen)
         block = clip.block(run[0], run[-1] + 1)
         for frame in run:
