@@ -30,9 +30,11 @@ from bench.trees.wind import Wind
 
 FOLDER = Path(__file__).parents[1] / "docs" / "gallery"
 SAMPLES = ("leafed", "fern", "grass")
-RETURN_FRAMES = 30  # of the tree that grows, in which it goes back to its first frame
+RETURN_FRAMES = 30  # In so many frames the tree that grows goes back to its first one.
 BARE = {"nodes": 4001, "orders": 3, "height": 12.0, "seed": 1}
-BARE_FRAMES, BARE_FPS, BARE_WIND = 200, 30.0, 9.0  # wind in m/s
+BARE_FRAMES = 200  # After so many frames the wind of the bare tree repeats.
+BARE_FPS = 30.0  # Frames per second of the bare tree.
+BARE_WIND = 9.0  # Speed of its wind, in m/s.
 BARE_SETTLING_SECONDS = 12.0  # What the tree began with has died away after these.
 FLOOR = {"fern": 4.0, "grass": 9.0}  # plants around each tree of the forest
 TREES = 40

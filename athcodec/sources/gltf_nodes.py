@@ -201,7 +201,7 @@ def _bind_matrices(file: GltfFile, skin: JsonObject, joint_count: int) -> np.nda
 def _load_influences(node: GltfNode, file: GltfFile) -> None:
     """Store in the node, for each joint, the vertices that it moves and their weights, which add up to 1 for each
     vertex. A vertex whose weights are all 0 hangs on its first joint. Also store the strongest joint of each vertex."""
-    influences: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # of a slot: vertices, joints, weights
+    influences: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # Each slot has vertices, joints and weights.
     for slot in range(64):
         names = f"JOINTS_{slot}", f"WEIGHTS_{slot}"
         if names[0] not in node.attributes or names[1] not in node.attributes:
