@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import sys
 from itertools import combinations
 from pathlib import Path
@@ -54,7 +55,11 @@ def tiers(config) -> list[str]:
 
 
 def pytest_configure(config):
-    """Leave out tests that belong to a later tier than those that the marker expression names."""
+    """Leave out tests that belong to a later tier than those that the marker expression names. Let SIGINT interrupt
+    tests and the programs that they start: a shell has it ignored by what it runs in the background.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     expression, names = config.option.markexpr, tiers(config)
     last = max((place for place, name in enumerate(names) if re.search(rf"\b{name}\b", expression)), default=None)
     if last is not None:

@@ -619,16 +619,8 @@ def test_a_reader_that_leaves_early_is_no_error(encoded, tmp_path):
     process.stderr.close()
 
 
-@pytest.fixture
-def interruptible():
-    """SIGINT interrupts, also where the tests run in the background of a shell, which has it ignored."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.parametrize("kind, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys, interruptible, kind, code):
+def test_what_is_interrupted_leaves_nothing_behind(tmp_path, monkeypatch, capsys, kind, code):
     def interrupt(stage, fraction):
         if stage == "motion":
             signal.raise_signal(kind)
