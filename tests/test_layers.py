@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from io import BytesIO
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from plants import chain_plant, plant
 
 import athcodec
-from athcodec import Thresholds, encoding
+from athcodec import MotionClip, Thresholds, encoding
 from athcodec.decoding import container as ct
 from athcodec.encoding import decisions
 from athcodec.encoding.assembly.assembly import FileAssembly
@@ -62,6 +63,33 @@ def test_a_ladder_has_a_layer_for_each_error_that_is_well_above_the_bound():
     assert layer_ratios((1e-2, 1e-3, 1e-4), 5e-4, 1.0) == [34, 1]
     assert layer_ratios((1e-2, 9e-3), 1e-4, 1.0) == [170, 1]
     assert layer_ratios((), 1e-4, 1.0) == layer_ratios((1e-4, 1e-5), 1e-4, 1.0) == [1]
+
+
+@pytest.mark.parametrize("first", [0.0, 0.01, 0.07, 0.3, 0.8, 1.7])
+def test_each_layer_has_a_finer_step_than_the_one_before(first):
+    ratios = layer_ratios((1e-1, 1e-2, 1e-3), 1e-4, 1.0, (first, 1.25))
+    assert ratios[-1] == 1 and all(coarse > fine for coarse, fine in pairwise(ratios))
+
+
+@pytest.mark.parametrize("way", [0.0, 3e-4, 6e-4, 1e-3, 2e-3])
+@pytest.mark.parametrize("has_own_rest", [False, True])
+def test_stalks_side_by_side_that_hardly_move_are_decoded(way, has_own_rest, tmp_path):
+    """Their first layer may be finer than the ladder asks of the second."""
+    rng = np.random.default_rng(5)
+    foot, phase = rng.uniform(-1, 1, (30, 1, 3)) * [1, 1, 0], rng.uniform(0, 6, (30, 1))
+    height = np.linspace(0, 0.4, 6)
+    stalks = foot + height[:, None] * [0, 0, 1]
+    time = np.arange(12) / 30
+    positions = np.repeat(stalks[None], len(time), axis=0)
+    positions[..., 0] += way * (height / 0.4) ** 2 * np.sin(8 * time[:, None, None] + phase)
+    clip = MotionClip(
+        positions=positions.reshape(len(time), -1, 3).astype(np.float32),
+        rest=(stalks + 0.01 * has_own_rest).reshape(-1, 3).astype(np.float32),
+        time=time,
+        vertex_branch=np.repeat(np.arange(30), 6),
+        branch_parent=np.full(30, -1),
+    )
+    check_levels(clip, athcodec.encode(clip, tmp_path / "a.ath", effort="fast").path)
 
 
 def test_errors_far_above_the_bound_get_layers_in_between(bushy_clip, tmp_path):

@@ -151,7 +151,8 @@ def layer_ratios(
 
     `ladder`: the largest errors that layers are to hold, over the diagonal, descending. An error that is close to the
     bound or to another error makes no layer of its own. Where two layers are too far apart for one to refine the other,
-    layers are added between them. `bound`, `diagonal`: in scene units; `factors`: what `step_factors` returns.
+    layers are added between them. A first layer whose step is as fine as that of a later one takes its place, as where
+    plants side by side hardly move. `bound`, `diagonal`: in scene units; `factors`: what `step_factors` returns.
     """
     errors: list[float] = []  # In bounds.
     for bounds in _in_bounds(ladder, bound, diagonal):
@@ -159,7 +160,8 @@ def layer_ratios(
             errors.append(bounds)
     # Ratios are rounded down, so that layers hold what the ladder names.
     ratios = [max(1, int(min(factors[i > 0] * bounds, MOST_RATIO**2))) for i, bounds in enumerate(errors)]
-    return [step for pair in pairwise([*ratios, 1]) for step in _between(*pair)] + [1]
+    descending = [ratio for ratio in ratios[:1] if ratio > 1] + [ratio for ratio in ratios[1:] if 1 < ratio < ratios[0]]
+    return [step for pair in pairwise([*descending, 1]) for step in _between(*pair)] + [1]
 
 
 def _in_bounds(ladder: Sequence[float], bound: float, diagonal: float) -> list[float]:
