@@ -56,8 +56,11 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
 
 
 def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    values, vectors = principal(moments)
-    return np.sqrt(np.maximum(values, 0.0)), vectors
+    """Return the lengths and the unit vectors of the components of moments, (P, n, n), whose memory the vectors take."""
+    values = np.empty(moments.shape[:2])
+    for part in _parts(moments, moments[:1].size):
+        values[part], moments[part] = principal(moments[part])
+    return np.sqrt(np.maximum(values, 0.0)), moments
 
 
 def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:

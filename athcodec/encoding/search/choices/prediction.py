@@ -206,18 +206,19 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
     """Code the motion of a segment by prediction. Return the payload of the chunk PREDICTED, and the positions that it
-    decodes to, (N, 3, T). Raises BoundError if no step keeps the limits. `positions`: (N, 3, T) of the source, less the
-    origin.
+    decodes to, (N, 3, T), frame by frame in memory. Raises BoundError if no step keeps the limits. `positions`: (N, 3,
+    T) of the source, less the origin.
     """
     settings = choice.settings
-    source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
     for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
         for factor in STEPS:
             step = qz.single(factor * _largest_step(share * limits))
-            coded = streams.encode_predicted(prelude.plan, prelude.origin, source, share * limits, step, prelude.dtype)
+            coded = streams.encode_predicted(
+                prelude.plan, prelude.origin, positions, share * limits, step, prelude.dtype
+            )
             if coded is not None:
-                return writing.pack_predicted(step, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+                return writing.pack_predicted(step, coded[0]), coded[1].transpose(1, 2, 0)
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
@@ -240,7 +241,9 @@ def code_predicted_segment(
     3).
     """
     plan, settings = prelude.plan, choice.settings
-    payload, decoded = _predicted(prelude, choice, positions)
+    payload, by_frame = _predicted(prelude, choice, positions)
+    decoded = np.ascontiguousarray(by_frame)
+    del by_frame
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
         return position_errors(shown, positions, prelude.origin, plan.pool, shown_times, prelude.shares)
