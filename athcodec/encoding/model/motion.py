@@ -189,6 +189,10 @@ class Plan:
             self.pool.map(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
         self.core.bases = self.bases.ctypes.data
 
+    def forget_bases(self) -> None:
+        """Free the bases of the pieces, without which nothing more can be analysed or posed on this plan."""
+        self.bases, self.core.bases = np.empty(0), None
+
     @cached_property
     def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
         """Return three lists of ranges (start, stop) of pieces, which have no piece in common: branches with large
@@ -552,8 +556,8 @@ class SegmentMotion:
 
     def pose(self, stage: int, origin: np.ndarray, dtype: DTypeLike, room: np.ndarray | None = None) -> np.ndarray:
         """Return the positions that a decoder shows at `stage`, without corrections: (N, 3, frames) of `dtype`, float32
-        or float64, with the origin added. `room`: an array of as many float64, whose memory the result takes; None: new
-        memory is taken.
+        or float64, with the origin added. `room`: an array whose memory the result takes, which is enough for it; None:
+        new memory is taken.
         """
         shape = self.plan.vertex_count, 3, self.frames
         if room is None:

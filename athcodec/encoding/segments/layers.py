@@ -488,7 +488,8 @@ class CodedMotion:
         self._correct(decoded, layer, last)
         del decoded  # Stages with maps are in memory before the last one is posed again.
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
-        self._room = zeros(self.positions.shape)
+        stands_alone = self._before is None and self._after is None
+        self._room = zeros(self.positions.shape, self._output[1] if stands_alone else np.float64)
         shown = [self._at_stage_0(segment, settings), *[segment] * (plan.stage_count - 2)]
         self.errors = _EvenStages(self, shown, settings).errors
         if self._is_worse_than_before(last):
@@ -497,7 +498,7 @@ class CodedMotion:
             if plan.has_affines(stage):
                 self.chunks[stage, ct.AFFINES] = streams.encode_affines(nodes, stage)
         for stage, nodes in enumerate(shown):
-            self._finish(stage, self._pose_to_join(nodes, stage))
+            self._finish(stage, self.pose(nodes, stage) if stands_alone else self._pose_to_join(nodes, stage))
         self._finish(last, self.pose(segment, last), layer)
         segment.forget_nodes()
         del self._room

@@ -22,7 +22,7 @@ from athcodec.encoding.model.motion import SegmentMotion, StageStream, position_
 from athcodec.encoding.search.choices.node_steps import FILE_SHARE
 from athcodec.encoding.search.choices.rest import with_best_rest
 from athcodec.encoding.search.progress import PREDICTION, REST, Work
-from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, spread, typical_segments
+from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, typical_segments
 from athcodec.encoding.segments.levels import MOST_AWAY, SourceFrames
 from athcodec.encoding.segments.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segments.settings import Choice, Settings
@@ -30,6 +30,7 @@ from athcodec.encoding.streams import streams, writing
 from athcodec.errors import BoundError
 from athcodec.files.threads import ranges
 from athcodec.motion.algebra import length
+from athcodec.motion.sampling import spread
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
