@@ -104,14 +104,17 @@ def best_prediction(
         settings = by_ratio(way.rest_ratio)
         stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
         choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
-        work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
+        work.add(PREDICTION * vertices * sum(source.frames_of(segment) for segment, _ in samples))
+        motion, twitches = 0.0, False
         try:
             prelude = prelude_of(way.rest_ratio)
-            parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+            for sample in _read(source, samples):
+                payload, shown = _predicted(prelude, choice, sample.positions)
+                motion += len(payload) * sample.scale
+                twitches = twitches or _twitches(shown, sample.positions, settings.limit)
+                del sample, shown  # One segment is in memory at a time.
         except BoundError:
             return FoundPrediction(way, choice, math.inf, False)
-        motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
-        twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
 
     def best(share: float, most: float) -> FoundPrediction:
@@ -126,10 +129,10 @@ def best_prediction(
     if usual:
         prediction = coded(Way(USUAL_REST_RATIO))
         return prediction if prediction.bytes < most_bytes else None
-    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
+    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, source.frames_of(segment)) for segment, _ in samples))
     try:
         prelude, settings = prelude_of(USUAL_REST_RATIO), by_ratio(USUAL_REST_RATIO)
-        if sum(_begun(prelude, settings, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(prelude, settings, sample) for sample in _read(source, samples)) > TOO_MANY * most_bytes:
             return None
     except BoundError:
         return None
@@ -188,13 +191,19 @@ def _largest_step(limit: np.ndarray | float) -> float:
     return qz.single(qz.SAFE_REST_CAP * float(np.min(limit)))
 
 
-def _samples(source: Source) -> list[SegmentSample]:
-    """Return a few segments spread over a clip, or the typical segments of several clips."""
+def _samples(source: Source) -> list[tuple[int, float]]:
+    """Return a few segments spread over a clip, or the typical segments of several clips: pairs of a segment and the
+    number of frames that it stands for."""
     if len(source.clip_range_segments) > 1:
-        return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
-    positions = [source.positions(segment) for segment in spread(len(source.segments), SAMPLES)]
-    scale = source.coded_frames / sum(block.shape[2] for block in positions)
-    return [SegmentSample(block, scale * block.shape[2]) for block in positions]
+        return [(segment, frames) for segment, frames in typical_segments(source)]
+    chosen = spread(len(source.segments), SAMPLES)
+    scale = source.coded_frames / sum(map(source.frames_of, chosen))
+    return [(segment, scale * source.frames_of(segment)) for segment in chosen]
+
+
+def _read(source: Source, samples: list[tuple[int, float]]) -> Iterator[SegmentSample]:
+    """Yield samples with their positions, of which this holds none."""
+    return (SegmentSample(source.positions(segment), frames) for segment, frames in samples)
 
 
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
