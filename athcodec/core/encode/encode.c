@@ -333,7 +333,8 @@ static void open_frame(const prediction *p, predicted_source *source)
     if (number > 0) return;
     for (size_t row = 0; row < rows; row++)
         for (int32_t t = 0; t < count; t++)
-            source->block[(size_t)t * rows + row] = source->source[row * (size_t)source->stride + (size_t)(p->frame + t)];
+            source->block[(size_t)t * rows + row] =
+                source->source[row * (size_t)source->stride + (size_t)(p->frame + t)];
 }
 
 /* Returns a coordinate of the rest pose as a copied frame gets it, less the origin. */

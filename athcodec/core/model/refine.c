@@ -223,8 +223,7 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         predict_evenly(stream, motion, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
                        track, coarse, ath_row(rows->predicted_modes, r, T));
     }
-    for (int32_t r = modes; r < ath_rank(piece); r++)
-        clear_row(ath_row(rows->predicted_modes, r, T), 3 * T);
+    for (int32_t r = modes; r < ath_rank(piece); r++) clear_row(ath_row(rows->predicted_modes, r, T), 3 * T);
 }
 
 int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
