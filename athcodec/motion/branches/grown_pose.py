@@ -69,8 +69,8 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     if not len(small):
         return pose
     largest = np.array(frames)[sizes.argmax(axis=0)]
-    shown = np.unique(largest[small])
-    shapes = {number: frame[source] for number, frame in zip(shown.tolist(), _poses(clip, shown))}
+    shown = np.unique(largest[small]).tolist()
+    shapes = {number: frame[source] for number, frame in zip(shown, _poses(clip, shown))}
     for branch in small.tolist():  # Parents come first.
         shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
         vertices = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
