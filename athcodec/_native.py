@@ -275,7 +275,10 @@ _ENCODING = {  # Functions of core/model/*.h and core/encode/encode.h.
     "ath_predicted_memory": (c_size_t, [c_int32]),
     "ath_encode_predicted": (
         c_int64,
-        [*_WRITER, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, *[c_void_p] * 3],
+        [
+            *(*_WRITER, POINTER(CorePlan), c_void_p, c_int32, c_int, c_double, c_void_p, c_int64, c_void_p, c_int32),
+            *(c_void_p, c_void_p),
+        ],
     ),
     "ath_encode_corrections": (c_int64, [*_WRITER, c_int32, c_int32, c_void_p, c_int64]),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 import tracemalloc
 
 import h5py
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from files import coded
 from plants import chain_plant, clip_of, plant
+from programs import printed
 
 import athcodec
 from athcodec import MotionClip
@@ -24,6 +26,7 @@ from athcodec.encoding.search.progress import silent
 from athcodec.encoding.segments.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
 from athcodec.motion import clip as clip_module
+from bench.scenes import fields
 
 OLDER = MAGIC + b"older"
 
@@ -368,6 +371,28 @@ def test_the_layers_of_a_segment_are_in_memory_one_at_a_time(tmp_path):
     peak_memory(endless_clip(64, at_once=64), tmp_path)  # What is made once, such as imports, is not counted.
     segment = 32 * 2000 * 12
     assert peak_memory(endless_clip(128, 2000, at_once=128), tmp_path) < 22 * segment
+
+
+ENCODE_ARRAY = """
+import resource, sys
+import athcodec
+import numpy as np
+
+athcodec.encode(np.load(sys.argv[1], mmap_mode="r"), sys.argv[2], rel_error=1e-4, unit="m", fps=30)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="no resource module")
+def test_the_memory_of_default_options_grows_by_a_few_times_the_source(tmp_path):
+    peaks, sizes, source = [], [], tmp_path / "stalks.npy"
+    for plants in (500, 2000):
+        np.save(source, fields.stalks(37, plants).clip.positions)
+        printed_peak = printed(sys.executable, "-c", ENCODE_ARRAY, source, tmp_path / "stalks.ath")
+        peaks.append(int(printed_peak) * (1 if sys.platform == "darwin" else 1024))
+        sizes.append(source.stat().st_size)
+    assert peaks[1] - peaks[0] < 6.5 * (sizes[1] - sizes[0])
 
 
 @pytest.mark.parametrize("jobs", [0, -1])

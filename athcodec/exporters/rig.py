@@ -31,6 +31,7 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy, hierarchy_of
 from athcodec.motion.protocol import Motion
 from athcodec.motion.quaternions import quaternions, rotation_matrices
+from athcodec.motion.sampling import spread
 from athcodec.options import RIG_JOINTS
 
 LONGEST_CHAIN = 32
@@ -109,7 +110,7 @@ def fit_rig(motion: Motion, most: int = RIG_JOINTS, report: Progress = lambda do
     order = hierarchy.vertex_source
     rest = np.asarray(motion.rest).astype(np.float32).astype(np.float64)[order]
     allowed, parts = allowed_error(motion), _Parts.whole(hierarchy)
-    some = np.unique(np.linspace(0, motion.frame_count - 1, min(SAMPLE_FRAMES, motion.frame_count)).astype(int))
+    some = spread(motion.frame_count, SAMPLE_FRAMES)
     sample = np.stack([motion.block(frame, frame + 1)[0][order].astype(np.float64) for frame in some])
     for done in range(ROUNDS):
         bones = _Bones(hierarchy, parts, rest)

@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from athcodec.motion.clip import MotionClip
+from athcodec.motion.sampling import spread
 
 SAMPLED = 64  # Points whose neighbours are followed.
 FRAMES = 17  # Frames that are looked at, spread over the clip: scans list other points in each.
@@ -23,13 +24,13 @@ def lost_neighbours(clip: MotionClip) -> float:
     """
     if clip.polygons is not None or clip.edges is not None or clip.vertex_count < SAMPLED:
         return 0.0
-    numbers = np.unique(np.linspace(0, clip.frame_count - 1, FRAMES).astype(int)).tolist()
+    numbers = spread(clip.frame_count, FRAMES)
     largest = {numbers[0], numbers[len(numbers) // 2], numbers[-1]}
     frames = [clip.block(frame, frame + 1)[0] for frame in sorted(largest)]
     sizes = [float(np.linalg.norm(np.ptp(frame, axis=0))) for frame in frames]
     size = max(sizes)
     points = frames[sizes.index(size)].astype(np.float64)
-    chosen = np.linspace(0, clip.vertex_count - 1, SAMPLED).astype(np.int64)
+    chosen = np.array(spread(clip.vertex_count, SAMPLED))
     nearest = np.empty(SAMPLED, np.int64)
     for row, vertex in enumerate(chosen):
         away = ((points - points[vertex]) ** 2).sum(axis=1)

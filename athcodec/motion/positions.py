@@ -21,6 +21,7 @@ from numpy.typing import DTypeLike
 
 from athcodec.errors import ClipError
 from athcodec.motion.frames import Frames
+from athcodec.motion.sampling import spread
 from athcodec.untyped import ArrayLike, JsonMapping
 
 FRAMES, VERTICES, XYZ, INDICES = "frames", "vertices", "xyz", "indices"
@@ -204,8 +205,7 @@ def looks_turned(positions: ArrayLike, facts: Facts) -> bool:
     frame_count, vertex_count = positions.shape[:2]
     if min(frame_count, vertex_count) < 2 or positions.dtype.kind != "f" or _confirm(positions.shape, facts):
         return False
-    starts = np.unique(np.linspace(0, frame_count - 2, FRAMES_LOOKED_AT).astype(int)).tolist()
-    places = np.unique(np.linspace(0, vertex_count - 2, VERTICES_LOOKED_AT).astype(int))
+    starts, places = spread(frame_count - 1, FRAMES_LOOKED_AT), np.array(spread(vertex_count - 1, VERTICES_LOOKED_AT))
     pairs = [np.asarray(positions[start : start + 2]) for start in starts]
     points = np.stack([pair[:, places] for pair in pairs]).astype(np.float64)  # Of each frame and the next one.
     beside = np.stack([pair[:, places + 1] for pair in pairs]).astype(np.float64)

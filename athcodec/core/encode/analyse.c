@@ -182,13 +182,21 @@ ATH_HOT static void settle_ends(const ath_stream *stream, int32_t T, int32_t mos
     }
 }
 
-/* Quantises a track of three axes about its prediction, if there is one, and replaces it by the decoded track if that is
- * shown. */
+/* Stores a row of `count` integers. Memory that holds them already is not written: of rows of zeros, which most are at
+ * coarse steps, the system then keeps no pages. */
+static void store_row(const int32_t *integers, int32_t count, int32_t *row)
+{
+    size_t size = (size_t)count * sizeof *row;
+    if (memcmp(row, integers, size) != 0) memcpy(row, integers, size);
+}
+
+/* Quantises a track of three axes about its prediction, if there is one, into a row, and replaces it by the decoded
+ * track if that is shown. */
 ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double steps[3], const ath_rounding *rounding,
-                               double *track, const int32_t *predicted, int32_t *quantised, int shown)
+                               double *track, const int32_t *predicted, int32_t *row, int shown)
 {
     double units[3][ATH_SEGMENT_FRAMES];
-    int32_t longest = 0;
+    int32_t longest = 0, quantised[3 * ATH_SEGMENT_FRAMES];
     memset(quantised, 0, 3 * (size_t)T * sizeof *quantised);
     for (int32_t axis = 0; axis < 3; axis++) {
         const int32_t *about = predicted ? predicted + axis * T : 0;
@@ -205,15 +213,16 @@ ATH_HOT static void code_track(const ath_stream *stream, int32_t T, const double
         settle_ends(stream, T, longest, steps[axis], rounding, track + axis * T, units[axis],
                     predicted ? predicted + axis * T : 0, quantised + axis * T);
     for (int32_t i = 0; predicted && i < 3 * T; i++) quantised[i] += predicted[i];
+    store_row(quantised, 3 * T, row);
     for (int32_t axis = 0; axis < 3 && shown; axis++)
         ath_inverse_temporal(stream, T, longest, steps[axis], quantised + axis * T, track + axis * T);
 }
 
 static void code_even_track(const ath_stream *stream, int32_t T, double step, const ath_rounding *rounding,
-                            double *track, const int32_t *predicted, int32_t *quantised, int shown)
+                            double *track, const int32_t *predicted, int32_t *row, int shown)
 {
     double steps[3] = {step, step, step};
-    code_track(stream, T, steps, rounding, track, predicted, quantised, shown);
+    code_track(stream, T, steps, rounding, track, predicted, row, shown);
 }
 
 /* Codes a track as it is predicted. */

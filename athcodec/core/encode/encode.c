@@ -313,16 +313,28 @@ int64_t ath_encode_corrections(void *memory, uint8_t *bytes, size_t capacity, in
     return coder_finish(&coder);
 }
 
-/* The input: frames x vertex_count x 3 source positions less the origin, and the limit of each vertex. */
+/* The input: source positions less the origin, vertex-major with `stride` numbers from row to row, and the limit of each
+ * vertex. A few frames at a time are put side by side in `block`. */
 typedef struct {
     const double *source, *limits;
+    int64_t stride;
+    int32_t frames, block_frames;
+    double *block;       /* block_frames x vertex_count x 3 */
+    const double *frame; /* the one that is coded */
 } predicted_source;
 
 enum { LOOKED_AT = 32 }; /* sampled vertices that tell which frames are similar */
 
-static const double *source_of(const prediction *p, const predicted_source *source, int32_t v)
+static void open_frame(const prediction *p, predicted_source *source)
 {
-    return source->source + 3 * ((size_t)p->vertex_count * (size_t)p->frame + (size_t)v);
+    size_t rows = 3 * (size_t)p->vertex_count;
+    int32_t number = p->frame % source->block_frames, count = ath_min(source->block_frames, source->frames - p->frame);
+    source->frame = source->block + (size_t)number * rows;
+    if (number > 0) return;
+    for (size_t row = 0; row < rows; row++)
+        for (int32_t t = 0; t < count; t++)
+            source->block[(size_t)t * rows + row] =
+                source->source[row * (size_t)source->stride + (size_t)(p->frame + t)];
 }
 
 /* Returns a coordinate of the rest pose as a copied frame gets it, less the origin. */
@@ -335,7 +347,7 @@ static double put_back_rest(const prediction *p, size_t at, size_t k)
 /* Returns the squared distance of a vertex from its position in an earlier frame. */
 static double way2_from(const prediction *p, const predicted_source *source, int32_t frame, int32_t v)
 {
-    const double *wanted = source_of(p, source, v);
+    const double *wanted = source->frame + 3 * (size_t)v;
     size_t from = 3 * (size_t)v, at = 3 * (size_t)p->vertex_count * (size_t)ath_max(frame, 0) + from;
     double way2 = 0.0;
     for (size_t k = 0; k < 3; k++) {
@@ -429,7 +441,7 @@ static void cheapest_point(const double left[3], double limit, int32_t steps[3])
 static int choose_steps(prediction *p, const predicted_source *source, int32_t v, const predicted_way *way,
                         int32_t steps[3])
 {
-    const double *wanted = source_of(p, source, v), *was = p->around.was[0] + 3 * (size_t)v;
+    const double *wanted = source->frame + 3 * (size_t)v, *was = p->around.was[0] + 3 * (size_t)v;
     double left[3];
     for (size_t k = 0; k < 3; k++) {
         left[k] = (wanted[k] - (was[k] + way->way[k])) / p->step;
@@ -484,9 +496,10 @@ static int encode_vertex(ath_coder *coder, prediction *p, const predicted_source
     return 1;
 }
 
-static int encode_frame(ath_coder *coder, prediction *p, const predicted_source *source)
+static int encode_frame(ath_coder *coder, prediction *p, predicted_source *source)
 {
     int copied, valid = 1;
+    open_frame(p, source);
     int32_t distance = find_reference(p, source, &copied);
     if (!start_frame(coder, p, &copied, distance)) return 0;
     for (int32_t v = 0; !copied && valid && v >= 0; v = p->vertices[v].next) valid = encode_vertex(coder, p, source, v);
@@ -501,12 +514,12 @@ size_t ath_predicted_memory(int32_t vertex_count)
 }
 
 int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan, const double *origin,
-                             int32_t frames, int is_float64, double step, const double *source, const double *limits,
-                             void *positions)
+                             int32_t frames, int is_float64, double step, const double *source, int64_t stride,
+                             const double *limits, int32_t block_frames, double *block, void *positions)
 {
     ath_coder coder;
     prediction *p = (prediction *)memory;
-    predicted_source wanted = {source, limits};
+    predicted_source wanted = {source, limits, stride, frames, block_frames, block, 0};
     int valid = 1;
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);

@@ -278,12 +278,14 @@ ATH_ENCODER_API int64_t ath_encode_refinement(void *model, uint8_t *bytes, size_
                                               const ath_motion *motion, const ath_integers *integers, int32_t stage);
 ATH_ENCODER_API int64_t ath_encode_affines(void *model, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                            const ath_motion *motion, const ath_integers *integers, int32_t stage);
-/* memory: ath_predicted_memory bytes. source: frames x vertex_count x 3, less the origin. limits: one per vertex. Fills
- * positions, as decoded. */
+/* memory: ath_predicted_memory bytes. source: vertex-major doubles less the origin, `stride` numbers from row to row.
+ * limits: one per vertex. block: block_frames x vertex_count x 3. Fills positions, as decoded, frames x vertex_count x
+ * 3. */
 ATH_ENCODER_API size_t ath_predicted_memory(int32_t vertex_count);
 ATH_ENCODER_API int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, const ath_plan *plan,
                                              const double *origin, int32_t frames, int is_float64, double step,
-                                             const double *source, const double *limits, void *positions);
+                                             const double *source, int64_t stride, const double *limits,
+                                             int32_t block_frames, double *block, void *positions);
 ATH_ENCODER_API int64_t ath_encode_corrections(void *model, uint8_t *bytes, size_t capacity, int32_t vertex_count,
                                                int32_t frames, const int32_t *corrections, int64_t count);
 

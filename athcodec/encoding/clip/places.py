@@ -59,9 +59,9 @@ class PlacedClip:
         pose = grown_pose(self.clip)
         return self.clip.source_rest if pose is None else pose
 
-    def apart(self, zeros_differ: bool = False) -> PlacedClip | None:
+    def apart(self) -> PlacedClip | None:
         """Return this clip with more places: parts of its mesh that touch at a single place, and not along a side of a
-        face, get places of their own there. Return None if no parts touch like that. `zeros_differ` has no effect.
+        face, get places of their own there. Return None if no parts touch like that.
         """
         if not self.places.are_shared or self.clip.polygons is None:
             return None

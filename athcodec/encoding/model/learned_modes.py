@@ -20,6 +20,7 @@ from athcodec.encoding.model.motion import LEARNED_NUMBERS, LearnedModes, Plan, 
 from athcodec.files.threads import ranges
 from athcodec.motion.algebra import multiply, principal, solve
 
+PART_BYTES = 2 << 20  # Memory of the products, or modes, of the pieces that are worked on at once.
 FAINT = 0.15  # Bend of rings, in steps, below which a learned mode drops it: it would stretch rings that turn.
 
 
@@ -56,13 +57,16 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
 
 
 def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    values, vectors = principal(moments)
-    return np.sqrt(np.maximum(values, 0.0)), vectors
+    """Return the lengths and the unit vectors of the components of moments, (P, n, n), in whose memory they are."""
+    values = np.empty(moments.shape[:2])
+    for part in _parts(moments, moments[:1].size):
+        values[part], moments[part] = principal(moments[part])
+    return np.sqrt(np.maximum(values, 0.0)), moments
 
 
-def _parts(pieces: np.ndarray, row_bytes: int) -> Iterator[slice]:
-    """Yield few enough pieces at a time that memory does not grow with their number."""
-    count = max(1, (16 << 20) // (8 * row_bytes))
+def _parts(pieces: np.ndarray, numbers: int) -> Iterator[slice]:
+    """Yield few enough pieces at a time that memory does not grow with their number. `numbers`: those of each."""
+    count = max(1, PART_BYTES // (8 * numbers))
     return (slice(at, at + count) for at in range(0, len(pieces), count))
 
 

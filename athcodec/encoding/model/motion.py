@@ -54,15 +54,17 @@ LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 
 
-def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
+def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64, *, sparse: bool = False) -> np.ndarray:
     """Return zeros. The memory of a large array goes back to the system with it, whereas allocators keep freed memory
-    for each thread."""
+    for each thread. `sparse`: whether most numbers stay 0; then memory is taken in small pages, and only where one is
+    written.
+    """
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.zeros(shape, dtype)
     memory = mmap.mmap(-1, size, **_PRIVATE)
-    if hasattr(mmap, "MADV_HUGEPAGE"):
-        memory.madvise(mmap.MADV_HUGEPAGE)
+    if (pages := getattr(mmap, "MADV_NOHUGEPAGE" if sparse else "MADV_HUGEPAGE", None)) is not None:
+        memory.madvise(pages)
     return np.frombuffer(memory, dtype).reshape(shape)
 
 
@@ -186,6 +188,10 @@ class Plan:
         for fill in fill_modes, fill_sheets:
             self.pool.map(fill, ranges(pieces, PIECE_VERTICES * PIECE_VERTICES))
         self.core.bases = self.bases.ctypes.data
+
+    def forget_bases(self) -> None:
+        """Free the bases of the pieces, without which nothing more can be analysed or posed on this plan."""
+        self.bases, self.core.bases = np.empty(0), None
 
     @cached_property
     def piece_ranges(self) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
@@ -367,10 +373,10 @@ class SegmentMotion:
             )
         self.plan, self.frames, self.streams, self.learned_modes = plan, frames, streams, learned_modes
         core = plan.core
-        self.coefficients = zeros((int(plan.ranks.sum()), 3, frames), np.int32)
-        self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32)
+        self.coefficients = zeros((int(plan.ranks.sum()), 3, frames), np.int32, sparse=True)
+        self.tracks = zeros((core.piece_count, 2, 3, frames), np.int32, sparse=True)
         node_count = 0 if before is not None else core.node_count  # Refinements have no maps.
-        self.node_tracks = zeros((node_count, 4, 3, frames), np.int32)
+        self.node_tracks = zeros((node_count, 4, 3, frames), np.int32, sparse=True)
         self.node_steps = np.zeros(node_count, np.int32)
         self._attach_caches: np.ndarray | None = None
         self.waves = waves_over_time(frames, Waves.PERIODIC if periodic else Waves.SMOOTH)
@@ -382,8 +388,8 @@ class SegmentMotion:
         self.predicted_tracks: np.ndarray | None = None
         if before is not None:
             self.predicted, self.predicted_tracks = (
-                zeros(self.coefficients.shape, np.int32),
-                zeros(self.tracks.shape, np.int32),
+                zeros(self.coefficients.shape, np.int32, sparse=True),
+                zeros(self.tracks.shape, np.int32, sparse=True),
             )
             self.known = self._known(before)
             self.turn_steps = np.empty((core.piece_count, 3))
@@ -550,8 +556,8 @@ class SegmentMotion:
 
     def pose(self, stage: int, origin: np.ndarray, dtype: DTypeLike, room: np.ndarray | None = None) -> np.ndarray:
         """Return the positions that a decoder shows at `stage`, without corrections: (N, 3, frames) of `dtype`, float32
-        or float64, with the origin added. `room`: an array of as many float64, whose memory the result takes; None: new
-        memory is taken.
+        or float64, with the origin added. `room`: an array whose memory the result takes, which is enough for it; None:
+        new memory is taken.
         """
         shape = self.plan.vertex_count, 3, self.frames
         if room is None:

@@ -10,6 +10,7 @@ from athcodec.encoding.assembly.decided import Draft
 from athcodec.encoding.clip.coded_clip import CodedClip, hierarchy_and_pose
 from athcodec.encoding.clip.places import PlacedClip, find_places
 from athcodec.encoding.clip.survey import survey
+from athcodec.encoding.model.motion import release_memory
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.options.weights import ErrorWeights
 from athcodec.encoding.preparation.bounds import BoundOption
@@ -76,6 +77,7 @@ def surveyed(placed: PlacedClip, branches: Found | None, options: EncodingOption
     thresholds = {} if options.tam is None else {name: getattr(options.tam, name) for name in ("lam", "xi", "eta")}
     _warn_of_odd_points(placed.clip)
     seen = survey(clip.motion, hierarchy, progress=lambda f: report("survey", f), pool=pool, rest=pose, **thresholds)
+    release_memory()
     return Source.of(clip, seen, options, pool)
 
 

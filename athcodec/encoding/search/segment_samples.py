@@ -39,11 +39,6 @@ class SegmentSample:
         return replace(self, positions=sample.source.sharing(self.segment, self.positions[sample.vertices]))
 
 
-def spread(count: int, most: int = FRAMES) -> list[int]:
-    """Return a few of so many frames, or of other things, from the first to the last."""
-    return np.unique(np.linspace(0, count - 1, most).astype(int)).tolist()
-
-
 def samples_of(source: Source) -> list[SegmentSample]:
     """Return the typical segments with their positions."""
     return [

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import TypeAlias
@@ -15,12 +15,12 @@ import numpy as np
 
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model.learned_modes import Components, components, learn
-from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion
+from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion, release_memory
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import progress
 from athcodec.encoding.search.progress import Work
 from athcodec.encoding.search.sample import ExtrapolationFactors
-from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS, SegmentSample, spread, usual_change
+from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS, SegmentSample, usual_change
 from athcodec.encoding.segments.segment import (
     Coded,
     CodedPrelude,
@@ -40,6 +40,7 @@ from athcodec.encoding.segments.time_bases import TimeComponents
 from athcodec.encoding.streams import streams
 from athcodec.errors import BoundError
 from athcodec.files.threads import ThreadPool
+from athcodec.motion.sampling import spread
 
 TimeComponentsOfSamples: TypeAlias = list[dict[int | None, TimeComponents]]
 """For each sample its components over time by stage; None: those of all stages."""
@@ -315,6 +316,7 @@ class Trials:
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
             self.work.add(progress.EIGENVECTOR * longest**3 * len(stages) * len(self.samples))
+            release_memory()
             learned = [
                 time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, stages)
                 for sample in self.samples
@@ -339,10 +341,22 @@ class Trials:
             chosen = spread(count, LEARNING_SEGMENTS)
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)
-            self._components[key] = components(
-                plan, (analyse_finely(plan, settings, self.source.positions(segment), bent=True) for segment in chosen)
-            )
+            self._components[key] = components(plan, self._analysed_finely(plan, settings, chosen, last=not coded))
         return self._components[key]
+
+    def _analysed_finely(
+        self, plan: Plan, settings: Settings, segments: Sequence[int], last: bool
+    ) -> Iterator[SegmentMotion]:
+        """Yield segments that were analysed with a fine step. `last`: whether the plan is of no use afterwards; its
+        bases are freed then before the last segment is looked at.
+        """
+        release_memory()
+        for segment in segments:
+            motion = analyse_finely(plan, settings, self.source.positions(segment), bent=True)
+            if last and segment == segments[-1]:
+                plan.forget_bases()
+            yield motion
+            del motion  # The next segment is analysed after this one has been freed.
 
 
 def distinct(candidates: Iterable[Settings]) -> list[Settings]:

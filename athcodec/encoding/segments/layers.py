@@ -488,17 +488,19 @@ class CodedMotion:
         self.chunks |= {(stage, ct.STEMS): data for stage, data in stems.items()}
         last = plan.stage_count - 1
         self._correct(decoded, layer, last)
+        del decoded  # Stages with maps are in memory before the last one is posed again.
         segment.analyse_nodes(self.positions, settings.node_steps, settings.rounding)
-        self._room = zeros(self.positions.shape)
+        stands_alone = self._before is None and self._after is None
+        self._room = zeros(self.positions.shape, self._output[1] if stands_alone else np.float64)
         shown = [self._at_stage_0(segment, settings), *[segment] * (plan.stage_count - 2)]
         self.errors = _EvenStages(self, shown, settings).errors
-        self._keep_last_stage_best(layer, last, decoded)
-        del decoded  # Stages with maps are in memory before the last one is posed again.
+        if self._is_worse_than_before(last):
+            self._keep_last_stage_best(layer, last, self.pose(segment, last))
         for stage, nodes in enumerate(shown):
             if plan.has_affines(stage):
                 self.chunks[stage, ct.AFFINES] = streams.encode_affines(nodes, stage)
         for stage, nodes in enumerate(shown):
-            self._finish(stage, self._pose_to_join(nodes, stage))
+            self._finish(stage, self.pose(nodes, stage) if stands_alone else self._pose_to_join(nodes, stage))
         self._finish(last, self.pose(segment, last), layer)
         segment.forget_nodes()
         del self._room
@@ -509,15 +511,19 @@ class CodedMotion:
         before, which is shown by affine maps, and while the corrections take few bytes. `decoded`: positions of the
         stage without corrections.
         """
-        before, known = self.errors[stage - 1][RMS], len(self.chunks.get((stage, ct.CORRECTIONS), b""))
+        known = len(self.chunks.get((stage, ct.CORRECTIONS), b""))
         most = known + EVEN_SHARE * (self._bytes_up_to(stage) + known)
         for factor in TIGHTER_LIMITS:
-            if self.errors[stage][RMS] <= STAGE_TOLERANCE * before:
+            if not self._is_worse_than_before(stage):
                 break
             corrections = self._corrections(decoded, layer, factor)
             if len(corrections.chunk) > most:
                 break
             self.errors[stage] = self._set_last(layer, stage, decoded, corrections)
+
+    def _is_worse_than_before(self, stage: int) -> bool:
+        """Return whether the RMS error of a stage exceeds that of the stage before."""
+        return self.errors[stage][RMS] > STAGE_TOLERANCE * self.errors[stage - 1][RMS]
 
     def _keep_smooth(self, layer: Layer, stage: int, positions: np.ndarray) -> None:
         """Leave out corrections without which a stage before the last layer's does not jerk. It is then shown, with an

@@ -12,9 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from athcodec._native import BRANCH, CoreMetEnds, address, encode_stream, lib
-from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion
+from athcodec.encoding.model.motion import LearnedModes, Plan, SegmentMotion, zeros
 from athcodec.encoding.streams.polygons import Mesh
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
+
+PREDICTED_FRAMES = 8  # Frames of the source that prediction reads at once: a cache line of each row.
 
 
 def encode_hierarchy(branches: np.ndarray, branch_source: np.ndarray, vertex_source: np.ndarray) -> bytes:
@@ -233,12 +235,16 @@ def encode_predicted(
     plan: Plan, origin: np.ndarray, source: np.ndarray, limits: np.ndarray, step: float, dtype: np.dtype
 ) -> tuple[bytes, np.ndarray] | None:
     """Code the motion of a segment by prediction. Return two things: the stream, and the positions that it decodes to,
-    (T, N, 3) of `dtype`. Return None if a step so large cannot keep the limits. `source`: (T, N, 3) float64 less the
-    origin; `limits`: the largest error of each vertex, (N,).
+    (T, N, 3) of `dtype`. Return None if a step so large cannot keep the limits. `source`: (N, 3, T) float64 less the
+    origin, some frames of an array in order; `limits`: the largest error of each vertex, (N,).
     """
-    frames, vertices, _ = source.shape
+    vertices, _, frames = source.shape
+    row = source.strides[1]
+    if source.strides != (3 * row, row, 8):
+        source = np.ascontiguousarray(source)
+        row = source.strides[1]
     memory = np.empty(lib.ath_predicted_memory(vertices) // 16 + 1, np.complex128)
-    positions = np.empty(source.shape, dtype)
+    block, positions = np.empty((PREDICTED_FRAMES, vertices, 3)), zeros((frames, vertices, 3), dtype)
     capacity = 1024 + source.size
     while True:
         buffer = np.empty(capacity, np.uint8)
@@ -251,8 +257,11 @@ def encode_predicted(
             frames,
             positions.dtype == np.float64,
             step,
-            address(source, np.float64, source.size),
+            source.ctypes.data,
+            row // source.itemsize,
             address(limits, np.float64, vertices),
+            len(block),
+            block.ctypes.data,
             positions.ctypes.data,
         )
         if size >= 0:

@@ -14,6 +14,7 @@ import numpy as np
 from athcodec.motion.branches.seen import links_of
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import Hierarchy
+from athcodec.motion.sampling import spread
 
 FRAMES = 64  # Frames of a clip that are looked at.
 SMALL_LINK = 0.2  # Length of a link, over its largest in any frame, below which it is not grown.
@@ -40,7 +41,7 @@ def grown_pose(clip: MotionClip) -> np.ndarray | None:
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
-    frames = _some_frames(clip.frame_count)
+    frames = spread(clip.frame_count, FRAMES)
     poses = (pose.T.copy() for pose in itertools.chain([clip.rest], _poses(clip, frames)))
     sizes = np.sqrt([sum(np.square(x[links[:, 0]] - x[links[:, 1]]) for x in pose) for pose in poses])
     largest = sizes[1:].max(axis=0)
@@ -51,7 +52,7 @@ def grown_pose(clip: MotionClip) -> np.ndarray | None:
     grown = (sizes[1:, moving] / largest[moving]).mean(axis=1)
     if grown.max() < GROWN:  # Points that wander are never all far apart.
         return None
-    best = int(frames[int(np.argmax(grown))])
+    best = frames[int(np.argmax(grown))]
     return clip.block(best, best + 1)[0]
 
 
@@ -61,15 +62,15 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     """
     if clip.frame_count == 1:
         return pose
-    frames, source, first = _some_frames(clip.frame_count), hierarchy.vertex_source, hierarchy.first_vertex
+    frames, source, first = spread(clip.frame_count, FRAMES), hierarchy.vertex_source, hierarchy.first_vertex
     sizes = np.array([_branch_sizes(frame[source], first) for frame in _poses(clip, frames)])
     rest = pose[source].astype(np.float64)
     small = np.flatnonzero(_branch_sizes(rest, first) < SMALL * sizes.max(axis=0))
     if not len(small):
         return pose
-    largest = frames[sizes.argmax(axis=0)]
-    shown = np.unique(largest[small])
-    shapes = {number: frame[source] for number, frame in zip(shown.tolist(), _poses(clip, shown))}
+    largest = np.array(frames)[sizes.argmax(axis=0)]
+    shown = np.unique(largest[small]).tolist()
+    shapes = {number: frame[source] for number, frame in zip(shown, _poses(clip, shown))}
     for branch in small.tolist():  # Parents come first.
         shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
         vertices = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
@@ -79,16 +80,11 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     return grown
 
 
-def _some_frames(frame_count: int) -> np.ndarray:
-    """Return the numbers of frames spread over the clip, the first and the last among them."""
-    return np.unique(np.linspace(0, frame_count - 1, FRAMES).astype(int))
-
-
-def _poses(clip: MotionClip, frames: np.ndarray) -> Iterator[np.ndarray]:
+def _poses(clip: MotionClip, frames: list[int]) -> Iterator[np.ndarray]:
     """Yield the positions (N, 3) float64 of the clip in each of these frames, which ascend. Frames in one chunk of the
     source are read together, so that it is unpacked once, but never more of them than fit a block."""
     length = min(clip.chunk_frames, clip.block_length())
-    for _, chosen in itertools.groupby(frames.tolist(), lambda frame: frame // length):
+    for _, chosen in itertools.groupby(frames, lambda frame: frame // length):
         run = list(chosen)
         block = clip.block(run[0], run[-1] + 1)
         for frame in run:

@@ -12,6 +12,7 @@ from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import sides
+from athcodec.motion.sampling import spread
 
 SAMPLE_FRAMES = 12  # Frames of the clip that the methods look at.
 AFFINE_ERROR = 1e-4  # Part of the diagonal that parts may be off one affine map.
@@ -52,7 +53,7 @@ class Seen:
     @cached_property
     def _frames(self) -> np.ndarray:
         clip = self.clip
-        some = np.unique(np.linspace(0, clip.frame_count - 1, min(SAMPLE_FRAMES, clip.frame_count)).astype(int))
+        some = spread(clip.frame_count, SAMPLE_FRAMES)
         return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
 
     @cached_property

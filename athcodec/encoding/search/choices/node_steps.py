@@ -12,11 +12,11 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model.motion import Plan, SegmentMotion, position_errors
 from athcodec.encoding.search import progress
-from athcodec.encoding.search.segment_samples import spread
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import CodedPrelude, Source
 from athcodec.encoding.segments.settings import Settings
 from athcodec.encoding.streams import streams
+from athcodec.motion.sampling import spread
 
 # Steps that are tried, over the error of a stage: half octaves, and octaves from 8 on.
 QUALITIES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0, 128.0)

@@ -22,7 +22,7 @@ from athcodec.encoding.model.motion import SegmentMotion, StageStream, position_
 from athcodec.encoding.search.choices.node_steps import FILE_SHARE
 from athcodec.encoding.search.choices.rest import with_best_rest
 from athcodec.encoding.search.progress import PREDICTION, REST, Work
-from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, spread, typical_segments
+from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, typical_segments
 from athcodec.encoding.segments.levels import MOST_AWAY, SourceFrames
 from athcodec.encoding.segments.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segments.settings import Choice, Settings
@@ -30,6 +30,7 @@ from athcodec.encoding.streams import streams, writing
 from athcodec.errors import BoundError
 from athcodec.files.threads import ranges
 from athcodec.motion.algebra import length
+from athcodec.motion.sampling import spread
 from athcodec.motion.thresholds import Thresholds
 from athcodec.options import SMOOTHNESS
 
@@ -103,14 +104,17 @@ def best_prediction(
         settings = by_ratio(way.rest_ratio)
         stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
         choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
-        work.add(PREDICTION * vertices * sum(sample.positions.shape[2] for sample in samples))
+        work.add(PREDICTION * vertices * sum(source.frames_of(segment) for segment, _ in samples))
+        motion, twitches = 0.0, False
         try:
             prelude = prelude_of(way.rest_ratio)
-            parts = [(sample, *_predicted(prelude, choice, sample.positions)) for sample in samples]
+            for sample in _read(source, samples):
+                payload, shown = _predicted(prelude, choice, sample.positions)
+                motion += len(payload) * sample.scale
+                twitches = twitches or _twitches(shown, sample.positions, settings.limit)
+                del sample, shown  # One segment is in memory at a time.
         except BoundError:
             return FoundPrediction(way, choice, math.inf, False)
-        motion = sum(len(payload) * sample.scale for sample, payload, _ in parts)
-        twitches = any(_twitches(shown, sample.positions, settings.limit) for sample, _, shown in parts)
         return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
 
     def best(share: float, most: float) -> FoundPrediction:
@@ -125,10 +129,10 @@ def best_prediction(
     if usual:
         prediction = coded(Way(USUAL_REST_RATIO))
         return prediction if prediction.bytes < most_bytes else None
-    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, sample.positions.shape[2]) for sample in samples))
+    work.add(PREDICTION * vertices * sum(min(TRIAL_FRAMES, source.frames_of(segment)) for segment, _ in samples))
     try:
         prelude, settings = prelude_of(USUAL_REST_RATIO), by_ratio(USUAL_REST_RATIO)
-        if sum(_begun(prelude, settings, sample) for sample in samples) > TOO_MANY * most_bytes:
+        if sum(_begun(prelude, settings, sample) for sample in _read(source, samples)) > TOO_MANY * most_bytes:
             return None
     except BoundError:
         return None
@@ -187,13 +191,19 @@ def _largest_step(limit: np.ndarray | float) -> float:
     return qz.single(qz.SAFE_REST_CAP * float(np.min(limit)))
 
 
-def _samples(source: Source) -> list[SegmentSample]:
-    """Return a few segments spread over a clip, or the typical segments of several clips."""
+def _samples(source: Source) -> list[tuple[int, float]]:
+    """Return a few segments spread over a clip, or the typical segments of several clips: pairs of a segment and the
+    number of frames that it stands for."""
     if len(source.clip_range_segments) > 1:
-        return [SegmentSample(source.positions(segment), frames) for segment, frames in typical_segments(source)]
-    positions = [source.positions(segment) for segment in spread(len(source.segments), SAMPLES)]
-    scale = source.coded_frames / sum(block.shape[2] for block in positions)
-    return [SegmentSample(block, scale * block.shape[2]) for block in positions]
+        return [(segment, frames) for segment, frames in typical_segments(source)]
+    chosen = spread(len(source.segments), SAMPLES)
+    scale = source.coded_frames / sum(map(source.frames_of, chosen))
+    return [(segment, scale * source.frames_of(segment)) for segment in chosen]
+
+
+def _read(source: Source, samples: list[tuple[int, float]]) -> Iterator[SegmentSample]:
+    """Yield samples with their positions, of which this holds none."""
+    return (SegmentSample(source.positions(segment), frames) for segment, frames in samples)
 
 
 def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> float:
@@ -206,18 +216,19 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
     """Code the motion of a segment by prediction. Return the payload of the chunk PREDICTED, and the positions that it
-    decodes to, (N, 3, T). Raises BoundError if no step keeps the limits. `positions`: (N, 3, T) of the source, less the
-    origin.
+    decodes to, (N, 3, T), frame by frame in memory. Raises BoundError if no step keeps the limits. `positions`: (N, 3,
+    T) of the source, less the origin.
     """
     settings = choice.settings
-    source = np.ascontiguousarray(positions.transpose(2, 0, 1))
     limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
     for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
         for factor in STEPS:
             step = qz.single(factor * _largest_step(share * limits))
-            coded = streams.encode_predicted(prelude.plan, prelude.origin, source, share * limits, step, prelude.dtype)
+            coded = streams.encode_predicted(
+                prelude.plan, prelude.origin, positions, share * limits, step, prelude.dtype
+            )
             if coded is not None:
-                return writing.pack_predicted(step, coded[0]), np.ascontiguousarray(coded[1].transpose(1, 2, 0))
+                return writing.pack_predicted(step, coded[0]), coded[1].transpose(1, 2, 0)
     raise BoundError(
         f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
     )
@@ -240,7 +251,9 @@ def code_predicted_segment(
     3).
     """
     plan, settings = prelude.plan, choice.settings
-    payload, decoded = _predicted(prelude, choice, positions)
+    payload, by_frame = _predicted(prelude, choice, positions)
+    decoded = np.ascontiguousarray(by_frame)
+    del by_frame
 
     def error(shown: np.ndarray) -> tuple[float, ...]:
         return position_errors(shown, positions, prelude.origin, plan.pool, shown_times, prelude.shares)

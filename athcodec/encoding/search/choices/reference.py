@@ -13,9 +13,10 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import SegmentMotion
-from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS, spread
+from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS
 from athcodec.encoding.segments.segment import FINER, Source, analyse_finely, stage_streams, uncoded_plan
 from athcodec.encoding.segments.settings import Settings
+from athcodec.motion.sampling import spread
 
 
 def mean_pose(source: Source, ath: Ath, settings: Settings) -> np.ndarray:

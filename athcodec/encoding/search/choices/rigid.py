@@ -16,11 +16,12 @@ from athcodec._native import PIECE_VERTICES
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices.steps import STEP_FACTOR
-from athcodec.encoding.search.segment_samples import SegmentSample, spread
+from athcodec.encoding.search.segment_samples import FRAMES, SegmentSample
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.settings import Settings
 from athcodec.motion.algebra import decompose, determinant, multiply
+from athcodec.motion.sampling import spread
 
 MOST_BEND = 0.3  # Distance, in bounds, by which a rigid part may bend in the source.
 STIFF_BEND = 0.05  # Distance, in bounds, up to which a part of any size is rigid.
@@ -121,7 +122,7 @@ def _bends(shapes: np.ndarray, sample: np.ndarray, vertices: np.ndarray) -> np.n
     """
     d = shapes - shapes.mean(axis=1, keepdims=True)
     worst = np.zeros(len(shapes))
-    for t in spread(sample.shape[2]):
+    for t in spread(sample.shape[2], FRAMES):
         x = sample[:, :, t][vertices]
         x = x - x.mean(axis=1, keepdims=True)
         u, _, v = decompose(multiply(x.transpose(0, 2, 1), d))

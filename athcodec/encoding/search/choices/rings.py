@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from athcodec.encoding.model.quantise import bits
-from athcodec.encoding.search.segment_samples import spread
+from athcodec.encoding.search.segment_samples import FRAMES
+from athcodec.motion.sampling import spread
 
 LEAST_RING = 2  # Least vertices of a ring (FORMAT.md, HIERARCHY).
 LARGEST_RING = 32  # Most vertices of a ring (FORMAT.md, HIERARCHY).
@@ -68,7 +69,7 @@ def _move_alike(stems: np.ndarray, vertices: np.ndarray, samples: Sequence[np.nd
     sizes = np.diff(np.append(starts, stems.shape[1]))
     within, all_in_all = np.zeros(len(stems)), np.zeros(len(stems))
     for sample in samples:
-        for t in spread(sample.shape[2]):
+        for t in spread(sample.shape[2], FRAMES):
             moved = sample[:, :, t][vertices] - stems
             moved -= moved.mean(axis=1, keepdims=True)
             centres = np.add.reduceat(moved, starts, axis=1) / sizes[:, None]

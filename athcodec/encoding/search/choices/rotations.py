@@ -11,11 +11,12 @@ import numpy as np
 from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices import learned_bases
-from athcodec.encoding.search.segment_samples import SegmentSample, spread
+from athcodec.encoding.search.segment_samples import FRAMES, SegmentSample
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.settings import Settings
 from athcodec.motion.algebra import decompose, determinant
+from athcodec.motion.sampling import spread
 
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
@@ -45,7 +46,7 @@ def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
     size2 = _sums(np.square(rest), first).sum(axis=1)
     moved, bent, turned = (np.zeros(len(roots)) for _ in range(3))
     for sample in samples:
-        for frame in spread(sample.positions.shape[2]):
+        for frame in spread(sample.positions.shape[2], FRAMES):
             pose = _about_centres(sample.positions[:, :, frame], first)
             moments = _sums((pose[:, :, None] * rest[:, None]).reshape(-1, 9), first).reshape(-1, 3, 3)
             left, stretch, right = decompose(moments)
