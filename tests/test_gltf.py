@@ -820,7 +820,7 @@ def test_the_takes_that_are_not_read_are_named(tmp_path, capsys):
     assert main(["encode", path, out]) == 0
     assert "this is walk; there are walk.1, animation 2, turn too, and --takes all" in capsys.readouterr().err
     assert main(["encode", path, out, "--takes", "turn,gallop"]) == 1
-    assert "got gallop, expected one of ['walk', 'walk.1'" in capsys.readouterr().err
+    assert "got gallop, expected one of walk, walk.1, " in capsys.readouterr().err
     assert main(["encode", path, out, "--takes", "all", "--names", "a,b,c,d", "--loop", "a", "--fps", "10"]) == 0
     assert "takes" not in capsys.readouterr().err.splitlines()[-1]
     with athcodec.open(out) as decoder:
