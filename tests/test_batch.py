@@ -488,6 +488,20 @@ def test_warnings_of_workers_look_like_those_of_a_single_encoding(clips, out):
     assert ".py:" not in done.stderr
 
 
+@pytest.mark.parametrize("words", [("--still",), ("--settings",)])
+def test_a_source_of_a_single_frame_can_be_meant(clips, out, words):
+    """By the option of `encode` or by a setting, and a plain run sets nothing that nobody asked for."""
+    np.savez(clips / "still.npz", verts=plant(seed=1, branches=5, longest=4, frames=1).positions)
+    settings = clips / "settings.toml"
+    settings.write_text('["still*"]\nstill = true\n')
+    words = [*words, str(settings)] if words == ("--settings",) else words
+    command = [*BATCH, str(clips / "*.npz"), "--out", str(out), "--workers", "1", *WORDS, *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0 and "holds a single frame" not in done.stderr, done.stderr
+    planned = subprocess.run([*command, "--dry-run"], capture_output=True, text=True, timeout=600)
+    assert "still=True" in planned.stdout and "allow_outside" not in planned.stdout
+
+
 # ---- what goes wrong ----
 
 

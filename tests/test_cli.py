@@ -735,3 +735,66 @@ def test_bash_completes_verbs_options_and_files(encoded, tmp_path, capsys, monke
     with pytest.raises(SystemExit) as refused:
         run("--print-completion", "zsh")
     assert refused.value.code == 2 and "athcodec[completion]" in capsys.readouterr().err
+
+
+# ---- what a newcomer types ----
+
+
+def test_a_completion_script_ends_quietly_when_its_reader_has_left():
+    """As in `athcodec --print-completion bash | head`, where Python would show a traceback."""
+    process = spawn("--print-completion", "bash")
+    process.stdout.close()
+    assert process.wait(timeout=60) == 141 and process.stderr.read() == ""
+    process.stderr.close()
+
+
+def test_a_misspelt_option_is_named_with_the_one_that_looks_like_it(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        run("encode", SAMPLE, "tree.ath", "--max-eror", "1mm")
+    assert stopped.value.code == 2
+    assert "unrecognized arguments: --max-eror 1mm; did you mean --max-error?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "expected"), [("a.gltf", "expected one of .glb\n"), ("a.npy", " .npz ")])
+def test_decoding_to_a_format_that_is_only_read_says_so(encoded, tmp_path, capsys, name, expected):
+    assert run("decode", encoded, tmp_path / name) == 1
+    said = capsys.readouterr().err
+    assert f"{name}: got {Path(name).suffix}, which is read and not written" in said and expected in said
+
+
+def test_a_missing_package_for_the_output_names_the_output(encoded, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("athcodec.sources.find_spec", lambda name: None)  # as where the package is not installed
+    assert run("decode", encoded, tmp_path / "b.usdc") == 1
+    assert capsys.readouterr().err.startswith(f"athcodec: error: {tmp_path / 'b.usdc'}: USD: needs pxr")
+
+
+def test_a_loop_that_jumps_is_named_with_lengths_in_its_unit_and_the_option_that_smooths_it(tmp_path, capsys):
+    words = ("--loop", "all", "--names", "sway", "--effort", "fast", "--rel-error", "1e-2")
+    assert run("encode", SAMPLE, tmp_path / "a.ath", *words) == 0
+    said = capsys.readouterr().err
+    assert re.search(r"loop: sway: vertices move by up to [\d.]+ m from .*by up to [\d.]+ m .*up to [\d.]+ m;", said)
+    assert "the loop jumps: --loop-blend FRAMES smooths it" in said
+
+
+def test_an_array_that_is_a_second_motion_is_named_because_it_is_not_compressed_as_one(tmp_path, capsys):
+    positions = np.zeros((4, 3, 3)) + np.arange(3)[:, None] + np.arange(4)[:, None, None]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["positions"], file["velocities"], file["mass"] = positions, positions, np.arange(3.0)
+    words = ("encode", tmp_path / "a.h5", tmp_path / "a.ath", "--effort", "fast")
+    assert run(*words) == 0
+    assert f"arrays: {tmp_path / 'a.h5'}: velocities: a value for each frame" in capsys.readouterr().err
+    assert run(*words, "--attributes", "none") == 0
+    assert "arrays: " not in capsys.readouterr().err
+
+
+def test_a_single_branch_is_not_described_as_several(tmp_path, capsys):
+    np.save(tmp_path / "a.npy", np.stack([np.eye(3), np.eye(3) + 1]))
+    assert run("encode", tmp_path / "a.npy", tmp_path / "a.ath", "--hierarchy", "motion", "--effort", "fast") == 0
+    assert re.search(r"hierarchy: 1 branch by \w+: all 3 vertices\n", capsys.readouterr().err)
+
+
+def test_what_is_no_clip_is_refused_by_what_it_is(tmp_path):
+    with pytest.raises(TypeError, match="write: got ndarray, expected a MotionClip, a decoder or a ClipView"):
+        athcodec.write(np.zeros((2, 3, 3)), tmp_path / "a.npz")
+    with pytest.raises(TypeError, match="onto: got str, expected a decoder of the plant"):
+        athcodec.onto("tree.ath", "lod1.glb")

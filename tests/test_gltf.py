@@ -388,7 +388,10 @@ def test_animations_of_different_nodes_run_together_and_takes_do_not(tmp_path):
     jumped, clip = frames_of(path, fps=1, only=["animation:ju*", "a"])
     assert clip.vertex_count == 8 and clip.metadata["part_names"] == ["a"]
     assert np.allclose(jumped[1] - jumped[0], [0, 0, 9])
-    for only, message in ((["leaf*"], "expected names such as"), (["animation:run"], "expected one of .*walk")):
+    for only, message in (
+        (["leaf*"], "expected names such as [^\\[]*$"),
+        (["animation:run"], "expected one of .*walk"),
+    ):
         with pytest.raises(ClipError, match=message):
             read(path, only=only)
 
@@ -817,7 +820,7 @@ def test_the_takes_that_are_not_read_are_named(tmp_path, capsys):
     assert main(["encode", path, out]) == 0
     assert "this is walk; there are walk.1, animation 2, turn too, and --takes all" in capsys.readouterr().err
     assert main(["encode", path, out, "--takes", "turn,gallop"]) == 1
-    assert "got gallop, expected one of ['walk', 'walk.1'" in capsys.readouterr().err
+    assert "got gallop, expected one of walk, walk.1, " in capsys.readouterr().err
     assert main(["encode", path, out, "--takes", "all", "--names", "a,b,c,d", "--loop", "a", "--fps", "10"]) == 0
     assert "takes" not in capsys.readouterr().err.splitlines()[-1]
     with athcodec.open(out) as decoder:

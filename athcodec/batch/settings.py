@@ -47,8 +47,8 @@ READING = (
     "unit",
     "up_axis",
 )
-# These settings change a clip before it is encoded.
-SHAPING = ("hierarchy", "loop", "loop_blend", "strength", "heading")
+# These settings change a clip before it is encoded, or say what is expected of it.
+SHAPING = ("hierarchy", "loop", "loop_blend", "still", "strength", "heading")
 
 Settings = JsonObject
 
@@ -94,8 +94,8 @@ def check_settings(settings: JsonMapping, where: str = "settings", folder: FileP
     ----------
     settings : dict
         Values by name. Names are keywords of `athcodec.encode` and of `athcodec.read` (whose format is called
-        source_format), hierarchy, loop, loop_blend, strength and heading. Lengths and sizes may be text with a unit,
-        such as "1mm".
+        source_format), hierarchy, loop, loop_blend, still, strength and heading. Lengths and sizes may be text with a
+        unit, such as "1mm".
     where : str, optional
         Text that error messages begin with.
     folder : str or path, optional
@@ -300,6 +300,7 @@ _CHECKS: dict[str, Callable[[JsonValue], JsonValue]] = {
     "up_axis": _one_of(*AXES),
     "loop": _BOOL,
     "loop_blend": _whole(0, 1 << 31),
+    "still": _BOOL,
     "strength": _finite,
     "heading": _finite,
 }

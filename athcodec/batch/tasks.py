@@ -173,7 +173,8 @@ def _opened(item: Item, folder: str, source: JsonObject) -> Iterator[MotionClip]
         warnings.simplefilter("always", GuessWarning)
         how = reading_options(item.settings)
         opened = athcodec.read(path, **how)
-        warn_of_still(opened, path, how.get("format"), how.get("axes"))
+        if not item.settings.get("still"):
+            warn_of_still(opened, path, how.get("format"), how.get("axes"))
     with opened as source_clip:
         clip = source_clip
         if "strength" in item.settings:

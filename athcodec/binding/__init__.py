@@ -392,6 +392,8 @@ def onto(
     ((150, 700, 3), 0)
     """
     view = ClipView(motion) if isinstance(motion, Decoder) else motion
+    if not isinstance(view, ClipView):
+        raise TypeError(f"onto: got {type(view).__name__}, expected a decoder of the plant, as athcodec.open returns")
     if frame is None:
         _warn_of_rest(view)
     stated = {"unit": unit and checked_unit(unit), "up_axis": up_axis and checked_axis(up_axis)}

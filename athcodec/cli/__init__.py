@@ -10,6 +10,7 @@ progress only where that is a terminal. Exit codes: 0 done, 1 an error or a fail
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import signal
@@ -36,7 +37,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Raises SystemExit: code 2 for wrong usage, 0 after --help and --version, 143 on SIGTERM.
     """
-    args = make_parser().parse_args(argv)
+    try:
+        return _run(make_parser().parse_args(argv))
+    except BrokenPipeError:
+        # Whoever read stdout has left. What is still buffered goes nowhere, or Python complains at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+
+
+def _run(args: argparse.Namespace) -> int:
+    """Run the verb that `args` name and return its exit code. Raise BrokenPipeError if stdout has lost its reader."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name need not be valid text
     try:
@@ -48,9 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"athcodec: interrupted{OUTCOMES.get(args.verb, ', nothing written')}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read stdout has left. What is still buffered goes nowhere, or Python complains at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return BROKEN_PIPE
+        raise
     except Exception as error:
         if args.debug:
             print(shown(traceback.format_exc()), file=sys.stderr)

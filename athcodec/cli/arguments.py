@@ -6,6 +6,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import athcodec
@@ -51,8 +52,15 @@ class _Parser(argparse.ArgumentParser):
         """Return the arguments; of those that a verb does not know, it is the verb whose usage is shown."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{self._meant(unknown)}")
         return known, unknown
+
+    def _meant(self, unknown: Sequence[str]) -> str:
+        """Return the end of an error about unknown options: the options of this verb that look like them."""
+        names = [word.partition("=")[0] for word in unknown if word.startswith("--")]
+        like = [get_close_matches(name, self._option_string_actions, 1, 0.75) for name in names]
+        meant = [match for matches in like for match in matches]
+        return f"; did you mean {' '.join(meant)}?" if meant else ""
 
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(shown(message), file)
@@ -211,7 +219,6 @@ def _encode_arguments(verb: argparse.ArgumentParser) -> None:
         type=_argument(_names),
         help="names of the clips that are loops: their first frame follows their last; all: every clip is",
     )
-    verb.add_argument("--still", action="store_true", help="a source of a single frame is meant: do not warn of it")
     verb.add_argument(
         "--loop-blend",
         metavar="FRAMES",
@@ -311,6 +318,7 @@ def _batch_arguments(verb: argparse.ArgumentParser) -> None:
 
 def _coding_arguments(verb: argparse.ArgumentParser) -> None:
     """Add the options that say how motion is coded, which `encode` and `batch` share, to a verb's parser."""
+    verb.add_argument("--still", action="store_true", help="a source of a single frame is meant: do not warn of it")
     bound = verb.add_mutually_exclusive_group()
     bound.add_argument(
         "--max-error",
@@ -685,7 +693,9 @@ def _view_arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--port", metavar="PORT", type=_argument(_whole), default=0, help="port of the address (default: a free one)"
     )
-    verb.add_argument("--clip", metavar="NAME", help="clip to begin with (default: the file's first)")
+    verb.add_argument(
+        "--clip", metavar="NAME", help="clip to begin with (default: that of the strongest wind, else the first)"
+    )
     _host_mesh_argument(verb)
     verb.add_argument(
         "--floor",

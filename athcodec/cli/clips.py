@@ -66,6 +66,12 @@ def clip_to_encode(
     return joined
 
 
+def arrays_of_frames(clip: MotionClip) -> list[str]:
+    """Return the names of a clip's arrays that have a value for each frame and vertex, such as another motion."""
+    moving = (clip.frame_count, clip.vertex_count)
+    return [name for name, array in clip.attributes.items() if array.shape[:2] == moving and clip.frame_count > 1]
+
+
 def gltf_to_fill(paths: Sequence[str], args: argparse.Namespace) -> Into:
     """Return the GLB in `paths` whose vertices get a motion (`--into`). Raises ClipError if there is more than one
     path, it is no GLB, or an option says otherwise how to read it."""

@@ -246,15 +246,18 @@ def say(kind: str, message: str) -> None:
     echo(f"athcodec: {kind}: {errors.one_line(message)}", file=sys.stderr)
 
 
-def say_seam(seam: Seam, path: str) -> None:
+def say_seam(seam: Seam, path: str, unit: str | None) -> None:
     """Print how far vertices move from the last frame of a loop to its first, and whether that is a visible jump.
-    `path` is the name of a clip without one."""
+    `path` is the name of a clip without one, and `unit` that of lengths."""
     jumps = seam.step > JUMP * seam.step_beside + seam.error
+    step, beside, error = (
+        f"{length:.3g}{f' {unit}' if unit else ''}" for length in (seam.step, seam.step_beside, seam.error)
+    )
     say(
         "loop",
-        f"{seam.clip or path}: vertices go up to {seam.step:.3g} from the last frame to the first, "
-        f"{seam.step_beside:.3g} from frame to frame beside that; the file is off by {seam.error:.3g} there"
-        + ("; it jumps, --loop-blend smooths it" if jumps else ""),
+        f"{seam.clip or path}: vertices move by up to {step} from the last frame to the first, and by up to {beside} "
+        f"between the frames around them; the file's error there is up to {error}"
+        + ("; the loop jumps: --loop-blend FRAMES smooths it" if jumps else ""),
     )
 
 

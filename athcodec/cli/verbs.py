@@ -20,6 +20,7 @@ import numpy as np
 import athcodec
 from athcodec.cli.arguments import DEMO_FLOOR, DEMO_PAGE
 from athcodec.cli.clips import (
+    arrays_of_frames,
     check_name,
     check_output,
     clip_to_encode,
@@ -147,7 +148,13 @@ def _encode(clip: MotionClip, path: str, output: str, args: argparse.Namespace, 
     if summary.found_branches is not None:
         say("hierarchy", summary.found_branches)
     for seam in summary.seams:
-        say_seam(seam, path)
+        say_seam(seam, path, clip.metadata.get("unit"))
+    if options.get("attributes") != "none" and (moving := arrays_of_frames(clip)):
+        say(
+            "arrays",
+            f"{path}: {', '.join(moving)}: a value for each frame and vertex is packed without loss and takes many "
+            "bytes; --attributes none leaves out all arrays, athcodec.read(skip=[...]) in Python some of them",
+        )
     return summary
 
 
@@ -185,8 +192,8 @@ def _batch_settings(args: argparse.Namespace) -> JsonObject:
     from athcodec.batch.settings import BOUNDS, READING
 
     names = (*BOUNDS, *READING, "segment_frames", "hierarchy", "weights", "loop_blend", "rest_error")
-    settings = {name: getattr(args, name) for name in names if getattr(args, name) is not None}
-    settings |= {name: True for name in ("exact_rest", "lossless", "loop") if getattr(args, name)}
+    settings = {name: value for name in names if (value := getattr(args, name)) is not None and value is not False}
+    settings |= {name: True for name in ("exact_rest", "lossless", "loop", "still") if getattr(args, name)}
     settings |= {
         name: getattr(args, name)
         for name, usual in (("attributes", "all"), ("effort", "default"), ("smoothness", "default"))
@@ -262,8 +269,10 @@ def _decode(args: argparse.Namespace, quiet: bool) -> int:
         for name in ("onto_unit", "onto_up_axis", "onto_frame", "bind"):
             if (value := getattr(args, name)) is not None and value is not False:
                 raise ClipError(f"--{name.replace('_', '-')}: got no mesh, expected one with --onto")
-    format_name = format_to_write(args.output, args.format).name  # An unknown one is refused before there is work.
-    if args.bind and format_name != "gltf":
+    wanted = format_to_write(args.output, args.format)  # What cannot be written is refused before there is work.
+    with naming(args.output):
+        wanted.check()
+    if args.bind and wanted.name != "gltf":
         raise ClipError(f"--bind: got {args.output}, expected a .glb file, which has bones")
     if args.bind and (args.rig is not None or args.instances or args.animation != "auto" or _blurs(args)):
         raise ClipError("--bind: got another way to move the mesh too, expected its bones alone")

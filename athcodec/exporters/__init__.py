@@ -28,6 +28,7 @@ from athcodec.files.kinds import add_kind, kind_by_suffix
 from athcodec.motion.protocol import Motion
 from athcodec.options import COARSE_SHARE, set_numbers
 from athcodec.sources import ATH, Format, format_by_suffix, format_named
+from athcodec.sources import FORMATS as SOURCE_FORMATS
 from athcodec.sources.registry import registered
 from athcodec.untyped import JsonObject
 
@@ -202,6 +203,11 @@ def write(
     """
     wanted = WriteOptions(**options)
     motion = ClipView(motion) if isinstance(motion, Decoder) else motion
+    if not hasattr(motion, "blocks"):
+        raise TypeError(
+            f"write: got {type(motion).__name__}, expected a MotionClip, a decoder or a ClipView; "
+            "athcodec.MotionClip(positions) makes a clip of an array, athcodec.read that of a file"
+        )
     kind = format_to_write(path, format)
     kind.check()
     if wanted.rig is not None and kind.name not in RIGS:
@@ -265,7 +271,19 @@ def format_to_write(path: str | PathLike[str], format: str | None = None) -> For
             python="athcodec.encode writes .ath files, athcodec.truncate shortens them",
             shell="`athcodec encode` writes .ath files, `athcodec truncate` shortens them",
         )
+    _object_to_read_only(path)
     return format_by_suffix(path, formats())
+
+
+def _object_to_read_only(path: str | PathLike[str]) -> None:
+    """Raise ClipError if the suffix of a path belongs to a format that is read but not written."""
+    suffix = Path(path).suffix.lower()
+    source = next((kind for kind in SOURCE_FORMATS if suffix in kind.suffixes), None)
+    if source is None or any(suffix in kind.suffixes for kind in formats()):
+        return
+    family = [kind for kind in FORMATS if kind.name == source.name] or FORMATS
+    expected = " ".join(suffix for kind in family for suffix in kind.suffixes)
+    raise ClipError(f"{os.fspath(path)}: got {suffix}, which is read and not written, expected one of {expected}")
 
 
 def check_ath_name(path: str | PathLike[str]) -> None:

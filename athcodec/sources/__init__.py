@@ -250,7 +250,8 @@ class Format:
         missing = self._missing()
         if missing:
             package = (self.package or "athcodec") + (f"[{self.extra}]" if self.extra else "")
-            raise MissingExtra(f'{self.title}: needs {", ".join(missing)}: pip install "{package}"')
+            title = self.title.partition(": ")[0]
+            raise MissingExtra(f'{title}: needs {", ".join(missing)}: pip install "{package}"')
 
     def function(self, name: str, home: str) -> Callable[..., Any]:
         """Return the function `name` of the module that implements this format. If the format is one of athcodec's own,

@@ -21,7 +21,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.files.gltf.document import GltfFile
-from athcodec.files.gltf.json import BROKEN, brief, indices, integer
+from athcodec.files.gltf.json import BROKEN, indices, integer
 from athcodec.files.gltf.motion import EXTENSION, extension_of
 from athcodec.files.gltf.primitives import corners, rows_of
 from athcodec.files.plain import FilePath
@@ -29,7 +29,7 @@ from athcodec.files.reading import closing_on_failure, naming
 from athcodec.motion.clip import RESERVED_NAMES, ClipRange, MotionClip, Skin
 from athcodec.motion.frames import Frames
 from athcodec.motion.joining import join
-from athcodec.sources import ReadOptions, besides
+from athcodec.sources import LISTED, ReadOptions, besides
 from athcodec.sources.gltf_motion import NodeMotion, sampling_of
 from athcodec.sources.gltf_nodes import GltfNode, load_node, moving_nodes, nodes_of_mesh
 from athcodec.sources.gltf_scene import Scene
@@ -279,7 +279,7 @@ def _chosen(scene: Scene, patterns: Sequence[str]) -> list[GltfNode]:
             if not patterns or any(fnmatch.fnmatchcase(name, pattern) for name in called for pattern in patterns):
                 nodes.extend(nodes_of_mesh(scene, index, mesh, next(filter(None, called), f"mesh {mesh_index}")))
     if not nodes:
-        names = brief(sorted({name for name in seen if name}))
+        names = ", ".join(sorted({name for name in seen if name})[:LISTED])
         raise ClipError(
             f"only: got {', '.join(patterns)}, expected names such as {names}"
             if patterns and seen
@@ -310,7 +310,7 @@ def _animations(scene: Scene, patterns: Sequence[str], subject: str) -> dict[str
         matching = {name for name in numbers if name == pattern or fnmatch.fnmatchcase(name, pattern)}
         if not matching:
             unmoving = ", which moves no node of the scene" if pattern in every else ""
-            raise ClipError(f"{subject}{pattern}{unmoving}, expected one of {brief(list(numbers))}")
+            raise ClipError(f"{subject}{pattern}{unmoving}, expected one of {', '.join(list(numbers)[:LISTED])}")
         wanted |= matching
     return {name: index for name, index in numbers.items() if name in wanted}
 

@@ -53,8 +53,10 @@ class Found:
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
         method = f"{self.method} ({self.array_name})" if self.array_name else self.method
+        if len(sizes) == 1:
+            return f"1 branch by {method}: all {sizes[0]:,} vertices"
         return (
-            f"{len(sizes):,} branch{'es' * (len(sizes) != 1)} by {method}: {roots:,} without a parent, "
+            f"{len(sizes):,} branches by {method}: {roots:,} without a parent, "
             f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
         )
 
