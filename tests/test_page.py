@@ -109,19 +109,19 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
 
 
 def test_whether_levels_are_automatic_is_a_switch_and_the_chip_that_is_filled_is_what_is_shown(page):
-    last = str(page.evaluate("athcodecViewer.motion.levelCount") - 1)
-    current = "document.querySelector('#level-choice [aria-current=true]')?.dataset.value === "
+    filled = "Number(document.querySelector('#level-choice [aria-current=true]')?.dataset.value)"
     page.evaluate("athcodecViewer.setPlaying(false)")
-    page.wait_for_function(f"() => athcodecViewer.motion.level === athcodecViewer.motion.target && {current}{last!r}")
+    automatic = f"() => (({{ automatic, level, target }}) => automatic && level === target && target > 0 && {filled} >= target)(athcodecViewer.motion)"
+    page.wait_for_function(automatic)
     assert page.is_checked("#auto") and page.locator("#level-choice [aria-checked=true]").count() == 0
     page.click("#level-choice [data-value='0']")
-    page.wait_for_function(f"() => {current}'0'")
+    page.wait_for_function(f"() => {filled} === 0")
     assert not page.is_checked("#auto") and chosen(page, "level-choice") == "0"
     page.check("#auto")
-    page.wait_for_function(f"() => {current}{last!r}")
-    assert page.evaluate("athcodecViewer.motion.automatic")
+    page.wait_for_function(automatic)
     page.uncheck("#auto")
-    assert chosen(page, "level-choice") == last and not page.evaluate("athcodecViewer.motion.automatic")
+    assert chosen(page, "level-choice") == str(page.evaluate("athcodecViewer.motion.target"))
+    assert not page.evaluate("athcodecViewer.motion.automatic")
 
 
 def test_a_level_as_small_as_the_next_one_has_no_chip_and_is_reached_by_key(opened_file):
