@@ -19,7 +19,7 @@ function levelControls() {
   const chips = values.map((value) => app.levelText(deepest, Number(value)).join("\n±"));
   for (const choice of [app.level, app.left]) choice.fill(values, chips, titles);
   app.left.set(String(Math.min(1, most)));
-  $("levels-title").textContent = most > 0 ? `Plays from ${bytesOf(0)} on, closer with each level` : "One level";
+  $("levels-title").textContent = most > 0 ? `Plays from ${bytesOf(0)} on, then sharpens` : "One level";
   app.compare.buttons[1].disabled = most === 0;
 }
 
@@ -68,7 +68,8 @@ function tellLevel() {
   const { motion, space } = main(), shown = Math.max(motion.level, 0), [bytes, error] = levelText(main(), shown);
   const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, space.matrixWorld), { bytesFetched, bytesTotal } = motion;
   const isComing = motion.level < motion.target && !motion.failure, isAll = shown === motion.levelCount - 1;
-  const come = isComing ? `Streaming: ${bytesText(bytesFetched)} of ${bytesText(bytesTotal)} here` : isAll ? `All ${bytes} shown` : `First ${bytes} shown`;
+  const [here, total] = [bytesFetched, bytesTotal].map(bytesText), count = here.slice(-2) === total.slice(-2) ? here.slice(0, -3) : here;
+  const come = isComing ? `Streaming: ${count} of ${total}` : isAll ? `All ${bytes} shown` : `First ${bytes} shown`;
   $("arrived").textContent = state.forest ? "Each plant as its distance asks for" : `${come}, within ${error} of the source`;
   $("arrived").title = off <= 1 ? "Under a pixel for 99 of 100 points" : "";
   for (const { dataset } of app.level.buttons) dataset.here = Number(dataset.value) <= motion.readyLevel;

@@ -19,7 +19,7 @@ function tellSizes() {
   const { metadata, motion: { info, clips, levelCount } } = app.opened[0], seconds = clips.reduce((sum, { duration }) => sum + duration, 0);
   const error = Math.max(...clips.map(({ errors }) => errors[levelCount - 1].max));
   const points = `${countText(info.vertexCount)} ${info.vertexCount === 1 ? "point" : "points"}`;
-  $("what").textContent = `The motion of a plant${levelCount > 1 ? ", streamed in levels" : ""}`;
+  $("what").textContent = `A plant's motion${levelCount > 1 ? ", streamed in levels" : ""}`;
   $("extent").textContent = `${Number(seconds.toPrecision(2))} s, ${points}, within ${shortLength(error, metadata.unit)} of the source`;
   $("file-size").textContent = bytesText(info.fileLength);
   const others = [[info.vertexCount * FLOAT3, "uncompressed"], [info.branchCount * JOINT, "as GLB"]].map(([each, name]) => [info.frameCount * each, name]);
