@@ -111,7 +111,10 @@ def test_levels_are_chips_of_their_bytes_and_their_error(page, sample_ath):
 def test_whether_levels_are_automatic_is_a_switch_and_the_chip_that_is_filled_is_what_is_shown(page):
     filled = "Number(document.querySelector('#level-choice [aria-current=true]')?.dataset.value)"
     page.evaluate("athcodecViewer.setPlaying(false)")
-    automatic = f"() => (({{ automatic, level, target }}) => automatic && level === target && target > 0 && {filled} >= target)(athcodecViewer.motion)"
+    automatic = f"""() => {{
+      const {{ automatic, level, target }} = athcodecViewer.motion;
+      return automatic && level === target && target > 0 && {filled} >= target;
+    }}"""
     page.wait_for_function(automatic)
     assert page.is_checked("#auto") and page.locator("#level-choice [aria-checked=true]").count() == 0
     page.click("#level-choice [data-value='0']")
@@ -233,7 +236,9 @@ def test_while_bytes_come_the_page_says_how_many_of_how_many_are_here(opened_fil
     """As if the line had stopped: what has come is set here, so that no clock decides what is seen."""
     page = opened_file(athcodec.sample_path("fern").read_bytes(), viewport=dict(zip(("width", "height"), size)))
     page.evaluate("""() => {
-      const { motion } = athcodecViewer, stopped = { bytesFetched: 5900, complete: false, level: 0 };
+      const { motion } = athcodecViewer;
+      athcodecViewer.setLevel(String(motion.levelCount - 1));
+      const stopped = { bytesFetched: 5900, complete: false, level: 0 };
       for (const [name, value] of Object.entries(stopped)) Object.defineProperty(motion, name, { value });
     }""")
     says = "/^Streaming: 5.9 of 41 kB, within [\\d.]+ .?m of the source$/"
@@ -360,7 +365,7 @@ def test_wind_is_one_weight_from_calm_to_gale_and_the_gale_comes_first(opened_fi
 
 
 def test_a_file_opens_with_the_story_of_how_it_comes(opened_file, windy, opened):
-    """Each level beside the best that has come, unless somebody does anything; not where an address says what is seen."""
+    """Each level beside the best that has come, unless somebody does anything, or an address says what is seen."""
     with ThrottledServer({"tree.ath": windy}) as line:
         intro = "globalThis.athcodecViewer?.state.intro"
         tag = "document.getElementById('split-{}').textContent.startsWith('{}')"
