@@ -239,7 +239,7 @@ def test_while_bytes_come_the_page_says_how_many_of_how_many_are_here(opened_fil
       const { motion } = athcodecViewer;
       athcodecViewer.setLevel(String(motion.levelCount - 1));
       const stopped = { bytesFetched: 5900, complete: false, level: 0 };
-      for (const [name, value] of Object.entries(stopped)) Object.defineProperty(motion, name, { value });
+      for (const [name, value] of Object.entries(stopped)) Object.defineProperty(motion, name, { get: () => value, set() {} });
     }""")
     says = "/^Streaming: 5.9 of 41 kB, within [\\d.]+ .?m of the source$/"
     page.wait_for_function(
@@ -327,7 +327,7 @@ def test_the_sides_of_a_split_never_show_the_same_level(page):
     page.wait_for_function("() => athcodecViewer.plants.every(({ motion }) => motion.level === motion.target)")
     page.wait_for_function("() => document.querySelector('#left-choice [aria-current=true]').dataset.value === '0'")
     page.evaluate("athcodecViewer.plants[0].motion.setLevel(1)")
-    page.evaluate("Object.defineProperty(athcodecViewer.plants[0].motion, 'level', { value: 1 })")
+    page.evaluate("Object.defineProperty(athcodecViewer.plants[0].motion, 'level', { get: () => 1, set() {} })")
     page.wait_for_function("() => document.getElementById('split-view').hidden")
 
 
