@@ -239,7 +239,8 @@ def test_while_bytes_come_the_page_says_how_many_of_how_many_are_here(opened_fil
       const { motion } = athcodecViewer;
       athcodecViewer.setLevel(String(motion.levelCount - 1));
       const stopped = { bytesFetched: 5900, complete: false, level: 0 };
-      for (const [name, value] of Object.entries(stopped)) Object.defineProperty(motion, name, { get: () => value, set() {} });
+      for (const [name, value] of Object.entries(stopped))
+        Object.defineProperty(motion, name, { get: () => value, set() {} });
     }""")
     says = "/^Streaming: 5.9 of 41 kB, within [\\d.]+ .?m of the source$/"
     page.wait_for_function(
