@@ -567,11 +567,15 @@ def test_the_playback_stands_below_the_middle_of_the_plant(opened_file, sample_a
     page = opened_file(sample_ath.read_bytes())
     for width, height in ((1440, 900), (1024, 768), (844, 390), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})
-        for _ in range(2):
-            page.wait_for_timeout(300)  # cards are measured when the browser has laid them out
-            plant = page.evaluate(PLACED)["plant"]
-            middle, wide = (plant["left"] + plant["right"]) / 2, plant["right"] - plant["left"]
-            assert centre(page, "footer")[0] == pytest.approx(middle, abs=0.1 * wide), (width, height)
+        for panel in ("as it was", "the other way"):
+            for _ in range(50):  # cards are measured when the browser has laid them out
+                plant = page.evaluate(PLACED)["plant"]
+                middle, wide = (plant["left"] + plant["right"]) / 2, plant["right"] - plant["left"]
+                off = centre(page, "footer")[0] - middle
+                if abs(off) < 0.1 * wide:
+                    break
+                page.wait_for_timeout(100)
+            assert abs(off) < 0.1 * wide, (width, height, panel, off, wide)
             page.click("#toggle-panel")
 
 
