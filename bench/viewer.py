@@ -19,8 +19,8 @@ COMPARE = """([left, right, seconds]) => {
   athcodecViewer.setPlaying(false);
   press("compare", "levels");
   press("colour", "error");
-  document.getElementById("compare-level").value = left;
   athcodecViewer.setLevel(String(right));
+  athcodecViewer.setLeft(left);
   athcodecViewer.seek(seconds);
 }"""
 

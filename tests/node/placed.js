@@ -14,5 +14,5 @@
   const outside = ({ left, top, right, bottom }) => left < 0 || top < 0 || right > width || bottom > height;
   const share = Math.max(plant.right - plant.left, plant.bottom - plant.top) / Math.min(width, height);
   const [head, foot] = seen("header, footer"), top = head.width > 0.8 * width ? head.bottom : 0;
-  return { tall: (plant.bottom - plant.top) / (foot.top - top), over: seen("header, nav, #panel, footer").filter(meets), outside: [plant, ...seen("header, nav button, footer *")].filter(outside), share };
+  return { plant, tall: (plant.bottom - plant.top) / (foot.top - top), over: seen("header, nav, #panel, footer").filter(meets), outside: [plant, ...seen("header, nav button, footer *")].filter(outside), share };
 }

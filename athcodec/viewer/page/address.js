@@ -78,8 +78,7 @@ function restoreView([...values]) {
 
 function restoreSplit([left, share]) {
   app.compare.pick("levels");
-  document.getElementById("compare-level").value = left;
-  app.setLevel(app.level.value);
+  app.setLeft(left);
   app.setSplit(share);
 }
 

@@ -84,14 +84,20 @@ function frameView() {
   if (!state.forest) {
     stage.fog(0, 0);
     stage.look(all, { height: all.min.y, size: 1.9 * most });
-    return;
-  }
-  stage.lookOver(all, app.forestRadius());
+  } else stage.lookOver(all, app.forestRadius());
+  centre();
 }
 
 /** Frames the view anew, as long as nobody moved it by hand. */
 function reframe() {
   if (app.plants.length > 0 && !app.stage.moved) frameView();
+  else centre();
+}
+
+// The playback stands below the middle of what is looked at.
+function centre() {
+  const { room: [left, , right] } = app.stage;
+  document.documentElement.style.setProperty("--centre", `${(left + right) / 2}px`);
 }
 
 function resetView() {

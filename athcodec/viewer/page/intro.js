@@ -1,27 +1,19 @@
-// The story of a file, told once as it opens: under the split, on the left what has come of it, on the right all of it.
+// The story of a file, told once as it opens: under the split, on the left each level in turn, on the right the best that has come.
 
-import { app, main, state } from "./app.js";
-import { $ } from "./ui.js";
+import { app, state } from "./app.js";
 
 const SECONDS = 6;
 let timers = [], isOver = false;
 
 /** Begins, where nobody has asked for anything else: once, with a file that has several levels, for who likes motion. */
 function beginIntro() {
-  const { motion } = main(), last = motion.levelCount - 1, isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
-  if (isOver || last === 0 || isStill || location.hash || app.opened.length > 1 || app.opened[0].model) return;
+  const lower = app.left.buttons.slice(0, -1).map(({ dataset }) => Number(dataset.value)), isStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  if (isOver || lower.length === 0 || isStill || location.hash || app.opened.length > 1 || app.opened[0].model) return;
   isOver = state.intro = true;
   app.compare.pick("levels");
-  leave(0);
   // Errors fall by about the same factor from level to level, so each gets the same time.
-  timers = Array.from({ length: last + 1 }, (_, level) => setTimeout(() => leave(level), (1000 * SECONDS * level) / (last + 1)));
+  timers = lower.map((level, i) => setTimeout(() => app.setLeft(level), (1000 * SECONDS * i) / lower.length));
   timers.push(setTimeout(endIntro, 1000 * SECONDS));
-}
-
-function leave(level) {
-  $("compare-level").value = level;
-  app.setLevel(app.level.value);
-  app.splitLabels();
 }
 
 /** Ends at once, as soon as somebody does anything. */

@@ -4,7 +4,7 @@ import { app, main, state } from "./app.js";
 import { heatGradient, orderCss } from "./colours.js";
 import { $, bytesText, Choice, detailText, lengthText, shortLength, upper } from "./ui.js";
 
-const MOST_BUTTONS = 9, LEGEND = 7; // colours of orders, which then come again
+const MOST_CHIPS = 8, LEGEND = 7; // colours of orders, which then come again
 
 /** The error of a level in its clip, as text. */
 const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.metadata.unit);
@@ -12,17 +12,15 @@ const within = ({ ath, motion }, of) => lengthText(motion.error(of).max, ath.met
 function levelControls() {
   const most = Math.max(...app.plants.map(({ motion }) => motion.levelCount)) - 1;
   const deepest = app.plants.find(({ motion }) => motion.levelCount > most), bytesOf = (level) => app.levelText(deepest, level)[0];
-  // A level gets no chip where the next one is as small, in the same figures, and better.
+  // A level gets no chip where the next one is as small, in the same figures, and better; nor do some of very many.
   const worth = Array.from({ length: most + 1 }, (_, level) => level).filter((level) => level === most || bytesOf(level) !== bytesOf(level + 1));
-  const values = ["auto", ...worth.map(String)];
-  const titles = values.slice(1).map((value) => `${upper(detailText(deepest.motion, Number(value)))}, error up to ${within(deepest, value)}`);
-  const chips = values.slice(1).map((value) => app.levelText(deepest, Number(value)).join("\n")), areFew = values.length <= MOST_BUTTONS;
-  if (areFew) app.level.fill(values, ["Auto", ...chips], ["As much detail as can be seen", ...titles]);
-  else app.level.fill(["auto"], ["Auto"], ["As much detail as can be seen"]);
-  $("level").hidden = areFew;
-  for (const id of ["level", "compare-level"]) $(id).max = most;
-  $("compare-level").value = Math.min(1, most);
-  $("level").value = most;
+  const each = Math.ceil(worth.length / MOST_CHIPS), values = worth.filter((_, i) => (worth.length - 1 - i) % each === 0).map(String);
+  const titles = values.map((value) => `${upper(detailText(deepest.motion, Number(value)))}, error up to ${within(deepest, value)}`);
+  const chips = values.map((value) => app.levelText(deepest, Number(value)).join("\n±"));
+  for (const choice of [app.level, app.left]) choice.fill(values, chips, titles);
+  app.left.set(String(Math.min(1, most)));
+  $("levels-title").textContent = most > 0 ? `Plays from ${bytesOf(0)} on, then sharpens` : "One level";
+  app.compare.buttons[1].disabled = most === 0;
 }
 
 /** A level as bytes and error: the file's up to it, and the largest in the clip. */
@@ -34,24 +32,30 @@ function levelText({ ath: { channel, metadata }, motion }, of) {
 
 function setLevel(value) {
   app.level.set(value);
-  const right = main();
-  for (const plant of app.plants) {
-    const left = plant !== right && app.compare.value === "levels";
-    plant.motion.setLevel(left ? Number($("compare-level").value) : value === "auto" ? "auto" : Number(value));
-  }
-  if (value !== "auto") $("level").value = value;
-  if (right) readOut();
+  $("auto").checked = value === "auto";
+  for (const plant of app.plants) if (!isLeft(plant)) plant.motion.setLevel(value === "auto" ? value : Number(value));
+  setLeft();
   state.dirty = true;
 }
 
-// Sliders say what they mean.
-function readOut() {
-  for (const id of ["level", "compare-level"]) {
-    const plant = app.plants[id === "level" ? app.plants.length - 1 : 0], of = Math.min(Number($(id).value), plant.motion.levelCount - 1);
-    $(id).setAttribute("aria-valuetext", `${detailText(plant.motion, of)}, error up to ${within(plant, of)}`);
-  }
-  $("compare-level-value").value = $("compare-level").value;
-  $("compare-level-row").hidden = app.compare.value !== "levels";
+// Whether it is the left one of a split between levels.
+const isLeft = (plant) => app.compare.value === "levels" && plant !== main();
+
+/** The left side shows this level, or a neighbour of it where the right side is to show the same. */
+function setLeft(level = Number(app.left.value)) {
+  app.left.set(String(level));
+  const left = app.plants.find(isLeft);
+  $("left-row").hidden = !left;
+  if (!left) return;
+  const { target } = main().motion, other = level !== target ? level : Math.abs(target - 1);
+  if (left.motion.automatic || left.motion.target !== other) left.motion.setLevel(other);
+  markShown(app.left, other);
+}
+
+// The chip of a level, or of the next one that has a chip.
+function markShown({ buttons }, level) {
+  const shown = buttons.find(({ dataset: { value } }) => Number(value) >= level);
+  for (const button of buttons) button.ariaCurrent = String(button === shown);
 }
 
 function changeLevel(by) {
@@ -59,20 +63,18 @@ function changeLevel(by) {
   setLevel(String(Math.max(0, Math.min(motion.levelCount - 1, from + by))));
 }
 
-/** Says which level is shown, in the figures of its chip, and what that means on the screen; marks the chips of what is here. */
+/** Says what has come and which level is shown, in the figures of its chip; marks the chips of what is here. */
 function tellLevel() {
   const { motion, space } = main(), shown = Math.max(motion.level, 0), [bytes, error] = levelText(main(), shown);
-  const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, space.matrixWorld);
-  const means = motion.level < motion.target && !motion.failure ? ", sharpening…" : off <= 1 ? ", under a pixel" : "";
-  $("arrived").textContent = state.forest ? "Each plant as its distance asks for" : `Shown: ${bytes}, at most ${error} off${means}`;
+  const { camera, pixels } = app.stage, off = motion.pixelError(shown, camera, pixels, space.matrixWorld), { bytesFetched, bytesTotal } = motion;
+  const isComing = motion.level < motion.target && !motion.failure, isAll = shown === motion.levelCount - 1;
+  const [here, total] = [bytesFetched, bytesTotal].map(bytesText), count = here.slice(-2) === total.slice(-2) ? here.slice(0, -3) : here;
+  const come = isComing ? `Streaming: ${count} of ${total}` : isAll ? `All ${bytes} shown` : `First ${bytes} shown`;
+  $("arrived").textContent = state.forest ? "Each plant as its distance asks for" : `${come}, within ${error} of the source`;
   $("arrived").title = off <= 1 ? "Under a pixel for 99 of 100 points" : "";
-  const chips = app.level.buttons.slice(1).map(({ dataset: { value } }) => Number(value)), marked = chips.find((level) => level >= shown);
-  for (const { dataset } of app.level.buttons) {
-    dataset.here = dataset.value === "auto" || Number(dataset.value) <= motion.readyLevel;
-    dataset.shown = !state.forest && dataset.value === String(marked);
-  }
-  if (motion.automatic) $("level").value = motion.target;
-  readOut();
+  for (const { dataset } of app.level.buttons) dataset.here = Number(dataset.value) <= motion.readyLevel;
+  markShown(app.level, state.forest ? Infinity : shown);
+  setLeft();
 }
 
 // ---- the split ----
@@ -85,23 +87,15 @@ function setSplit(share) {
   app.stage.changed();
 }
 
-// Of the side of a split between two levels: the left one is of a level that is chosen, the right one of what is seen without it.
-function sideName(side) {
-  if (side > 0) return main().motion.automatic ? "Auto" : "Chosen";
-  const [left, right] = app.plants.map(({ motion }) => motion.level);
-  return state.intro ? "What has come" : left < right ? "Less detail" : left > right ? "More detail" : "The same detail";
-}
-
-/** Sets what is on either side. */
+/** Says what is on either side, as long as that differs. */
 function splitLabels() {
-  const two = app.plants.length > 1;
-  $("split-view").hidden = !two;
-  if (!two) return;
-  app.plants.forEach(({ ath, motion }, i) => {
-    const of = Math.max(motion.level, 0), [bytes, error] = app.levelText(app.plants[i], of);
-    const name = app.compare.value === "file" ? ath.fileName : of >= motion.levelCount - 1 ? "All of it" : sideName(i);
-    const text = `${name}: ${bytes}, ${error} off`;
-    const tag = $(i === 0 ? "split-left" : "split-right");
+  const [left, right] = app.plants, same = !right || (left.ath === right.ath && left.motion.level === right.motion.level);
+  $("split-view").hidden = same;
+  if (same) return;
+  app.plants.forEach((plant, i) => {
+    const { ath, motion } = plant, of = Math.max(motion.level, 0), [bytes, error] = levelText(plant, of);
+    const name = left.ath !== right.ath ? `${ath.fileName}, ` : of < motion.levelCount - 1 ? "First " : "All ";
+    const text = `${name}${bytes}: within ${error} of the source`, tag = $(i === 0 ? "split-left" : "split-right");
     if (tag.textContent !== text) tag.textContent = text;
   });
 }
@@ -142,8 +136,9 @@ function tellLegend() {
 }
 
 export default function begin() {
-  Object.assign(app, { tellLegend, within, levelControls, levelText, setLevel, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
+  Object.assign(app, { tellLegend, within, levelControls, levelText, setLevel, setLeft, changeLevel, tellLevel, setSplit, splitLabels, tellScale });
   app.level = new Choice($("level-choice"), (value) => setLevel(value));
+  app.left = new Choice($("left-choice"), (value) => setLeft(Number(value)));
   app.colour = new Choice($("colour"), (value) => {
     for (const plant of app.plants) plant.setColour(value);
     $("scale").hidden = value !== "error";
@@ -168,8 +163,7 @@ export default function begin() {
   app.show.set("plant");
   app.compare.set("off");
   $("scale").querySelector("i").style.background = heatGradient;
-  $("level").addEventListener("input", () => setLevel($("level").value));
-  $("compare-level").addEventListener("input", () => setLevel(app.level.value));
+  $("auto").addEventListener("change", () => setLevel($("auto").checked ? "auto" : String(main().motion.target)));
   const split = $("split");
   split.addEventListener("pointerdown", (event) => {
     split.setPointerCapture(event.pointerId);

@@ -2,7 +2,7 @@
 
 import { app, counters, main, state } from "./app.js";
 
-const CALLS = ["open", "loadAgain", "seek", "setPlaying", "setLevel", "setSplit", "setWind", "moveView", "playClip", "forestSwitch", "forestOf", "forests", "frameView"];
+const CALLS = ["open", "loadAgain", "seek", "setPlaying", "setLevel", "setLeft", "setSplit", "setWind", "moveView", "playClip", "forestSwitch", "forestOf", "forests", "frameView"];
 
 export default function begin() {
   globalThis.athcodecViewer = {

@@ -3,8 +3,6 @@
 import { app, counters, main, state } from "./app.js";
 import { $, bytesText, countText, lengthText, paintReady, rateText, rows, shortLength } from "./ui.js";
 
-const SHAPES = 0x13, REFINED_REST = 0x15, NO_LEVEL = 255; // chunks that are of no clip alone
-const SOURCE_REST = 0x21; // which nothing that is shown needs
 const FLOAT3 = 12; // bytes of a position as float32
 const JOINT = 28; // bytes of a rotation and a translation as float32, as a GLB has them for each joint and frame
 
@@ -18,14 +16,15 @@ function describe() {
 
 /** What the file holds and how small it is, in one sentence of figures that are all of the whole file. */
 function tellSizes() {
-  const { metadata, motion: { info, clips, levelCount }, channel } = app.opened[0], seconds = clips.reduce((sum, { duration }) => sum + duration, 0);
-  const error = Math.max(...clips.map(({ errors }) => errors[levelCount - 1].max)), isWind = [metadata, ...Object.values(metadata.clips ?? {})].some(({ strength }) => Number.isFinite(strength));
+  const { metadata, motion: { info, clips, levelCount } } = app.opened[0], seconds = clips.reduce((sum, { duration }) => sum + duration, 0);
+  const error = Math.max(...clips.map(({ errors }) => errors[levelCount - 1].max));
   const points = `${countText(info.vertexCount)} ${info.vertexCount === 1 ? "point" : "points"}`;
-  $("what").textContent = `A moving plant, ${Number(seconds.toPrecision(2))} s${isWind ? " of wind" : ""}: ${points} within ${shortLength(error, metadata.unit)}`;
+  $("what").textContent = `A plant's motion${levelCount > 1 ? ", streamed in levels" : ""}`;
+  $("extent").textContent = `${Number(seconds.toPrecision(2))} s, ${points}, within ${shortLength(error, metadata.unit)} of the source`;
   $("file-size").textContent = bytesText(info.fileLength);
   const others = [[info.vertexCount * FLOAT3, "uncompressed"], [info.branchCount * JOINT, "as GLB"]].map(([each, name]) => [info.frameCount * each, name]);
-  $("source-size").textContent = others.filter(([bytes]) => bytes > info.fileLength).map(([bytes, name]) => `${bytesText(bytes)} ${name}`).join(" or ");
-  $("instead").hidden = $("source-size").textContent === "";
+  const larger = others.filter(([bytes]) => bytes > info.fileLength);
+  $("instead").replaceChildren(...larger.map(([bytes, name], i) => Object.assign(document.createElement("li"), { textContent: `${i ? "or" : "instead of"} ${bytesText(bytes)} ${name}` })));
   $("sizes").title = `The whole file: ${countText(info.fileLength)} bytes. Uncompressed, as float32: ${countText(info.vertexCount)} points × ${countText(info.frameCount)} frames × ${FLOAT3} bytes. `
     + `GLB: a rotation and a translation of a joint for each of ${countText(info.branchCount)} branches × ${countText(info.frameCount)} frames × ${JOINT} bytes, before its meshes`;
   $("sizes").hidden = $("levels").hidden = $("replay").hidden = false;
@@ -42,14 +41,6 @@ function loadingStory(name) {
 function replayed(bits) {
   bandwidth = bits;
   for (const button of $("replay").querySelectorAll("button")) button.setAttribute("aria-pressed", String(1e6 * button.dataset.mbit === bits));
-}
-
-/** Returns how many bytes of the file the clip that plays can need. */
-function needed({ channel }, { clip, bytesTotal }) {
-  const end = clip.firstSegment + clip.segmentCount;
-  const others = channel.chunks.filter(({ kind, level, segment }) => kind === SOURCE_REST || (state.wind === null && level !== NO_LEVEL
-    && kind !== SHAPES && kind !== REFINED_REST && (segment < clip.firstSegment || segment >= end)));
-  return others.reduce((sum, { length }) => sum - length, bytesTotal);
 }
 
 /** When the first picture was drawn, and the first that differs from it. */
@@ -74,12 +65,12 @@ function watchArrival({ motion, channel }) {
 const seconds = (ms) => `${(ms / 1000).toFixed(ms < 9950 ? 1 : 0)} s`;
 
 function tellArrived() {
-  const { ath, motion } = main(), wanted = needed(ath, motion), { bytesFetched } = motion;
-  const share = Math.min(1, bytesFetched / wanted), { first, whole } = counters.arrived, bar = $("progress");
+  const { bytesFetched, bytesTotal, complete } = main().motion; // complete without the other clips, too
+  const share = complete ? 1 : bytesFetched / bytesTotal, { first, whole } = counters.arrived, bar = $("progress");
   bar.firstElementChild.style.width = `${100 * share}%`;
   bar.classList.toggle("full", share === 1);
   bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-  bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(wanted)}`);
+  bar.setAttribute("aria-valuetext", `${bytesText(bytesFetched)} of ${bytesText(bytesTotal)}`);
   $("timing").hidden = !bandwidth;
   $("timing").textContent = `First picture after ${seconds(first)}${whole ? `, full detail after ${seconds(whole)}` : ""}`;
 }
