@@ -298,7 +298,7 @@ def sources(medley_clips, tmp_path_factory):
 def test_files_are_joined_under_their_names_verified_and_decoded_by_name(sources, tmp_path, capsys):
     out, decoded = str(tmp_path / "oak.ath"), str(tmp_path / "calm.h5")
     assert main(["encode", *sources, "-o", out, "--names", "quiet,storm", "--loop", "storm", "--loop-blend", "9"]) == 0
-    assert "loop: storm: vertices go up to" in capsys.readouterr().err
+    assert "loop: storm: vertices move by up to" in capsys.readouterr().err
     assert main(["info", out]) == 0
     shown = capsys.readouterr().out
     assert "quiet" in shown and "storm" in shown and "57 frames" not in shown and "48 frames" in shown
