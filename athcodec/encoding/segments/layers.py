@@ -79,7 +79,6 @@ STAGE_0_STEP = 4  # Step of the rest pose of stage 0, over that of the first lay
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
 LARGEST = MEASURES.index("max")
 RMS = MEASURES.index("rms")
-STAGE_TOLERANCE = 1.0  # Largest errors of a stage, over that of the stage before.
 FINER_MAPS = 3  # Half octaves by which steps of maps may become finer for that.
 COARSER_MAPS = 16  # Half octaves by which steps of maps may become coarser for that.
 MOST_POSES = 4  # Largest number of poses for each stage by which steps of maps are moved.
@@ -523,7 +522,7 @@ class CodedMotion:
 
     def _is_worse_than_before(self, stage: int) -> bool:
         """Return whether the RMS error of a stage exceeds that of the stage before."""
-        return self.errors[stage][RMS] > STAGE_TOLERANCE * self.errors[stage - 1][RMS]
+        return self.errors[stage][RMS] > self.errors[stage - 1][RMS]
 
     def _keep_smooth(self, layer: Layer, stage: int, positions: np.ndarray) -> None:
         """Leave out corrections without which a stage before the last layer's does not jerk. It is then shown, with an
@@ -739,7 +738,7 @@ class _EvenStages:
     def _excess(self, first: int, last: int) -> float:
         """Return how far the errors of the stages from `first` to `last` exceed those before them."""
         pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
-        return sum(float(np.maximum(after - STAGE_TOLERANCE * before, 0.0).sum()) for before, after in pairs)
+        return sum(float(np.maximum(after - before, 0.0).sum()) for before, after in pairs)
 
     def _move(self, stage: int, worse: int, last: int, factor: float, most: int) -> None:
         """Multiply the step of the maps of `stage` by `factor`, at most `most` times, while the errors of the stage
