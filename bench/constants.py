@@ -51,8 +51,8 @@ FACTORS = (0.5, 2.0)
 BYTES_LIMIT, WORK_LIMIT = 0.005, 0.05  # Shares by which a constant that matters changes a file or its work.
 SINGLY = "no group first; clips behind one that a constant moves are not measured with it"
 NONE = ""  # The name of the run in which nothing is changed.
-# What is no choice: numbers that FORMAT.md or a type fixes, weights of work that were measured with a clock, the limit
-# of work itself, and sizes of buffers, which change no file.
+# What is no choice: numbers that FORMAT.md, a type or an option fixes, weights of work that were measured with a clock,
+# the limit of work itself, and what changes no file: sizes of buffers, and limits of warnings and refusals.
 FIXED: Mapping[str, Sequence[str]] = {
     "progress": (
         *("READING", "POSES", "SURVEY", "MOTION", "ANALYSIS", "PREDICTION", "MAPS", "TURNS", "TRIAL", "BYTE"),
@@ -60,9 +60,10 @@ FIXED: Mapping[str, Sequence[str]] = {
         *("EIGENVECTOR", "FINDING", "LEARNT", "LEARNING", "LEAST_WORK", "WORK", "SMALL_TRIALS", "BRANCHES", "SIZES"),
     ),
     "assembly": ("SPOOL_BYTES",),
-    "decisions": ("CHUNK_BYTES", "LEVEL_BYTES"),
+    "decisions": ("CHUNK_BYTES", "LEVEL_BYTES", "REFUSAL_ROUNDS"),
     "joins": ("END_FRAMES", "WIDTHS", "SLOPED", "TURN"),
-    "layers": ("MOST_LAYERS", "MOST_LEVELS", "LARGEST", "RMS"),
+    "layers": ("MOST_LAYERS", "MOST_LEVELS", "LARGEST", "RMS", "ROUNDED"),
+    "levels": ("ENDS",),
     "motion": ("LEARNED_NUMBERS", "NO_ROOT", "RANGES", "LEAST_RANGE", "LARGE_BYTES"),
     "rigid": ("MOST_TURN",),
     "rings": ("LEAST_RING", "LARGEST_RING"),
@@ -72,14 +73,16 @@ FIXED: Mapping[str, Sequence[str]] = {
     ),
     "places": ("MIXER",),
     "segment": ("ROWS_AT_ONCE", "LEAST_THREADED", "WORK_BYTES", "SEGMENT_WORK"),
+    "segment_samples": ("SPAN",),
     "segmentation": ("SEGMENT_BYTES",),
     "settings": ("BEAM",),
     "shape": ("WHOLE_DETAIL", "MOST_DETAIL"),
     "streams": ("FIRST", "LAST"),
     "survey": ("MAX_DEPTH", "_READ_VALUES", "_WORK_VERTICES"),
-    "time_bases": ("LEAST_STEP", "MOST_STEP"),
+    "time_bases": ("LEAST_STEP", "MOST_STEP", "MOST_SAMPLE"),
     "trials": ("PRELUDES_KEPT", "PRELUDE_BYTES"),
     "writing": ("BY_STEP", "BY_RATE", "ONE_BY_ONE", "IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
+    "preparation": ("MOST_LOST",),
     "polygons": ("PLACES_IN_ROWS", "CORNERS_OF_REST", "FACES_OF_REST", "MESH_PARTS"),
     "attachment": ("QUERY",),
     "point_runs": ("PAIRS_AT_ONCE",),
