@@ -38,7 +38,6 @@ STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
-CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first moves from which on the mean pose is better.
 TURNED_LEAST_SHARE = 0.5  # Least share of its bytes in waves that time bases have brought a turning root down to.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
@@ -353,8 +352,8 @@ class Search:
 
     def about_best_reference(self) -> Search:
         """Return this search, or one about the mean pose of the motion if that makes a smaller file than the rest pose
-        does. The mean pose is taken at once if it is far better at first moves. Else both are compared by what was
-        chosen about the rest pose or, in small clips, by separate searches up to their steps.
+        does. The mean pose is taken at once if its file and its motion are smaller at first moves. Else both are
+        compared by what was chosen about the rest pose or, in small clips, by separate searches up to their steps.
         """
         if not self._may_have_mean_pose:
             return self
@@ -369,7 +368,7 @@ class Search:
         if not self.makes_all_again:
             at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
             of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
-            if (of_rest > CLEAR_RATIO * of_mean).all():
+            if (of_rest > of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
         if not self.makes_all_again:
