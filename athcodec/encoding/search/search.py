@@ -38,7 +38,6 @@ STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
-TURNED_LEAST_SHARE = 0.5  # Least share of its bytes in waves that time bases have brought a turning root down to.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -143,10 +142,7 @@ class Search:
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
             other = cls(Trials(source, ath, plain, samples, everything, jobs, work), effort, ratios)
-            turned = (search.of_sample or search).trials
-            plain_cost = other.first_cost()  # Shapes that turn sum a few, too.
-            is_clear = plain_cost <= TURNED_LEAST_SHARE * turned.cost(turned.start)
-            search = other if is_clear or plain_cost <= search.first_cost() else search
+            search = min(other, search, key=cls.first_cost)  # Shapes that turn sum a few, too.
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
