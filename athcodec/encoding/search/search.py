@@ -30,7 +30,6 @@ from athcodec.encoding.segments.segment import CodedPrelude, Source, branch_reco
 from athcodec.encoding.segments.settings import OF_SAMPLE, Choice, Settings
 from athcodec.options import MIN_SEGMENT
 
-LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
 NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
@@ -321,8 +320,6 @@ class Search:
         turned = settings.with_rotations(main) if main else settings.with_turning_roots(max(factors))
         for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
-                if trials.cost(replace(candidate, learned_pieces=None)) > LEARNED_MODES_MAX_GAIN * least:
-                    continue
                 candidate = learned_pieces.best_pieces(candidate, trials)
                 least = min(least, trials.cost(candidate))
                 if trials.cost(candidate) > REFINEMENTS_MAX_GAIN * least:
