@@ -77,23 +77,28 @@ LOST_CLIPS = (  # Kinds of motion that another codec may describe in fewer bytes
 )
 LOST_WHY: Mapping[str, str] = {
     "cards in the wind of a shader": "A few waves of one formula move all cards. PCA stores the form of each wave over "
-    "the whole plant; athcodec stores maps of each card, whose three axes are rows of their own.",
-    "blades displaced by a texture that travels": "One displacement passes through all blades, which PCA takes "
-    "together; athcodec codes each blade by itself, in a time basis that all share.",
-    "shape keys": "The motion is a weighted sum of a few forms of the whole tree, which are as many components of PCA; "
-    "athcodec stores them stem by stem.",
-    "one leaf that vibrates": "A few modes of the whole blade move all of its pieces of 64 vertices.",
-    "stems held at both ends": "What moves a stem from both of its ends at once is shared by all of its pieces, each "
-    "of which is coded about the one before.",
-    "organs that grow, triangles apart": "Differences say vertices that stand still or follow a neighbour as well as "
-    "predictions do, and need no rest pose.",
+    "the whole plant, often with one weight of a vertex for all three axes. athcodec stores maps of each card in a "
+    "time basis that all share, with weights for each axis.",
+    "blades displaced by a texture that travels": "One displacement passes through all blades. Both codecs learn one "
+    "time basis from all of them. PCA then has weights of vertices that differ little from one to the next; athcodec "
+    "has modes of each blade, which suit bending and not a displacement that changes from vertex to vertex.",
+    "shape keys": "The motion is a weighted sum of a few forms of the whole tree, which are as many components of PCA, "
+    "each with one weight of a vertex for all three axes. athcodec stores the forms stem by stem and axis by axis.",
+    "one leaf that vibrates": "A few forms of the whole blade vibrate. PCA stores each once, with one weight of a "
+    "vertex for all three axes; athcodec stores them for each piece of 64 vertices and for each axis.",
+    "stems held at both ends": "What moves a stem from both of its ends at once is a few forms of the whole stem, "
+    "which PCA stores once. athcodec repeats it in all pieces of the stem, each coded about the one before.",
+    "organs that grow, triangles apart": "Most vertices stand still or move as a neighbour does. Differences say so in "
+    "as few bytes as predictions, and need no rest pose.",
     "cloth at the tightest bound": "No codec predicts many vertices within the bound: what is left is noise.",
 }
 MOTION_CHUNKS = ("STEMS", "SHAPES", "AFFINES", "PREDICTED")
 REST_CHUNKS = ("REST", "SOURCE_REST", "REFINED_REST")
+JOINT = "joint 1"  # What settings say of PCA whose components are paths in space.
 LOST_CAPTION = """
 Smaller by: the smallest file of another codec against ours, in per cent, least and most. Codecs: how many of these
-files each made. Motion, rest pose: shares of our files that both take; the rest is corrections, hierarchy and header.
+files each made. One weight: in how many of them one weight of a vertex stands for all three axes, as no weight of
+athcodec does. Motion, rest pose: shares of our files that both take; the rest is corrections, hierarchy and header.
 """
 
 
@@ -269,6 +274,7 @@ def _lost_row(kind: str, lost: Sequence[tuple[str, Point, Point]]) -> dict[str, 
         "sizes": len(lost),
         "smaller by %": f"{min(savings):.1f} to {max(savings):.1f}",
         "codecs": ", ".join(f"{name} {number}" for name, number in codecs.items()),
+        "one weight": sum(JOINT in best["settings"] for _, _, best in lost),
         "motion, rest pose %": f"{motion:.0f}, {rest:.0f}",
         "why": LOST_WHY.get(kind, "-"),
     }

@@ -49,9 +49,10 @@ CLIPS = (  # Clips of different makers. None is held out.
 FRAMES = 8  # First frames of a clip that are encoded.
 FACTORS = (0.5, 2.0)
 BYTES_LIMIT, WORK_LIMIT = 0.005, 0.05  # Shares by which a constant that matters changes a file or its work.
+SINGLY = "no group first; clips behind one that a constant moves are not measured with it"
 NONE = ""  # The name of the run in which nothing is changed.
-# What is no choice: numbers that FORMAT.md or a type fixes, weights of work that were measured with a clock, the limit
-# of work itself, and sizes of buffers, which change no file.
+# What is no choice: numbers that FORMAT.md, a type or an option fixes, weights of work that were measured with a clock,
+# the limit of work itself, and what changes no file: sizes of buffers, and limits of warnings and refusals.
 FIXED: Mapping[str, Sequence[str]] = {
     "progress": (
         *("READING", "POSES", "SURVEY", "MOTION", "ANALYSIS", "PREDICTION", "MAPS", "TURNS", "TRIAL", "BYTE"),
@@ -59,9 +60,10 @@ FIXED: Mapping[str, Sequence[str]] = {
         *("EIGENVECTOR", "FINDING", "LEARNT", "LEARNING", "LEAST_WORK", "WORK", "SMALL_TRIALS", "BRANCHES", "SIZES"),
     ),
     "assembly": ("SPOOL_BYTES",),
-    "decisions": ("CHUNK_BYTES", "LEVEL_BYTES"),
+    "decisions": ("CHUNK_BYTES", "LEVEL_BYTES", "REFUSAL_ROUNDS"),
     "joins": ("END_FRAMES", "WIDTHS", "SLOPED", "TURN"),
-    "layers": ("MOST_LAYERS", "MOST_LEVELS", "LARGEST", "RMS"),
+    "layers": ("MOST_LAYERS", "MOST_LEVELS", "LARGEST", "RMS", "ROUNDED"),
+    "levels": ("ENDS",),
     "motion": ("LEARNED_NUMBERS", "NO_ROOT", "RANGES", "LEAST_RANGE", "LARGE_BYTES"),
     "rigid": ("MOST_TURN",),
     "rings": ("LEAST_RING", "LARGEST_RING"),
@@ -71,14 +73,16 @@ FIXED: Mapping[str, Sequence[str]] = {
     ),
     "places": ("MIXER",),
     "segment": ("ROWS_AT_ONCE", "LEAST_THREADED", "WORK_BYTES", "SEGMENT_WORK"),
+    "segment_samples": ("SPAN",),
     "segmentation": ("SEGMENT_BYTES",),
     "settings": ("BEAM",),
     "shape": ("WHOLE_DETAIL", "MOST_DETAIL"),
     "streams": ("FIRST", "LAST"),
     "survey": ("MAX_DEPTH", "_READ_VALUES", "_WORK_VERTICES"),
-    "time_bases": ("LEAST_STEP", "MOST_STEP"),
+    "time_bases": ("LEAST_STEP", "MOST_STEP", "MOST_SAMPLE"),
     "trials": ("PRELUDES_KEPT", "PRELUDE_BYTES"),
     "writing": ("BY_STEP", "BY_RATE", "ONE_BY_ONE", "IS_HOST", "_IS_CONNECTED", "_IS_MIXED", "_IS_DERIVED"),
+    "preparation": ("MOST_LOST",),
     "polygons": ("PLACES_IN_ROWS", "CORNERS_OF_REST", "FACES_OF_REST", "MESH_PARTS"),
     "attachment": ("QUERY",),
     "point_runs": ("PAIRS_AT_ONCE",),
@@ -123,6 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("clips", nargs="*", metavar="CLIP", default=[], help="files, or names of clips")
     parser.add_argument("--modules", nargs="+", metavar="NAME", help="constants of these modules alone")
     parser.add_argument("--results", type=Path, default=RESULTS, metavar="FILE", help="where figures are kept")
+    parser.add_argument("--singly", action="store_true", help=SINGLY)
     add_number(parser, "--frames", FRAMES, "first frames of each clip")
     add_number(parser, "--seconds", 1500.0, "processor time after which no other figure is measured", "S")
     add_rel_error(parser)
@@ -139,19 +144,27 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         groups.setdefault(_module(one), []).append(one)
     with _Files(args) as files:
         for name, members in groups.items():
-            for factor in FACTORS:
-                for clip in files.clips:
-                    files.moves(name, members, factor, clip)
-        for name, members in groups.items():
-            for factor in FACTORS if len(members) > 1 else ():
-                moved = [clip for clip in files.clips if files.moves(name, members, factor, clip)]
-                for one, clip in product(members, moved):
-                    files.moves(one.full_name, [one], factor, clip)
+            _measure_singly(files, name, members) if args.singly else _measure_group(files, name, members)
     rows = [row for name, members in groups.items() for row in _rows(files, name, members)]
     modules = [_row(files, name, name) | {"constants": len(members)} for name, members in groups.items()]
     counts = {"constants": len(rows)} | Counter(row["moves"] for row in rows)
     tables = [table("Constants", rows, NOTE), table("Modules", modules), table("Counts", [counts])]
     return {"tables": tables, "broken": []}
+
+
+def _measure_group(files: _Files, group: str, members: Sequence[Constant]) -> None:
+    """Measure all constants of the module `group` at once, then each by itself on the clips that changed."""
+    for factor in FACTORS:
+        moved = [clip for clip in files.clips if files.moves(group, members, factor, clip)]
+        for one, clip in product(members if len(members) > 1 else (), moved):
+            files.moves(one.full_name, [one], factor, clip)
+
+
+def _measure_singly(files: _Files, group: str, members: Sequence[Constant]) -> None:
+    """Measure each constant of the module `group` by itself, until one of the clips changes."""
+    for one in members:
+        name = one.full_name if len(members) > 1 else group
+        any(files.moves(name, [one], factor, clip) for clip, factor in product(files.clips, FACTORS))
 
 
 @cache

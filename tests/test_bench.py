@@ -84,12 +84,31 @@ def test_where_another_codec_is_smaller_is_told_by_kinds_with_shares_of_our_file
 
     ours = "motion transformed, chunk_bytes HIERARCHY 100, REST 100, STEMS 700, CORRECTIONS 100"
     points = [point("athcodec", codec_registry.OURS, 1000, bound, ours) for bound in (1e-3, 1e-4)]
-    points += [point("global PCA (Alexa)", "baseline", size, bound) for bound, size in ((1e-3, 900), (1e-4, 1001))]
+    theirs = "step 2, joint 1, pose 0.2"
+    points += [
+        point("global PCA (Alexa)", "baseline", size, bound, theirs) for bound, size in ((1e-3, 900), (1e-4, 1001))
+    ]
     text = compare.lost_text([{"clips": [{"clip": "shader_card_tree"}], "points": points}], (1e-3, 1e-4))
     assert text.startswith("Of 2 foreign and held-out sizes, another codec's file is smaller in 1:")
     row = next(line for line in text.splitlines() if "`shader_card_tree`" in line)
     cells = [cell.strip() for cell in row.split("|")]
-    assert cells[3:7] == ["1", "10.0 to 10.0", "global PCA 1", "70, 10"]
+    assert cells[3:8] == ["1", "10.0 to 10.0", "global PCA 1", "1", "70, 10"]
+
+
+def test_no_clip_is_measured_behind_one_that_a_constant_measured_singly_moves():
+    some, measured = constants.constants()[:2], []
+
+    class Files:
+        clips = {"still": None, "moved": None, "behind": None}
+
+        def moves(self, name, members, factor, clip):
+            assert [one.full_name for one in members] == [name]
+            measured.append((name, clip, factor))
+            return clip == "moved"
+
+    constants._measure_singly(Files(), "group", some)
+    expected = [("still", 0.5), ("still", 2.0), ("moved", 0.5)]
+    assert measured == [(one.full_name, *each) for one in some for each in expected]
 
 
 def test_constants_are_told_apart_by_what_moves_a_file_and_by_what_was_measured():

@@ -30,17 +30,13 @@ from athcodec.encoding.segments.segment import CodedPrelude, Source, branch_reco
 from athcodec.encoding.segments.settings import OF_SAMPLE, Choice, Settings
 from athcodec.options import MIN_SEGMENT
 
-LEARNED_MODES_MAX_GAIN = 1.5  # Largest ratio by which learned modes have shrunk a file; what starts further off is out.
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
-SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
 NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
-CLEAR_RATIO = 1.03  # Ratio of bytes, of all and of motion, at first moves from which on the mean pose is better.
-TURNED_LEAST_SHARE = 0.5  # Least share of its bytes in waves that time bases have brought a turning root down to.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -145,10 +141,7 @@ class Search:
         if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
             plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
             other = cls(Trials(source, ath, plain, samples, everything, jobs, work), effort, ratios)
-            turned = (search.of_sample or search).trials
-            plain_cost = other.first_cost()  # Shapes that turn sum a few, too.
-            is_clear = plain_cost <= TURNED_LEAST_SHARE * turned.cost(turned.start)
-            search = other if is_clear or plain_cost <= search.first_cost() else search
+            search = min(other, search, key=cls.first_cost)  # Shapes that turn sum a few, too.
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -327,8 +320,6 @@ class Search:
         turned = settings.with_rotations(main) if main else settings.with_turning_roots(max(factors))
         for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
-                if trials.cost(replace(candidate, learned_pieces=None)) > LEARNED_MODES_MAX_GAIN * least:
-                    continue
                 candidate = learned_pieces.best_pieces(candidate, trials)
                 least = min(least, trials.cost(candidate))
                 if trials.cost(candidate) > REFINEMENTS_MAX_GAIN * least:
@@ -354,8 +345,8 @@ class Search:
 
     def about_best_reference(self) -> Search:
         """Return this search, or one about the mean pose of the motion if that makes a smaller file than the rest pose
-        does. The mean pose is taken at once if it is far better at first moves. Else both are compared by what was
-        chosen about the rest pose or, in small clips, by separate searches up to their steps.
+        does. The mean pose is taken at once if its file and its motion are smaller at first moves. Else both are
+        compared by what was chosen about the rest pose or, in small clips, by separate searches up to their steps.
         """
         if not self._may_have_mean_pose:
             return self
@@ -370,7 +361,7 @@ class Search:
         if not self.makes_all_again:
             at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
             of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
-            if (of_rest > CLEAR_RATIO * of_mean).all():
+            if (of_rest > of_mean).all():
                 return other
         cost = about_rest._cost_to_compare()
         if not self.makes_all_again:
@@ -457,8 +448,8 @@ class Search:
             settings = with_slack(trials.source, trials.ath, settings, chosen.rest_slack)
         if chosen.learned_saving is None:
             return settings
-        [(pieces, saved)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
+        [(pieces, _)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
         learned = replace(settings, learned_pieces=pieces)
-        if saved >= SURE_SAVING or not trials.work.fits(2 * trials.work_of_trial):
+        if not trials.work.fits(2 * trials.work_of_trial):
             return learned
         return trials.cheapest([learned, settings])  # A sample errs by more than some savings.

@@ -18,7 +18,6 @@ from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
-HOPELESS_UNTURNED = 1.1  # Motion that is so many times larger without rotations is not tried with learned modes.
 
 
 def candidates(settings: Settings, trials: Trials) -> list[Settings]:
@@ -54,8 +53,7 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
     if any(settings.rotation_step_factors) and any(settings.learned_bases) and not trials.is_layered:
-        unturned = trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials))
-        starts += [unturned] if trials.cost(unturned) <= HOPELESS_UNTURNED * trials.cost(settings) else []
+        starts.append(trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials)))
     return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
 
 

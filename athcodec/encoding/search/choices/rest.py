@@ -21,7 +21,6 @@ from athcodec.encoding.streams import streams
 from athcodec.files.threads import ranges
 
 CONNECTED_SHARE = 0.8  # Largest share of the size without faces at which layers refine a rest pose that goes by faces.
-JUDGED_BY_SAMPLE = 30_000  # Vertices of a plant from which on a sample of it tells which rest pose is smaller.
 REST_SHARE = 0.25  # Share of a file from which on slack is tried for its rest pose.
 REST_SLACKS = (0.5, 0.65, 0.8, 0.95)  # Distances, over the limit, by which a rest pose may be off.
 
@@ -63,8 +62,7 @@ def with_best_rest(source: Source, ath: Ath, settings: Settings) -> Settings:
 def judge(source: Source, ath: Ath, size: Callable[..., float]) -> Callable[..., float]:
     """Return a function that judges settings by `size` of a source, an ath and settings: on a sample of a large plant,
     unless the rest pose is all of the file."""
-    large = source.clip.vertex_count > JUDGED_BY_SAMPLE and not source.still
-    sample = sample_plant(source, ath, "default", with_faces=True) if large else None
+    sample = None if source.still else sample_plant(source, ath, "default", with_faces=True)
     if sample is None:
         return lambda *words: size(source, ath, *words)
     return lambda settings, *words: size(sample.source, sample.ath, sample.like(settings), *words)
