@@ -76,9 +76,7 @@ def files(tmp_path_factory):
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(
-            page, id=page.stem, marks=[pytest.mark.formats] if page.stem in ("formats", "gltf", "onto") else []
-        )
+        pytest.param(page, id=page.stem, marks=[] if page.stem == "README" else [pytest.mark.formats])
         for page in PAGES
         if blocks(page, "sh", "python")
     ],
@@ -272,6 +270,7 @@ def shown(positions: npt.NDArray[np.float32], path: Path) -> npt.NDArray[np.floa
 CHECKERS = {"mypy": ["--strict", "--follow-imports=silent"], "pyright": []}
 
 
+@pytest.mark.formats
 @pytest.mark.parametrize("checker", ["mypy", pytest.param("pyright", marks=pytest.mark.tools)])
 def test_a_type_checker_finds_nothing_in_the_script_of_a_user_and_its_mistakes_in_another(checker, tmp_path):
     (tmp_path / "pyrightconfig.json").write_text(

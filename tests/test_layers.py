@@ -18,6 +18,7 @@ from athcodec.encoding.assembly.segment_coding import SegmentCoder
 from athcodec.encoding.model.quantise import SOURCE_REST_TOLERANCE
 from athcodec.encoding.segments.layers import layer_ratios
 from athcodec.encoding.segments.levels import MOST_JERK, SourceFrames
+from athcodec.encoding.streams import writing
 from athcodec.errors import BadChecksum, LevelUnavailable, LimitExceeded
 
 LADDER = (1e-1, 1e-2, 1e-3)
@@ -90,6 +91,14 @@ def test_stalks_side_by_side_that_hardly_move_are_decoded(way, has_own_rest, tmp
         branch_parent=np.full(30, -1),
     )
     check_levels(clip, athcodec.encode(clip, tmp_path / "a.ath", effort="fast").path)
+
+
+def test_a_file_that_cannot_be_decoded_is_not_kept(bushy_clip, tmp_path, monkeypatch):
+    pack = writing.pack_refined_stems
+    monkeypatch.setattr(writing, "pack_refined_stems", lambda ratio, *words: pack(0, *words))
+    with pytest.raises(AssertionError, match="cannot be decoded, and did not keep it: chunk STEMS of level"):
+        athcodec.encode(bushy_clip, tmp_path / "a.ath", effort="fast", ladder=LADDER)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_errors_far_above_the_bound_get_layers_in_between(bushy_clip, tmp_path):

@@ -26,7 +26,7 @@ from athcodec.encoding.search.progress import Progress, silent
 from athcodec.encoding.segments.layers import layer_chunks
 from athcodec.encoding.segments.levels import chosen_levels
 from athcodec.encoding.streams import polygons, streams, writing
-from athcodec.errors import ClipError
+from athcodec.errors import ClipError, FormatError
 from athcodec.motion.clip import ERROR_WEIGHTS
 from athcodec.motion.hierarchy import derived_edges
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
@@ -77,19 +77,25 @@ class FileAssembly:
     def write(
         self, path: str | PathLike[str] | None, out: BinaryIO, spool: writing.Spool, coded: Iterable[CodedSegment]
     ) -> Summary:
-        """Write the whole file to the stream `out`, decode it once as a check, and return its summary. `path`: the name
-        that the file is to have afterwards, for the summary; `spool`: holds the chunks until they are written; `coded`:
-        the segments of the file, each once.
+        """Write the whole file to the stream `out`, decode every level once as a check, and return its summary. `path`:
+        the name that the file is to have afterwards, for the summary; `spool`: holds the chunks until they are written;
+        `coded`: the segments of the file, each once.
         """
         result = self._fill(writing.ChunkStore(spool), coded)
         chunks = result.store.write(out, result.header, result.errors)
+        mesh = host_rest(self.clip.placed.source) if self.options.host_rest else None
         if any(clip_range.loop for clip_range in self.clip.motion.clip_ranges):
-            mesh = host_rest(self.clip.placed.source) if self.options.host_rest else None
             with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
                 result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
             out.seek(0)
             chunks = result.store.write(out, result.header, result.errors)
-        with AthFile(out, strict=True) as file, Decoder(file) as decoder:  # The file gets its name after this check.
+        with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
+            try:  # The file gets its name after this check.
+                file.check()
+            except FormatError as error:
+                raise AssertionError(
+                    f"the encoder made a file that cannot be decoded, and did not keep it: {error}"
+                ) from error
             summary = self._summary(Path(path) if path else None, result, chunks, decoder)
         self.report("done", 1.0)
         return summary
