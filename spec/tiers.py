@@ -32,7 +32,7 @@ ENDING = 60.0  # Seconds that a stopped file has to clean up.
 RUNNING = re.compile(
     r"^(tests/\S+::(?:(?! (?:PASSED|FAILED|ERROR|SKIPPED|XFAIL)).)*?) *$", re.MULTILINE
 )  # A test without an outcome.
-NOT_PASSED = re.compile(r"^(?:FAILED|ERROR) (\S+::\S+)", re.MULTILINE)
+NOT_PASSED = re.compile(r"^(?:FAILED|ERROR) (\S+::.*?)(?: - .*)?$", re.MULTILINE)
 
 
 def tiers() -> list[str]:
@@ -134,6 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--limit", type=float, default=3600.0, help="seconds for each file (default: 3600)")
     parser.add_argument("--out", type=Path, default=HERE, help="folder of tiers.md and tiers.json")
     args = parser.parse_args(argv)
+    args.out.mkdir(parents=True, exist_ok=True)
     stored = args.out / "tiers.json"
     results = json.loads(stored.read_text()) if stored.exists() else {}
     failed = False
@@ -150,9 +151,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(f"{tier} {file}: {counts or 'nothing run'}; {ended} after {result['seconds']} s", flush=True)
             for test in result["not_passed"]:
                 print(f"  {test}", flush=True)
-            stored.write_text(
-                json.dumps(results, indent=1) + "\n"
-            )  # So that a run which is interrupted leaves its files.
+            # A run that is interrupted leaves what came of its files.
+            stored.write_text(json.dumps(results, indent=1) + "\n")
             (args.out / "tiers.md").write_text(as_markdown(results))
     return int(failed)
 

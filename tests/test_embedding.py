@@ -154,7 +154,7 @@ def test_a_notebook_server_plays_the_last_value_of_a_cell(browser, jupyter):
             break
         time.sleep(1)
     page.wait_for_selector(".jp-CodeCell .cm-content")
-    page.wait_for_selector("[data-status=idle], .jp-NotebookKernelStatus")
+    page.wait_for_selector(".jp-Notebook-ExecutionIndicator[data-status=idle]")  # The kernel runs.
     page.click(".jp-CodeCell .cm-content")
     page.keyboard.press("Shift+Enter")
     element = page.wait_for_selector("iframe[srcdoc]")
