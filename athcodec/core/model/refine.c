@@ -47,7 +47,7 @@ int ath_is_zero(const int32_t *integers, int32_t count)
 
 /* Sets a row to zeros. Memory that holds them already is not written: the encoder keeps the rows of all pieces, and the
  * system no pages of those of zeros. */
-static void clear_row(int32_t *row, int32_t count)
+static void set_to_zeros(int32_t *row, int32_t count)
 {
     if (!ath_is_zero(row, count)) memset(row, 0, (size_t)count * sizeof *row);
 }
@@ -58,7 +58,7 @@ static void predict_track(const ath_stream *stream, int32_t T, int32_t frequenci
                           const uint32_t ratios[3], const double *track, const int32_t *coarse, int32_t *predicted)
 {
     int32_t count = ath_min(frequencies, stream->temporal_rank);
-    clear_row(predicted, 3 * T);
+    set_to_zeros(predicted, 3 * T);
     for (int32_t axis = 0; axis < 3 && count > 0 && track; axis++) {
         const double *row = track + axis * T;
         double least = coarse ? 0.5 : 0.5 * (double)ratios[axis];
@@ -223,7 +223,7 @@ void ath_predict_modes(const ath_plan *plan, const ath_motion *motion, const ath
         predict_evenly(stream, motion, has_prediction ? before->frequencies : 0, ath_row_step(motion, piece, rows, r),
                        track, coarse, ath_row(rows->predicted_modes, r, T));
     }
-    for (int32_t r = modes; r < ath_rank(piece); r++) clear_row(ath_row(rows->predicted_modes, r, T), 3 * T);
+    for (int32_t r = modes; r < ath_rank(piece); r++) set_to_zeros(ath_row(rows->predicted_modes, r, T), 3 * T);
 }
 
 int32_t ath_row_extent(const int32_t *row, int32_t T, int32_t most)
