@@ -89,6 +89,7 @@ def test_a_large_plant_is_searched_on_a_part_of_it_in_all_its_clips(sample_clip,
     clips = {"a": part(sample_clip, 0, 40), "b": part(sample_clip, 40, 120)}
     whole = athcodec.encode(athcodec.join(clips), tmp_path / "a.ath", rel_error=1e-3)
     monkeypatch.setattr("athcodec.encoding.search.sample.LARGE", 500)
+    monkeypatch.setattr("athcodec.encoding.search.sample.LEAST_SAMPLE", 200)
     searched = athcodec.encode(athcodec.join(clips), tmp_path / "b.ath", rel_error=1e-3)
     assert searched.max_error_bound == whole.max_error_bound and searched.bytes < 1.05 * whole.bytes
     with athcodec.open(tmp_path / "b.ath", strict=True) as decoder:

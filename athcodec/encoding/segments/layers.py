@@ -79,6 +79,8 @@ STAGE_0_STEP = 4  # Step of the rest pose of stage 0, over that of the first lay
 LEAST_MEETING = 8  # Frames from which on the corrections of a segment meet those of the segments beside it.
 LARGEST = MEASURES.index("max")
 RMS = MEASURES.index("rms")
+FINER_MAPS = 3  # Half octaves by which steps of maps may become finer for that.
+COARSER_MAPS = 16  # Half octaves by which steps of maps may become coarser for that.
 MOST_POSES = 4  # Largest number of poses for each stage by which steps of maps are moved.
 EVEN_SHARE = 0.05  # Share of the bytes of a segment that corrections may take for that.
 TIGHTER_LIMITS = tuple(2.0 ** (-i / 8) for i in range(1, 17))  # Limits of these corrections, over that of the layer.
@@ -725,10 +727,10 @@ class _EvenStages:
         self._rounding, self._poses = settings.rounding, MOST_POSES * len(shown)
         self.errors = [coder.error(coder.pose(*each)) for each in zip(shown, range(len(shown)))] + coder.errors
         for stage in range(1, len(shown)):
-            self._move(stage, stage, stage, 0.5**0.5)
+            self._move(stage, stage, stage, 0.5**0.5, FINER_MAPS)
         for stage in range(len(shown), 0, -1):
             for coarser in range(stage - 1, -1, -1):
-                self._move(coarser, stage, len(shown), 2.0**0.5)
+                self._move(coarser, stage, len(shown), 2.0**0.5, COARSER_MAPS)
 
     def _is_worse(self, stage: int) -> bool:
         return self._excess(stage, stage) > 0
@@ -738,16 +740,18 @@ class _EvenStages:
         pairs = pairwise(np.array(error)[[LARGEST, RMS]] for error in self.errors[first - 1 : last + 1])
         return sum(float(np.maximum(after - before, 0.0).sum()) for before, after in pairs)
 
-    def _move(self, stage: int, worse: int, last: int, factor: float) -> None:
-        """Multiply the step of the maps of `stage` by `factor` while the errors of the stage `worse` exceed those of
-        the stage before it. Stop, and take the last change back, as soon as it does not reduce by how much the stages
-        from `worse` to `last` exceed those before them.
+    def _move(self, stage: int, worse: int, last: int, factor: float, most: int) -> None:
+        """Multiply the step of the maps of `stage` by `factor`, at most `most` times, while the errors of the stage
+        `worse` exceed those of the stage before it. Stop, and take the last change back, as soon as it does not reduce
+        by how much the stages from `worse` to `last` exceed those before them.
         """
         if not self._shown[stage].plan.has_affines(stage):
             return
-        while self._poses > 0 and self._is_worse(worse):
+        for _ in range(most):
             before = self.errors, self._steps
             excess = self._excess(worse, last)
+            if self._poses <= 0 or not self._is_worse(worse):
+                return
             self._set(stage, factor)
             if not self._excess(worse, last) < excess:
                 self.errors, self._steps = before
