@@ -31,6 +31,7 @@ from athcodec.encoding.segments.settings import OF_SAMPLE, Choice, Settings
 from athcodec.options import MIN_SEGMENT
 
 REFINEMENTS_MAX_GAIN = 1.05  # Largest gain of settings that suit refinements better than the layer that trials code.
+SURE_SAVING = 0.05  # Estimated share of all bits from which on learned modes make the file of any plant smaller.
 NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
@@ -448,8 +449,8 @@ class Search:
             settings = with_slack(trials.source, trials.ath, settings, chosen.rest_slack)
         if chosen.learned_saving is None:
             return settings
-        [(pieces, _)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
+        [(pieces, saved)] = learned_pieces.pieces_that_save(settings, trials, [chosen.learned_saving])
         learned = replace(settings, learned_pieces=pieces)
-        if not trials.work.fits(2 * trials.work_of_trial):
+        if saved >= SURE_SAVING or not trials.work.fits(2 * trials.work_of_trial):
             return learned
         return trials.cheapest([learned, settings])  # A sample errs by more than some savings.
