@@ -478,7 +478,7 @@ def test_what_animations_of_a_glb_address_besides_is_named(tmp_path):
         }
     with pytest.warns(SourceWarning), athcodec.read(path, takes="all") as clip:
         assert [each.name for each in clip.clip_ranges] == ["wind", "gale"] and "animation" not in clip.not_read
-    with pytest.raises(ClipError, match=r"got colours, which moves no node of the scene, expected .*'wind', 'gale'"):
+    with pytest.raises(ClipError, match=r"got colours, which moves no node of the scene, expected one of wind, gale"):
         athcodec.read(path, takes=["colours"])
 
 
