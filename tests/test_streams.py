@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -62,6 +63,16 @@ def test_a_clip_goes_through_pipes_to_an_ath_file_and_back(source, run, clip, tm
 def test_what_cannot_be_streamed_is_said_in_one_line(words, given, message, run):
     code, out, err = run(*words, given=given)
     assert code == 1 and out == b"" and message in err and err.count("\n") == 1
+
+
+def test_a_temporary_folder_is_made_for_streams_alone_and_removed(run, clip, tmp_path, monkeypatch):
+    made = []
+    monkeypatch.setattr("tempfile.mkdtemp", lambda *args, make=tempfile.mkdtemp: made.append(make(*args)) or made[-1])
+    athcodec.encode(clip, tmp_path / "a.ath", effort="fast")
+    assert run("info", "a.ath")[0] == 0
+    assert not made, "a process that is killed leaves no folder behind"
+    assert run("info", "-", given=(tmp_path / "a.ath").read_bytes())[0] == 0
+    assert made and not any(map(os.path.exists, made))
 
 
 def test_a_format_of_several_files_does_not_go_to_standard_output(run, clip, tmp_path):

@@ -11,7 +11,8 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import cached_property
 from typing import cast
 
 from athcodec.errors import ClipError
@@ -24,10 +25,15 @@ ATH = ".ath"
 
 
 class Streams:
-    """Files in place of "-", in a folder of their own. `writes`: whether one of them goes to standard output."""
+    """Files in place of "-", in a folder of their own, which is made for the first of them and removed with `opened`.
+    `writes`: whether one of them goes to standard output."""
 
-    def __init__(self, folder: str):
-        self._folder, self._input, self._output = folder, "", ""
+    def __init__(self, opened: ExitStack):
+        self._opened, self._input, self._output = opened, "", ""
+
+    @cached_property
+    def _folder(self) -> str:
+        return self._opened.enter_context(tempfile.TemporaryDirectory(prefix="athcodec-"))
 
     @property
     def writes(self) -> bool:
@@ -84,7 +90,7 @@ class Streams:
 @contextmanager
 def standard_streams() -> Iterator[Streams]:
     """Yield streams whose output is sent when the block ends without an error."""
-    with tempfile.TemporaryDirectory(prefix="athcodec-") as folder:
-        streams = Streams(folder)
+    with ExitStack() as opened:
+        streams = Streams(opened)
         yield streams
         streams.send()
