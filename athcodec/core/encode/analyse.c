@@ -5,8 +5,10 @@
 
 enum { ROTATION_STEPS = 5 };
 enum { WAVES = 8 }; /* waves that a row is projected on at once */
+enum { STIFF_FRAMES = 16, STIFF_PASSES = 6 }; /* frames and passes that tell which vertices of a tree bend least */
 
 static const double STANDING = 0.1; /* largest RMS motion of a foot that stands, over that of its plant */
+static const double STIFFEST = 1e-4; /* squared bend below which vertices count alike, over the mean of their tree */
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
 
@@ -294,6 +296,64 @@ static void add_carried(const ath_plan *plan, int32_t T, const ath_piece *root, 
         for (int32_t t = 0; t < T; t++) H[k][t] += own2 / carried2 * carried[k][t];
 }
 
+/* Adds to H the products of a vertex in some frames, times its weight, relative to the first vertex of its tree. */
+static void add_weighted(int32_t T, const int32_t *frame, int32_t frames, const double *x, const double *base,
+                         const double d[3], double weight, products H)
+{
+    for (int32_t j = 0; j < 3; j++)
+        for (int32_t i = 0; i < frames; i++) {
+            int32_t t = j * T + (frame ? frame[i] : i);
+            for (int32_t k = 0; k < 3; k++) H[3 * j + k][i] += weight * (x[t] - base[t]) * d[k];
+        }
+}
+
+/* Returns the mean squared distance of a vertex from where rotations R put it. */
+static double squared_bend(int32_t T, const int32_t *frame, int32_t frames, const double *x, const double *base,
+                           const double d[3], double R[STIFF_FRAMES][9])
+{
+    double sum = 0.0;
+    for (int32_t i = 0; i < frames; i++)
+        for (int32_t j = 0; j < 3; j++) {
+            const double *row = R[i] + 3 * j;
+            double away = x[j * T + frame[i]] - base[j * T + frame[i]] - (row[0] * d[0] + row[1] * d[1] + row[2] * d[2]);
+            sum += away * away;
+        }
+    return sum / (double)frames;
+}
+
+/* Fills the products of a root's tree. Vertices weigh the less the more they bend: what sways would add its own waves to
+ * a turn, and with them to the motion of all other vertices. Weights follow from a few frames, in passes that start from
+ * equal ones. Returns the weighted sum of squared distances from the first vertex. */
+static double sum_stiff(const ath_plan *plan, int32_t T, const ath_piece *root, const double *source, products H)
+{
+    int32_t frames = ath_min(T, STIFF_FRAMES), count = turned_vertices(plan, root), frame[STIFF_FRAMES];
+    double R[STIFF_FRAMES][9], mean = 0.0, size2 = 0.0;
+    const double *base = source + (size_t)root->first * 3 * (size_t)T, *a = ath_rest_of(plan, root->first);
+    for (int32_t i = 0; i < frames; i++) frame[i] = frames > 1 ? i * (T - 1) / (frames - 1) : 0;
+    for (int32_t pass = 0; pass <= STIFF_PASSES; pass++) {
+        int last = pass == STIFF_PASSES;
+        double bends = 0.0;
+        size2 = 0.0;
+        for (int32_t k = 0; k < 9; k++) memset(H[k], 0, (size_t)T * sizeof(double));
+        for (int32_t v = 0; v < count; v++) {
+            const double *x0 = ath_rest_of(plan, root->first + v), *x = base + (size_t)v * 3 * (size_t)T;
+            double d[3] = {x0[0] - a[0], x0[1] - a[1], x0[2] - a[2]};
+            double bend = pass > 0 ? squared_bend(T, frame, frames, x, base, d, R) : 1.0;
+            double weight = pass > 0 ? 1.0 / (bend + STIFFEST * mean + 1e-200) : 1.0;
+            bends += bend;
+            size2 += weight * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            add_weighted(T, last ? 0 : frame, last ? T : frames, x, base, d, weight, H);
+        }
+        mean = bends / (double)count;
+        for (int32_t i = 0; !last && i < frames; i++) {
+            double moments[9];
+            for (int32_t k = 0; k < 9; k++) moments[k] = H[k][i] + (k % 4 == 0 ? 1e-6 * size2 : 0.0);
+            ath_nearest_rotation(moments, R[i]);
+        }
+    }
+    return size2;
+}
+
 /* Turns rotations, one in each lane, by a step of Newton's method towards those nearest to H, for which the product of H
  * and the transpose of R is symmetric. Fills the squares of the turns; 1 where R is too far from the nearest rotation. */
 ATH_INLINE void turn_closer(double H[9][ATH_LANES], double R[9][ATH_LANES], double size2[ATH_LANES])
@@ -346,10 +406,10 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
 /* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its
  * vertices relative to the attach point, in the predicted frame. A turn that they show no better than an error of
  * `step` does, such as the twist of a straight stem, stays as in the frame before. carried: the source, if the branches
- * on a root tell more; else 0. about_centre: whether the piece turns about its centre, so that an error of its attach
- * point does not turn it. */
+ * on a root tell more; else 0. stiff: whether what bends least of them tells most. about_centre: whether the piece turns
+ * about its centre, so that an error of its attach point does not turn it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
-                         const double *carried, int about_centre, double *omega)
+                         const double *carried, int stiff, int about_centre, double *omega)
 {
     int rigid = (piece->flags & ATH_RIGID) != 0;
     double a[3], q[4] = {1.0, 0.0, 0.0, 0.0}, R[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
@@ -357,9 +417,11 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (about_centre) rest_centre(plan, piece, a);
-    double size2 = sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
-    if (carried) add_carried(plan, T, piece, carried, size2, sums);
-    double prior = 1e-6 * size2 + (rigid ? 0.0 : step * step * (double)piece->count);
+    stiff = stiff && carried;
+    double size2 = stiff ? sum_stiff(plan, T, piece, carried, sums)
+                         : sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
+    if (carried && !stiff) add_carried(plan, T, piece, carried, size2, sums);
+    double prior = 1e-6 * size2 + (rigid || stiff ? 0.0 : step * step * (double)piece->count);
     for (int32_t t = 0; t < T; t++) {
         double H[9], own[3];
         int32_t lane = t % ATH_LANES;
@@ -473,7 +535,8 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         else {
             int carries = turned_vertices(plan, piece) > piece->count;
             to_local(T, piece, &scratch->at, source, local);
-            fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, floats, scratch->track);
+            fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, rounding->roots_turn, floats,
+                         scratch->track);
             ath_into_axes(T, &turning, scratch->track);
             code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
         }

@@ -105,7 +105,8 @@ enum { ATH_END_PARTS = 3 };
 
 /* How numbers become integers. Below `dead_zone` steps they are 0. `ends` weighs the errors of a row's value, slope and
  * bend at either end, in squared steps; 0: they do not count. roots_turn: whether only the first pieces of roots, and
- * rigid ones, are turned; the others keep the rotation that they are predicted to have. */
+ * rigid ones, are turned, the former like what bends least of their trees; the others keep the rotation that they are
+ * predicted to have. */
 typedef struct ath_rounding {
     double dead_zone, ends[ATH_END_PARTS];
     int32_t roots_turn, reserved;

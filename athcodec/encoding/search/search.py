@@ -318,7 +318,8 @@ class Search:
             return
         factors, least = settings.rotation_step_factors, math.inf
         main = factors[trials.prelude(settings).plan.main_stage]
-        turned = settings.with_rotations(main) if main else settings.with_turning_roots(max(factors))
+        all_turn = main and not settings.roots_turn
+        turned = settings.with_rotations(main) if all_turn else settings.with_turning_roots(min(filter(None, factors)))
         for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
                 candidate = learned_pieces.best_pieces(candidate, trials)

@@ -35,13 +35,15 @@ def first_settings(
     relative = bound / source.seen.diagonal if source.seen.diagonal > 0 else 1e-4
     step, rest_step = bound * qz.first_step_ratio(relative), source.rest_limit(bound) * qz.rest_step_ratio(relative)
     settings = plain_settings(source, ath.height + 2, bound, step, rest_step)
+    factors = first_rotations(source, samples, rigid, settings.stages)
     settings = replace(
         settings,
         forms=first_forms(source, samples),
         rigid=rigid,
         layer=len(ratios) - 1,
         turn_step=turn_step,
-        rotation_step_factors=first_rotations(source, samples, rigid, settings.stages),
+        rotation_step_factors=factors,
+        roots_turn=any(factors),
         details=source.details if is_layered else settings.details,
         usual_change=usual_change(samples) if source.has_seams else np.inf,
     )

@@ -51,8 +51,11 @@ def arranged(
     """
     frames, rest = seen.frames, seen.clip.rest
     if parent is None:
-        arrange = _joints_by_price if seen.by_price else _joints_by_contact
-        joints = arrange(frames, label, _contacts(frames, label, names), root)
+        contacts = _contacts(frames, label, names)
+        if seen.by_price:
+            joints = _joints_by_price(frames, seen.frames_of_roots, label, contacts, root)
+        else:
+            joints = _joints_by_contact(frames, label, contacts, root)
     else:
         joints = _joints_of(rest, frames, label, parent)
     return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
@@ -75,10 +78,13 @@ class _Contacts:
     cost: np.ndarray
 
 
-def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+def _joints_by_price(
+    frames: np.ndarray, of_roots: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None
+) -> _Joints:
     """Return the forest of branches that takes the fewest bits: each branch hangs on the one where it costs least, or
-    is a root. `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `contacts`: where branches may
-    hang on each other; `root`: a vertex of the only root, as far as contacts lead to it, or None.
+    is a root. `frames`: (F, N, 3) positions; `of_roots`: the same with all motion that a root has; `label`: the branch
+    of each vertex, (N,); `contacts`: where branches may hang on each other; `root`: a vertex of the only root, as far
+    as contacts lead to it, or None.
     """
     prices, count = Prices(frames, label), int(label.max()) + 1
     vertices = np.concatenate([contacts.vertices, contacts.vertices[:, ::-1]])  # Of a branch, and of its parent.
@@ -86,7 +92,7 @@ def _joints_by_price(frames: np.ndarray, label: np.ndarray, contacts: _Contacts,
     cost = np.tile(contacts.cost, 2)
     size = np.maximum(sizes_of_each(frames[0], label)[child], cost / MOST_STRAIN)
     hanging = prices.on_others(vertices) + cost / np.maximum(size, np.finfo(float).tiny)
-    alone = prices.as_roots()
+    alone = (prices if of_roots is frames else Prices(of_roots, label)).as_roots()
     if root is not None:
         alone += hanging.sum() + alone.sum()
         alone[label[root]] = 0.0

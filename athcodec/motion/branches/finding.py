@@ -64,11 +64,10 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
     that stands still has none. What turns or travels as a whole is tried on a branch that carries all of it, too."""
     seen = Seen(clip, by_price=True)
-    for branches in _candidates(seen, by_points):
-        on_feet = carried(branches, seen.frames) if seen.is_carried else None
-        if on_feet is not None:
-            yield on_feet
-        yield branches
+    yield from _candidates(seen, by_points)
+    if seen.is_carried:
+        on_carrier = (carried(branches, seen.frames) for branches in _candidates(seen.of_carried(), by_points))
+        yield from (branches for branches in on_carrier if branches is not None)
 
 
 def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
@@ -391,7 +390,7 @@ def _by_runs(seen: Seen, root: int | None) -> Found | None:
     if len(seen.mesh):
         return None
     frames = seen.frames[1:]  # The rest pose may have links of other lengths.
-    links = run_links(frames)
+    links = run_links(seen.source_frames[1:])  # Distances stay in what turns, and no lean is taken for a turn.
     if links is None:
         return None
     bases = base_points(frames, links, root)

@@ -23,11 +23,12 @@ WELD = 1e-6  # Part of the diagonal; vertices that stay closer are one vertex of
 class Seen:
     """Observations of a clip, each computed once, when it is asked for.
 
-    by_price: whether branches hang where they take the fewest bits, and not where they grow.
+    by_price: whether branches hang where they take the fewest bits, and not where they grow. on_carrier: whether roots
+    will hang on a branch that moves as the whole plant does, so that this motion costs them nothing.
     """
 
     def __init__(self, clip: MotionClip, by_price: bool = False):
-        self.clip, self.by_price = clip, by_price
+        self.clip, self.by_price, self.on_carrier = clip, by_price, False
 
     def by_contact(self) -> Seen:
         """Return the same observations, with what is known of them, for branches that hang where they grow."""
@@ -35,11 +36,22 @@ class Seen:
         seen.by_price = False
         return seen
 
+    def of_carried(self) -> Seen:
+        """Return the same observations, with what is known of them, for roots that will hang on what carries them."""
+        seen = copy.copy(self)
+        seen.on_carrier = True
+        return seen
+
     @cached_property
     def frames(self) -> np.ndarray:
         """The rest pose and a few frames spread over the clip, (1 + k, N, 3) float64, without what they have in common
         as a whole."""
-        return self._frames if self._standing is None else self._standing
+        return self.source_frames if self._standing is None else self._standing
+
+    @property
+    def frames_of_roots(self) -> np.ndarray:
+        """The same frames with all motion that roots have to describe."""
+        return self.frames if self.on_carrier else self.source_frames
 
     @property
     def is_carried(self) -> bool:
@@ -48,10 +60,11 @@ class Seen:
 
     @cached_property
     def _standing(self) -> np.ndarray | None:
-        return without_common_motion(self._frames)
+        return without_common_motion(self.source_frames)
 
     @cached_property
-    def _frames(self) -> np.ndarray:
+    def source_frames(self) -> np.ndarray:
+        """The same frames as the clip has them."""
         clip = self.clip
         some = spread(clip.frame_count, SAMPLE_FRAMES)
         return np.concatenate([clip.rest[None], *(clip.block(frame, frame + 1).astype(np.float64) for frame in some)])
