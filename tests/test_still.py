@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from plants import blown_tree, turns
 
+import athcodec
 from athcodec.encoding.encoder import encode_clip
 from athcodec.encoding.search.trials import Trials
 from athcodec.motion.branches.common_motion import carried, without_common_motion
@@ -93,20 +94,35 @@ def test_a_plant_whose_trunk_stands_still_stays_whole():
 
 
 @pytest.mark.parametrize("ladder", ["none", "decades"])
-@pytest.mark.parametrize(("turn", "stop"), [(0.25, 1.0), (1.0, 1.0), (0.5, 0.5)])
-def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(turn, stop, ladder):
-    """`turn`: whole turns; `stop`: the part of the clip after which the table stands still."""
+@pytest.mark.parametrize(
+    ("turn", "stop", "named"), [(0.25, 1.0, True), (1.0, 1.0, True), (0.5, 0.5, True), (1.0, 1.0, False)]
+)
+def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(turn, stop, named, ladder):
+    """`turn`: whole turns; `stop`: the part of the clip after which the table stands still; `named`: whether the clip
+    names its branches, or they are found."""
     tree = blown_tree(3, 40, 48)
     positions = tree.block(0, tree.frame_count).astype(np.float64)
     turned_by = 2 * np.pi * turn * np.minimum(np.linspace(0, 1, len(positions)) / stop, 1)
     turned = positions @ turns(turned_by[:, None] * [0.0, 1.0, 0.0]).transpose(0, 2, 1)
     bound = 1e-4 * float(np.linalg.norm(np.ptp(positions.reshape(-1, 3), axis=0)))
-    on = {"vertex_branch": tree.vertex_branch, "branch_parent": tree.branch_parent}
+    on = {"vertex_branch": tree.vertex_branch, "branch_parent": tree.branch_parent} if named else {}
     standing, turning = (
         size_of(MotionClip(one.astype(np.float32), tree.time, **on), bound, ladder=ladder)
         for one in (positions, turned)
     )
     assert turning <= 1.05 * standing + 100
+
+
+def test_layers_of_what_turns_are_predicted_from_those_before():
+    """A turn that is coarse in one layer moves a crown much more than it moves the trunk by which it is known."""
+    with athcodec.read(athcodec.sample_path()) as tree:
+        positions = tree.block(0, tree.frame_count).astype(np.float64)
+        turned_by = turns(np.linspace(0, 2 * np.pi, len(positions))[:, None] * [0.0, 1.0, 0.0])
+        standing, turning = (
+            len(athcodec.encode(tree.replace(positions=one.astype(np.float32)), rel_error=1e-4))
+            for one in (positions, positions @ turned_by.transpose(0, 2, 1))
+        )
+    assert turning <= 1.05 * standing + 500
 
 
 def planted(count: int = 9, each: int = 6, frames: int = 10) -> np.ndarray:

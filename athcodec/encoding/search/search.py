@@ -300,10 +300,11 @@ class Search:
         """Return the settings of the first layer: the best ones if that is the only layer."""
         if not self.trials.is_layered:
             return self.best
-        turned = [rotations.best_rotations] * any(self.best.rotation_step_factors)  # Coarser steps turn no more.
-        choices: list[Choose] = [] if self.effort == "fast" else [*turned, learned_pieces.best_pieces]
-        first = replace(self.best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
-        return self._after([*choices, best_node_steps], first)
+        best = rotations.with_fine_roots(self.best)
+        turns = any(best.rotation_step_factors) and not best.roots_turn  # Coarser steps turn no more.
+        choices: list[Choose] = [rotations.best_rotations] * turns + [learned_pieces.best_pieces]
+        first = replace(best.coarser(self.ratios[0]), learned_pieces=None)  # Layers share a learned time basis.
+        return self._after([*(choices if self.effort != "fast" else []), best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
         """Yield settings that may suit the layers after the first, each of which has one stream: first with rotations,
@@ -319,7 +320,7 @@ class Search:
         factors, least = settings.rotation_step_factors, math.inf
         main = factors[trials.prelude(settings).plan.main_stage]
         all_turn = main and not settings.roots_turn
-        turned = settings.with_rotations(main) if all_turn else settings.with_turning_roots(min(filter(None, factors)))
+        turned = settings.with_rotations(main) if all_turn else settings.with_turning_roots(rotations.FINEST)
         for candidate in (turned, settings.with_rotations(0)):
             if self.effort != "fast":
                 candidate = learned_pieces.best_pieces(candidate, trials)

@@ -115,7 +115,7 @@ class Settings:
 
     def with_rotations(self, factor: int) -> Settings:
         """Return the settings with one rotation factor for all stages."""
-        return replace(self, rotation_step_factors=(factor,) * self.stages, roots_turn=False)
+        return replace(self, rotation_step_factors=(factor,) * self.stages)
 
     def with_turning_roots(self, factor: int) -> Settings:
         """Return the settings with a rotation factor of roots alone, in streams that hold all branches."""

@@ -64,10 +64,13 @@ def candidates(clip: MotionClip, by_points: bool = True) -> Iterator[Found]:
     for a welded mesh, its pieces. by_points: whether to look for patches and runs where there is nothing else; a clip
     that stands still has none. What turns or travels as a whole is tried on a branch that carries all of it, too."""
     seen = Seen(clip, by_price=True)
-    yield from _candidates(seen, by_points)
-    if seen.is_carried:
-        on_carrier = (carried(branches, seen.frames) for branches in _candidates(seen.of_carried(), by_points))
-        yield from (branches for branches in on_carrier if branches is not None)
+    if not seen.is_carried:
+        yield from _candidates(seen, by_points)
+        return
+    found = _candidates(seen.of_carried(), by_points)
+    on_carrier = ([carried(branches, seen.frames), branches] for branches in found)
+    proposals = itertools.chain(itertools.chain.from_iterable(on_carrier), _candidates(seen, by_points))
+    yield from _distinct(branches for branches in proposals if branches is not None)
 
 
 def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
@@ -390,7 +393,7 @@ def _by_runs(seen: Seen, root: int | None) -> Found | None:
     if len(seen.mesh):
         return None
     frames = seen.frames[1:]  # The rest pose may have links of other lengths.
-    links = run_links(seen.source_frames[1:])  # Distances stay in what turns, and no lean is taken for a turn.
+    links = run_links(seen.frames_of_roots[1:])
     if links is None:
         return None
     bases = base_points(frames, links, root)

@@ -37,7 +37,7 @@ class Seen:
         return seen
 
     def of_carried(self) -> Seen:
-        """Return the same observations, with what is known of them, for roots that will hang on what carries them."""
+        """Return the same observations, with what is known of them, for roots that may hang on what carries them."""
         seen = copy.copy(self)
         seen.on_carrier = True
         return seen
@@ -50,7 +50,7 @@ class Seen:
 
     @property
     def frames_of_roots(self) -> np.ndarray:
-        """The same frames with all motion that roots have to describe."""
+        """The same frames with all motion that roots have to describe: what a plant has in common may be a lean."""
         return self.frames if self.on_carrier else self.source_frames
 
     @property

@@ -22,7 +22,7 @@ HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not 
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
 FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
 
-FINEST_FACTOR = min(filter(None, ROTATION_FACTORS))
+FINEST = 1  # Rotation factor of the finest turns.
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
 MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre that is then no turn.
 
@@ -31,13 +31,21 @@ def first_rotations(
     source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray, stages: int
 ) -> tuple[int, ...]:
     """Return the factor of each stage that a search starts with: none turn, or the roots do where most of what stands
-    on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. A
-    coarse turn in one layer leaves little for the next one to be predicted from, so that turns are fine. rigid: (B,) of
-    branches that turn in any case if it is not 0."""
+    on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. rigid:
+    (B,) of branches that turn in any case if it is not 0."""
     turns = Feature.ROTATIONS not in source.without and not rigid[source.hierarchy.branch_parent < 0].all()
     turns = turns and _turn_as_wholes(source, samples)
     count = min(2, stages) if turns else 0
-    return (FINEST_FACTOR,) * count + (0,) * (stages - count)
+    return (FINEST,) * count + (0,) * (stages - count)
+
+
+def with_fine_roots(settings: Settings) -> Settings:
+    """Return the settings with fine turns, if roots alone turn: a coarse turn in one layer moves a crown far, and leaves
+    little for the next layer to be predicted from."""
+    if not settings.roots_turn:
+        return settings
+    factors = tuple(FINEST if factor else 0 for factor in settings.rotation_step_factors)
+    return replace(settings, rotation_step_factors=factors)
 
 
 def _turn_as_wholes(source: Source, samples: Sequence[SegmentSample]) -> bool:
@@ -140,8 +148,9 @@ def best_rotations(settings: Settings, trials: Trials, factors: tuple[int, ...] 
     if max(costs) == math.inf or min(turned) > HOPELESS_RATIO * unturned:
         return trials.cheapest([settings, *uniform])
     per_stage = np.array([trials.stage_costs(candidate) for candidate in uniform])
-    mixed = replace(uniform[0], rotation_step_factors=tuple(factors[i] for i in per_stage.argmin(axis=0)))
-    return trials.cheapest([settings, mixed, *_with_turning_roots(settings, trials, factors), *uniform])
+    mixed = replace(settings, rotation_step_factors=tuple(factors[i] for i in per_stage.argmin(axis=0)))
+    all_turn = [replace(candidate, roots_turn=False) for candidate in uniform[1:] if settings.roots_turn]
+    return trials.cheapest([settings, mixed, *_with_turning_roots(settings, trials, factors), *uniform, *all_turn])
 
 
 def _with_turning_roots(settings: Settings, trials: Trials, factors: tuple[int, ...]) -> list[Settings]:
