@@ -40,8 +40,8 @@ def first_rotations(
 
 
 def with_fine_roots(settings: Settings) -> Settings:
-    """Return the settings with fine turns, if roots alone turn: a coarse turn in one layer moves a crown far, and leaves
-    little for the next layer to be predicted from."""
+    """Return the settings with fine turns, if roots alone turn: a coarse turn in one layer moves a crown far, which
+    leaves little for the next layer to be predicted from."""
     if not settings.roots_turn:
         return settings
     factors = tuple(FINEST if factor else 0 for factor in settings.rotation_step_factors)
