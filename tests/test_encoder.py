@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import sys
 import tracemalloc
 
@@ -14,15 +15,19 @@ from plants import chain_plant, clip_of, plant
 from programs import printed
 
 import athcodec
-from athcodec import MotionClip
+from athcodec import MotionClip, encoding
+from athcodec.decoding.ath_file import AthFile
 from athcodec.decoding.container import MAGIC, Limits
 from athcodec.encoding.clip.coded_clip import CodedClip
 from athcodec.encoding.clip.places import PlacedClip
-from athcodec.encoding.model.motion import SegmentMotion
+from athcodec.encoding.model.motion import Plan, SegmentMotion
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.preparation.bounds import BoundOption
 from athcodec.encoding.preparation.preparation import surveyed
 from athcodec.encoding.search.progress import silent
+from athcodec.encoding.search.search import Search
+from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.segmentation import decoding_bytes, split_segments
 from athcodec.errors import BoundError, ClipError
 from athcodec.motion import clip as clip_module
@@ -393,6 +398,35 @@ def test_the_memory_of_default_options_grows_by_a_few_times_the_source(tmp_path)
         peaks.append(int(printed_peak) * (1 if sys.platform == "darwin" else 1024))
         sizes.append(source.stat().st_size)
     assert peaks[1] - peaks[0] < 6.5 * (sizes[1] - sizes[0])
+
+
+@pytest.mark.parametrize("by_steps", [False, True])
+def test_the_file_is_checked_when_nothing_that_encoding_made_is_in_memory(by_steps, bushy_clip, tmp_path, monkeypatch):
+    """Positions, plans and trials take several times as much memory as the decoder that checks the file."""
+    alive, check = [], AthFile.check
+    before = _records()
+
+    def noting(file, *words):
+        alive.append([type(one).__name__ for one in _records() if not any(one is other for other in before)])
+        check(file, *words)
+
+    monkeypatch.setattr(AthFile, "check", noting)
+    gc.disable()
+    try:
+        if by_steps:
+            made = encoding.draft(bushy_clip, effort="fast")
+            coded = encoding.code_segments(bushy_clip, made, range(made.segment_count))
+            encoding.write(bushy_clip, made, list(coded), tmp_path / "a.ath")
+        else:
+            athcodec.encode(bushy_clip, tmp_path / "a.ath", effort="fast")
+    finally:
+        gc.enable()
+    assert alive == [[]]
+
+
+def _records() -> list[object]:
+    """Return what of an encoder's records is in memory."""
+    return [one for one in gc.get_objects() if isinstance(one, (Source, Plan, SegmentMotion, Trials, Search))]
 
 
 @pytest.mark.parametrize("jobs", [0, -1])

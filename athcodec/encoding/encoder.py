@@ -14,11 +14,13 @@ import tempfile
 import warnings
 from collections.abc import Iterable, Iterator
 from os import PathLike
+from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from athcodec.decoding import container as ct
 from athcodec.encoding.assembly.assembly import SPOOL_BYTES, FileAssembly
 from athcodec.encoding.assembly.decided import CodedSegment, Decided, Draft
+from athcodec.encoding.assembly.filled import FilledFile
 from athcodec.encoding.assembly.segment_coding import SegmentCoder
 from athcodec.encoding.assembly.summary import Summary
 from athcodec.encoding.clip.places import PlacedClip
@@ -30,6 +32,7 @@ from athcodec.encoding.search.progress import Progress, WeightedProgress, phase_
 from athcodec.encoding.search.segment_samples import SAMPLES
 from athcodec.encoding.segments.layers import layer_ratios
 from athcodec.encoding.segments.segmentation import split_segments
+from athcodec.encoding.streams.writing import Spool
 from athcodec.errors import CoarseWarning, SourceWarning
 from athcodec.files.atomic import check_target, keeping, new_file
 from athcodec.motion.clip import ClipRange, MotionClip
@@ -60,14 +63,13 @@ def encode_clip(
         with whole as opened, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             out = cast(BinaryIO, opened)
             report = _weighted_progress(clip, progress, option, checked)
-            decisions, bound, decided = _decided(clip, option, checked, report)
-            with decisions.refusing(bound):
-                coded = SegmentCoder(decided, checked, report).coded(range(decided.segment_count))
-                summary = FileAssembly(decided, checked, report).write(path, out, spool, coded)
+            filled, objection = _filled(clip, option, checked, report, spool)
+            summary = filled.write(None if path is None else Path(path), out)
+            report("done", 1.0)
             if path is None:
                 out.seek(0)
                 shutil.copyfileobj(out, cast(BinaryIO, target))
-        _object(decided, option, bound)
+        _warn(objection)
         return summary
 
 
@@ -123,7 +125,7 @@ def draft(
         report = _weighted_progress(clip, progress, option, checked, draft=True)
         decisions, bound, decided = _decided(clip, option, checked, report)
         made = decisions.draft(decided)
-    _object(decided, option, bound)
+    _warn(_objection(decided, option, bound))
     return made
 
 
@@ -192,10 +194,31 @@ def write(
     """
     with keeping(clip.inputs):
         check_target(path, ".ath")
-    decisions = FileDecisions(*resumed(clip, draft))
     with new_file(path) as out, clip.watched(), tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
         report = WeightedProgress(progress, {"motion": 1.0})
-        return FileAssembly(decisions.decided(draft), decisions.options, report).write(path, out, spool, coded)
+        summary = _filled_of_draft(clip, draft, coded, report, spool).write(Path(path), out)
+        report("done", 1.0)
+        return summary
+
+
+def _filled(
+    clip: MotionClip, option: BoundOption, options: EncodingOptions, report: Progress, spool: Spool
+) -> tuple[FilledFile, str]:
+    """Decide about the file of a clip and code all of it. Return two things: the file, ready to be written, and what
+    there is to object to its bound. All else that encoding has made is freed, before the file is decoded as a check.
+    """
+    decisions, bound, decided = _decided(clip, option, options, report)
+    with decisions.refusing(bound):
+        coded = SegmentCoder(decided, options, report).coded(range(decided.segment_count))
+        return FileAssembly(decided, options, report).filled(spool, coded), _objection(decided, option, bound)
+
+
+def _filled_of_draft(
+    clip: MotionClip, draft: Draft, coded: Iterable[CodedSegment], report: Progress, spool: Spool
+) -> FilledFile:
+    """Return the file of a draft and its coded segments, ready to be written."""
+    decisions = FileDecisions(*resumed(clip, draft))
+    return FileAssembly(decisions.decided(draft), decisions.options, report).filled(spool, coded)
 
 
 def _decided(
@@ -250,10 +273,15 @@ def _bound(decisions: FileDecisions, option: BoundOption, report: Progress) -> f
     return option.in_scene_units(decisions.source, file_size)
 
 
-def _object(decided: Decided, option: BoundOption, bound: float) -> None:
-    """Warn the caller of `encode` if the bound is coarse for the plant."""
+def _objection(decided: Decided, option: BoundOption, bound: float) -> str:
+    """Return a sentence that says why the bound is coarse for the plant, or an empty text if it is not."""
     source = decided.source
-    if objection := option.objection(bound, source.seen.diagonal, source.clip.motion.metadata.get("unit")):
+    return option.objection(bound, source.seen.diagonal, source.clip.motion.metadata.get("unit"))
+
+
+def _warn(objection: str) -> None:
+    """Warn the caller of `encode` if there is something to object to the bound."""
+    if objection:
         warnings.warn(objection, CoarseWarning, stacklevel=4)
 
 

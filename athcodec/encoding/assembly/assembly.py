@@ -5,19 +5,15 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
-from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from athcodec._native import MEASURES, SHEET
 from athcodec.decoding import container as ct
-from athcodec.decoding.ath_file import AthFile
-from athcodec.decoding.decoder import Decoder
 from athcodec.encoding.assembly.decided import CodedSegment, Decided
+from athcodec.encoding.assembly.filled import Clips, FilledFile, LoopSteps
 from athcodec.encoding.assembly.segment_coding import SegmentCoder
-from athcodec.encoding.assembly.summary import Seam, Summary
+from athcodec.encoding.assembly.summary import Summary
 from athcodec.encoding.clip.coded_clip import CodedClip, host_rest, stored_polygons
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.options.file_options import EncodingOptions
@@ -26,7 +22,7 @@ from athcodec.encoding.search.progress import Progress, silent
 from athcodec.encoding.segments.layers import layer_chunks
 from athcodec.encoding.segments.levels import chosen_levels
 from athcodec.encoding.streams import polygons, streams, writing
-from athcodec.errors import ClipError, FormatError
+from athcodec.errors import ClipError
 from athcodec.motion.clip import ERROR_WEIGHTS
 from athcodec.motion.hierarchy import derived_edges
 from athcodec.motion.polygons import POLYGON_ARRAYS, Polygons, type_code
@@ -42,13 +38,6 @@ def time_chunk(*times: np.ndarray) -> bytes:
     """Return TIME for times in seconds, (T,) for each clip, exactly: by rules if these give the very same numbers."""
     steady = writing.pack_steady_time(*times)
     return steady or writing.pack_time(streams.encode_times(np.concatenate(times).astype(np.float64)))
-
-
-@dataclass
-class _Result:
-    store: writing.ChunkStore
-    header: ct.Header
-    errors: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -71,47 +60,21 @@ class FileAssembly:
         """Return the bytes of a file. Raises BoundError."""
         with tempfile.SpooledTemporaryFile(SPOOL_BYTES) as spool:
             coded = SegmentCoder(self.decided, self.options).coded(range(self.decided.segment_count))
-            result = replace(self, report=silent)._fill(writing.ChunkStore(spool), coded)
-            return result.store.size(result.header, result.errors)
+            return replace(self, report=silent).filled(spool, coded).size
 
-    def write(
-        self, path: str | PathLike[str] | None, out: BinaryIO, spool: writing.Spool, coded: Iterable[CodedSegment]
-    ) -> Summary:
-        """Write the whole file to the stream `out`, decode every level once as a check, and return its summary. `path`:
-        the name that the file is to have afterwards, for the summary; `spool`: holds the chunks until they are written;
-        `coded`: the segments of the file, each once.
+    def filled(self, spool: writing.Spool, coded: Iterable[CodedSegment]) -> FilledFile:
+        """Return the whole file with the summary of what was decided, ready to be written. `spool`: holds the chunks
+        until then; `coded`: the segments of the file, each once.
         """
-        result = self._fill(writing.ChunkStore(spool), coded)
-        chunks = result.store.write(out, result.header, result.errors)
-        mesh = host_rest(self.clip.placed.source) if self.options.host_rest else None
-        if any(clip_range.loop for clip_range in self.clip.motion.clip_ranges):
-            with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
-                result.store.replace(ct.CLIPS, self._clips(self._seam_errors(decoder)))
-            out.seek(0)
-            chunks = result.store.write(out, result.header, result.errors)
-        with AthFile(out, strict=True, host_mesh=mesh) as file, Decoder(file) as decoder:
-            try:  # The file gets its name after this check.
-                file.check()
-            except FormatError as error:
-                raise AssertionError(
-                    f"the encoder made a file that cannot be decoded, and did not keep it: {error}"
-                ) from error
-            summary = self._summary(Path(path) if path else None, result, chunks, decoder)
-        self.report("done", 1.0)
-        return summary
-
-    def _fill(self, store: writing.ChunkStore, coded: Iterable[CodedSegment]) -> _Result:
-        """Add all chunks of a file to `store`, and return what is known of the file then. `coded`: the segments of the
-        file, each once.
-        """
-        decided, layers = self.decided, self.decided.layers
+        decided, layers, store = self.decided, self.decided.layers, writing.ChunkStore(spool)
         self._add_prelude(store)
         for (stage, kind), content in layer_chunks(layers).items():
             store.add(kind, content, stage)
         errors, joins, stages = self._add_motion(store, coded)
         self._add_static(store)
-        if self.clip.motion.clip_ranges:
-            store.add(ct.CLIPS, self._clips([[0.0] * len(errors)] * len(self.clip.motion.clip_ranges)))
+        clips = self._clips()
+        if clips.ranges:
+            store.add(ct.CLIPS, clips.packed([[0.0] * len(errors)] * len(clips.ranges)))
         header = ct.Header(
             self.clip.placed.source.vertex_count,
             self.clip.vertex_count,
@@ -129,51 +92,29 @@ class FileAssembly:
             joins=joins,
             repeats=decided.source.repeats,
         )
-        return _Result(store, header, errors)
+        mesh = host_rest(self.clip.placed.source) if self.options.host_rest else None
+        return FilledFile(store, header, errors, clips, mesh, self._summary())
 
-    def _clips(self, seam_errors: Sequence[Sequence[float] | None]) -> bytes:
-        """Return the chunk CLIPS. seam_errors: for each loop the error at its seam at each level."""
-        decided = self.decided
+    def _clips(self) -> Clips:
+        """Return what the chunk CLIPS states, and how loops of the source move where they begin again."""
+        motion, decided = self.clip.motion, self.decided
         segment_counts = [len(segments) for segments in decided.source.clip_range_segments]
-        return writing.pack_clips(
-            self.clip.motion.clip_ranges, segment_counts, seam_errors, decided.choice.settings.periodic
-        )
-
-    def _seam_errors(self, decoder: Decoder) -> list[list[float] | None]:
-        """Return for each loop how far off its step from the last frame to the first is, per level."""
-        return [
-            self._seam_errors_of(decoder.play(clip.name), self._step(stop - 1, start)) if clip.loop else None
-            for clip, (start, stop) in zip(decoder.file.clips, self.clip.motion.clip_range_frames)
+        loops = [
+            self._loop_steps(start, stop) if clip_range.loop else None
+            for clip_range, (start, stop) in zip(motion.clip_ranges, motion.clip_range_frames)
         ]
+        return Clips(motion.clip_ranges, segment_counts, decided.choice.settings.periodic, loops)
 
-    @staticmethod
-    def _seam_errors_of(loop: Decoder, step: np.ndarray) -> list[float]:
-        errors = []
-        for level in range(loop.file.level_count):
-            last, first = (loop.positions(frame, level, np.float64) for frame in (-1, 0))
-            errors.append(np.linalg.norm(first - last - step, axis=1).max())
-        return errors
+    def _loop_steps(self, start: int, stop: int) -> LoopSteps:
+        """Return how a loop, the frames from `start` to before `stop`, moves where it begins again."""
+        beside = [self._step(start, min(start + 1, stop - 1)), self._step(max(stop - 2, start), stop - 1)]
+        return LoopSteps(self._step(stop - 1, start), max(float(np.linalg.norm(one, axis=1).max()) for one in beside))
 
     def _step(self, frame: int, following: int) -> np.ndarray:
         """Return how far the vertices move from one frame of the source to another, (N, 3) float64."""
         source = self.clip.placed.source
         before, after = (source.block(frame, frame + 1)[0].astype(np.float64) for frame in (frame, following))
         return after - before
-
-    def _seams(self, decoder: Decoder) -> tuple[Seam, ...]:
-        """Return for each clip of the file that loops its seam: how far the source moves from the last frame to the
-        first one, how far at most from frame to frame beside the seam, and the error at the seam of the finest level.
-        `decoder`: the file just written.
-        """
-        seams = []
-        for clip, (start, stop) in zip(decoder.file.clips, self.clip.motion.clip_range_frames):
-            if clip.loop:
-                beside = [(start, min(start + 1, stop - 1)), (max(stop - 2, start), stop - 1)]
-                step, *steps = (
-                    np.linalg.norm(self._step(*frames), axis=1).max() for frames in [(stop - 1, start), *beside]
-                )
-                seams.append(Seam(clip.name, float(step), float(max(steps)), clip.seam_errors[-1]))
-        return tuple(seams)
 
     def _add_prelude(self, store: writing.ChunkStore) -> None:
         """Add to `store` the chunks that decoding begins with: hierarchy, rest poses, times and places."""
@@ -274,17 +215,10 @@ class FileAssembly:
         first_held, diagonal = self.decided.layers.stage_0.stage_count - 1, self.decided.source.seen.diagonal
         return chosen_levels(errors, frames, flaws, diagonal, self.options.lossless, first_held)
 
-    def _summary(self, path: Path | None, result: _Result, chunks: list[ct.Chunk], decoder: Decoder) -> Summary:
-        """Return the summary of a file that has been written, with the bytes of each kind of chunk and the choices that
-        the search made. `path`: the file's name, or None; `result`: what `_fill` returned; `chunks`: those of the file;
-        `decoder`: the file itself.
-        """
+    def _summary(self) -> Summary:
+        """Return the summary of the file, as far as it is known before the file is written, with the choices that the
+        search made."""
         decided = self.decided
-        sizes: dict[str, int] = {}
-        for chunk in chunks:
-            name = ct.KIND_NAMES[chunk.kind]
-            sizes[name] = sizes.get(name, 0) + chunk.length
-        sizes["HEADER"] = result.header.file_length - sum(sizes.values())
         settings, bound = decided.choice.settings, decided.choice.settings.bound
         choices = {
             "motion": "predicted" if decided.choice.predicted else "transformed",
@@ -301,17 +235,16 @@ class FileAssembly:
         }
         diagonal, raw = decided.source.seen.diagonal, self.clip.frame_count * self.clip.placed.source.vertex_count * 12
         return Summary(
-            path,
-            result.header.file_length,
-            raw,
-            settings.largest_bound,
-            bound / diagonal if diagonal > 0 else 0.0,
-            decoder.file.table1(),
-            decoder.file.levels,
-            sizes,
-            choices,
-            self._seams(decoder),
-            None if self.clip.branches is None else str(self.clip.branches),
-            self.clip.placed.source.not_read,
-            decided.choice.untried,
+            path=None,
+            bytes=0,
+            raw_bytes=raw,
+            max_error_bound=settings.largest_bound,
+            relative_bound=bound / diagonal if diagonal > 0 else 0.0,
+            table1={},
+            levels=[],
+            chunk_bytes={},
+            choices=choices,
+            found_branches=None if self.clip.branches is None else str(self.clip.branches),
+            not_read=self.clip.placed.source.not_read,
+            untried=decided.choice.untried,
         )

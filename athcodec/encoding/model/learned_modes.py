@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -42,26 +43,37 @@ def components(plan: Plan, segments: Iterable[SegmentMotion]) -> Components:
     """
     sizes = np.minimum(plan.ranks, SHAPE_MODES)
     groups = [
-        (pieces, np.zeros((len(pieces), 3 * size, 3 * size)))
+        (pieces, 3 * int(size), np.zeros((len(pieces), len(_half(3 * size)))))
         for size in np.unique(sizes[sizes > 0])
         for pieces in [np.flatnonzero(sizes == size)]
     ]
     frames = 0
     for segment in segments:
         frames += segment.frames
-        for pieces, total in groups:
-            for part in _parts(pieces, total[:1].size):
-                total[part] += _products(plan, segment, pieces[part], total.shape[1])
+        for pieces, count, total in groups:
+            for part in _parts(pieces, count * count):
+                total[part] += _products(plan, segment, pieces[part], count).reshape(-1, count * count)[:, _half(count)]
         del segment  # The next segment is made after this one has been freed.
-    return Components(frames, [(pieces, *_principal(total)) for pieces, total in groups])
+    return Components(frames, [(pieces, *_principal(total, count)) for pieces, count, total in groups])
 
 
-def _principal(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths and the unit vectors of the components of moments, (P, n, n), in whose memory they are."""
-    values = np.empty(moments.shape[:2])
-    for part in _parts(moments, moments[:1].size):
-        values[part], moments[part] = principal(moments[part])
-    return np.sqrt(np.maximum(values, 0.0)), moments
+@lru_cache(SHAPE_MODES)
+def _half(count: int) -> np.ndarray:
+    """Return where the lower triangle of a symmetric matrix of so many rows is among all of its numbers."""
+    row, column = np.tril_indices(count)
+    return row * count + column
+
+
+def _principal(moments: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lengths, (P, count), and the unit vectors, (P, count, count), of the components of moments. `moments`:
+    the lower triangles of symmetric matrices of so many rows, (P, count (count + 1) / 2)."""
+    place = np.zeros((count, count), np.int64)
+    place[np.tril_indices(count)] = np.arange(moments.shape[1])
+    place = np.maximum(place, place.T)
+    values, vectors = np.empty((len(moments), count)), np.empty((len(moments), count, count))
+    for part in _parts(moments, count * count):
+        values[part], vectors[part] = principal(np.take(moments[part], place, axis=1))
+    return np.sqrt(np.maximum(values, 0.0)), vectors
 
 
 def _parts(pieces: np.ndarray, numbers: int) -> Iterator[slice]:

@@ -51,6 +51,7 @@ LEAST_RANGE = 1024  # Vertices of the smallest such part, below which a call cos
 LEAST_PIECES = 3  # Pieces of a sample, if there are as many.
 PERIOD = 128  # Vertices from one run of a sample to the next.
 LARGE_BYTES = 1 << 19  # Bytes from which on an array has memory of its own.
+RELEASING_BYTES = 32 << 20  # Bytes of an array before which memory that the allocator keeps is released.
 _PRIVATE = {"flags": mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS} if hasattr(mmap, "MAP_ANONYMOUS") else {}
 
 
@@ -62,6 +63,8 @@ def zeros(shape: tuple[int, ...], dtype: DTypeLike = np.float64, *, sparse: bool
     size = math.prod(shape) * np.dtype(dtype).itemsize
     if size < LARGE_BYTES:
         return np.zeros(shape, dtype)
+    if size >= RELEASING_BYTES:
+        release_memory()
     memory = mmap.mmap(-1, size, **_PRIVATE)
     if (pages := getattr(mmap, "MADV_NOHUGEPAGE" if sparse else "MADV_HUGEPAGE", None)) is not None:
         memory.madvise(pages)

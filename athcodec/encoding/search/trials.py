@@ -170,6 +170,8 @@ class Trials:
             if prelude is not None:
                 self._preludes[key] = prelude  # The prelude used last stands last.
                 return prelude
+            if self._preludes:  # Room for another one as large is made beforehand.
+                self._keep_preludes(next(iter(self._preludes.values())).plan.bases_bytes, others=1)
         prelude = CodedPrelude(self.source, self.ath, settings)
         with self._lock:
             if key not in self._seen_preludes:  # A prelude that was dropped depends on the order of threads.
@@ -177,10 +179,15 @@ class Trials:
                 squares = float(np.square(prelude.plan.pieces["count"]).sum())
                 self.work.add(progress.POSE * self.source.clip.vertex_count + progress.PIECE * squares)
             self._preludes[key] = prelude
-            most = min(PRELUDES_KEPT, max(1, PRELUDE_BYTES // max(1, prelude.plan.bases_bytes)))
-            while len(self._preludes) > most:
-                self._preludes.pop(next(iter(self._preludes)))
+            self._keep_preludes(prelude.plan.bases_bytes)
         return prelude
+
+    def _keep_preludes(self, size: int, others: int = 0) -> None:
+        """Drop the preludes that were not used for longest, so that all take at most PRELUDE_BYTES. `size`: bytes of
+        the bases of each; `others`: how many more are to come."""
+        most = min(PRELUDES_KEPT, max(1, PRELUDE_BYTES // max(1, size))) - others
+        while len(self._preludes) > most:
+            self._preludes.pop(next(iter(self._preludes)))
 
     def prelude_bytes(self, settings: Settings) -> float:
         """Return the bytes of hierarchy and rest pose of the whole plant."""
@@ -188,15 +195,17 @@ class Trials:
 
     def learned_modes(self, plan: Plan, settings: Settings) -> LearnedModes | None:
         """Return the learned modes of the pieces that the settings name; None if they name none."""
-        return None if settings.learned_pieces is None else self._learned(plan, settings, settings.learned_pieces)
+        if settings.learned_pieces is None:
+            return None
+        return self._learned(self._learn_modes(settings), plan, settings, settings.learned_pieces)
 
-    def learned_modes_everywhere(self, plan: Plan, settings: Settings) -> LearnedModes:
-        """Return the learned modes of all pieces."""
-        return self._learned(plan, settings, None)
-
-    def _learned(self, plan: Plan, settings: Settings, pieces: np.ndarray | None) -> LearnedModes:
-        """Return the learned modes of some pieces, (P,) bool, or of all if that is None."""
+    def learned_modes_everywhere(self, settings: Settings) -> LearnedModes:
+        """Return the learned modes of all pieces. The prelude is made after what takes the most memory."""
         seen = self._learn_modes(settings)
+        return self._learned(seen, self.prelude(settings).plan, settings, None)
+
+    def _learned(self, seen: Components, plan: Plan, settings: Settings, pieces: np.ndarray | None) -> LearnedModes:
+        """Return the learned modes of some pieces, (P,) bool, or of all if that is None."""
         key = id(seen), settings.step, pieces if pieces is None else pieces.tobytes()
         last = self._last_modes  # Other rest poses are tried with the same modes, by several threads.
         if last is None or last[0] != key:
@@ -244,22 +253,24 @@ class Trials:
         try:
             plan = self.prelude(settings).plan
             modes = self.learned_modes(plan, settings)
-            coded = [self.coded(settings, number, modes) for number in range(len(self.samples))]
-            stages = np.zeros(self.stages)
-            for one, sample in zip(coded, self.samples):
-                stages += self._stage_bytes(one, sample)
+            coded = [self._coded_bytes(settings, number, modes) for number in range(len(self.samples))]
         except BoundError:
             self._count(progress.TRIAL)
             return math.inf, np.full(self.stages, math.inf)
-        coding = sum(
-            progress.BYTE * sum(map(len, one.stems.values())) + progress.CORRECTION * len(one.corrections.rows)
-            for one in coded
-        )
+        stages, coding = np.sum([stages for stages, _ in coded], axis=0), sum(work for _, work in coded)
         each = progress.ANALYSIS + progress.TURNS * any(settings.rotation_step_factors)
         self._count(progress.TRIAL + self.work_of(each) + coding)
         stored = streams.encode_learned_modes(plan, modes)
         mode_bytes = sum(len(stream) * self.extrapolation.rows[stage] for stage, stream in stored.items())
         return float(stages.sum()) + mode_bytes + self.prelude_bytes(settings), stages
+
+    def _coded_bytes(self, settings: Settings, number: int, modes: LearnedModes | None) -> tuple[np.ndarray, float]:
+        """Code sample `number`. Return two things: the estimated bytes of each stage's streams, (stages,), in all
+        segments that the sample stands for; and the work that depends on what was coded.
+        """
+        coded = self.coded(settings, number, modes)
+        rows, size = len(coded.corrections.rows), sum(map(len, coded.stems.values()))
+        return self._stage_bytes(coded, self.samples[number]), progress.BYTE * size + progress.CORRECTION * rows
 
     def _count(self, work: float) -> None:
         """Count the work of a trial."""
@@ -336,8 +347,7 @@ class Trials:
         coded, count = settings.learned_coded, len(self.source.segments)
         key = _before_modes(settings) + (settings.prelude_key if coded else ())
         if key not in self._components:
-            prelude = self.prelude(settings)
-            plan = prelude.plan if coded else self._uncoded_plan(settings)
+            plan = self.prelude(settings).plan if coded else self._uncoded_plan(settings)
             chosen = spread(count, LEARNING_SEGMENTS)
             frames = sum(self.source.frames_of(segment) for segment in chosen)
             self.work.add((progress.LEARNT + progress.LEARNING * frames) * self.source.clip.vertex_count)

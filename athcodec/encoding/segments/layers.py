@@ -703,7 +703,8 @@ class CodedMotion:
         positions, pieces = shown.pose(stage, origin, np.float64, self._room), shown.plan.pieces
         is_stem = np.repeat(pieces["stage"] <= stage, pieces["count"])
         for run in np.split(positions, np.flatnonzero(np.diff(is_stem)) + 1)[not is_stem[0] :: 2]:
-            run[:] = run.astype(dtype)
+            for start, stop in ranges(len(run), 3 * shown.frames):
+                run[start:stop] = run[start:stop].astype(dtype)
         return positions
 
     def error(self, decoded: np.ndarray, rounding: float = 0.0) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -212,6 +213,7 @@ class Source:
     def _changed(self, **fields: Any) -> Source:
         """Return the source with other fields; it shares the positions that were read if its segments are the same."""
         source = replace(self, **fields)
+        source.source_rest = self.source_rest  # Neither the clip nor the origin changes.
         if source.segments == self.segments and source.held is self.held:
             source._held, source._only = self._held, self._only
         return source
@@ -604,7 +606,7 @@ def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarra
             slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
     chosen = np.concatenate(slots) if slots else np.zeros(0, int)
     parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
-    return _moments(segment, (*parts, segment.tracks[segment.plan.base_stage == stage]))
+    return _moments(segment, chain(parts, [segment.tracks[segment.plan.base_stage == stage]]))
 
 
 def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
@@ -877,16 +879,23 @@ def code_stems(
 ) -> Coded:
     """Return the streams of the stems of a single layer and the corrections that keep the limit, of a sample if there
     are many vertices."""
-    segment, decoded = analyse(prelude.plan, prelude.output, settings, positions, learned_modes, bases)
+    plan, origin = prelude.plan, prelude.origin
+    segment, decoded = analyse(plan, prelude.output, settings, positions, learned_modes, bases)
     stems, heads = stem_streams(segment, settings, bases)
-    return Coded(segment, stems, *_some_corrections(prelude, settings, decoded, positions), heads)
+    part = _part_to_correct(prelude, settings, decoded, positions)
+    if part == 1:
+        corrections = find_corrections(decoded, positions, origin, settings, plan)
+        return Coded(segment, stems, corrections, np.arange(len(decoded)), heads)
+    some = plan.sample(part)
+    decoded = decoded[some.vertices]  # The others are freed.
+    of_sample = replace(settings, limit=settings.limit_of(some.vertices))
+    corrections = find_corrections(decoded, positions[some.vertices], origin, of_sample, some)
+    return Coded(segment, stems, corrections, some.vertices, heads)
 
 
-def _some_corrections(
-    prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray
-) -> tuple[Corrections, np.ndarray]:
-    """Return two things: the corrections of a sample of the vertices, and the vertices of the sample. The sample is all
-    of a small plant, and smaller the more positions lie beyond the limit.
+def _part_to_correct(prelude: CodedPrelude, settings: Settings, decoded: np.ndarray, positions: np.ndarray) -> int:
+    """Return of how many parts of the pieces one is corrected as a sample: 1 for a small plant, and more the more
+    positions lie beyond the limit.
     """
     plan, count, part = prelude.plan, len(decoded), 1 if len(decoded) < SAMPLED else 2
     if count >= LEAST_SAMPLED:
@@ -897,16 +906,4 @@ def _some_corrections(
         most = MANY + MANY_SHARE * decoded[:, 0].size
         while part < SPARSE and beyond * len(plan.sample(part).vertices) > most:
             part *= 2
-    return sampled_corrections(plan, prelude.origin, settings, decoded, positions, part)
-
-
-def sampled_corrections(
-    plan: Plan, origin: np.ndarray, settings: Settings, decoded: np.ndarray, positions: np.ndarray, part: int
-) -> tuple[Corrections, np.ndarray]:
-    """Return the corrections of one of so many parts of the pieces, and the vertices that they number."""
-    if part == 1:
-        return find_corrections(decoded, positions, origin, settings, plan), np.arange(len(decoded))
-    some = plan.sample(part)
-    at = some.vertices
-    of_sample = replace(settings, limit=settings.limit_of(at))
-    return find_corrections(decoded[at], positions[at], origin, of_sample, some), at
+    return part

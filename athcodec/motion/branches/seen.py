@@ -255,6 +255,16 @@ def near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
 
 
 def cheapest_of_each(key: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return the cheapest entry of each group of the same key."""
-    order = np.lexsort((cost, key))
-    return order[np.unique(key[order], return_index=True)[1]]
+    """Return the cheapest entry of each group of the same key, the first of several; groups in the order of their
+    keys."""
+    order = np.argsort(key, kind="stable")  # Sorting by costs, too, takes several times as long.
+    key, cost = key[order], cost[order]
+    first = np.flatnonzero(_begins(key))
+    least = np.repeat(np.minimum.reduceat(cost, first), np.diff(np.append(first, len(key))))
+    cheapest = np.flatnonzero(cost == least)
+    return order[cheapest[_begins(key[cheapest])]]
+
+
+def _begins(key: np.ndarray) -> np.ndarray:
+    """Return whether each of some sorted keys differs from the one before it, (K,) bool."""
+    return np.append(True, key[1:] != key[:-1])[: len(key)]

@@ -80,8 +80,8 @@ def pieces_that_save(
     that factor times those with them, (P,) bool; and the share of all bits of the motion that learned modes on these
     pieces save. `plain`: settings without learned modes.
     """
+    modes = trials.learned_modes_everywhere(plain)
     plan = trials.prelude(plain).plan
-    modes = trials.learned_modes_everywhere(plan, plain)
     piece_count = len(modes.counts)
     piece_of_row = np.repeat(np.arange(piece_count), plan.ranks)
 
