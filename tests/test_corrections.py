@@ -130,7 +130,7 @@ def test_a_trial_corrects_some_of_very_many_frames_only(monkeypatch):
     positions = np.stack(np.broadcast_arrays(u, v, waves), axis=-1).reshape(60, -1, 3)
     trials, find = [], segment.find_corrections
     monkeypatch.setattr(segment, "find_corrections", lambda *words: trials.append(find(*words)) or trials[-1])
-    athcodec.encode(positions, fps=24, rel_error=1e-4)
+    athcodec.encode(positions, fps=24, rel_error=1e-4, effort="fast")
     assert 0 < max(len(one.rows) for one in trials) < segment.MANY + segment.MANY_SHARE * positions[..., 0].size
 
 

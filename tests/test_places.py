@@ -151,7 +151,7 @@ def test_vertices_of_other_faces_that_stay_near_share_a_place_and_the_bound_hold
     places = find_places(clip, most_error=bound / 16)
     assert places.count == 320
     assert 0 < places.error <= bound / 16
-    with decoded(clip, max_error=bound, ladder="none") as decoder:
+    with decoded(clip, max_error=bound, ladder="none", effort="fast") as decoder:
         assert decoder.file.core.info.place_count == 320
         assert np.linalg.norm(np.asarray(decoder) - clip.block(0, 20), axis=2).max() <= bound
 
@@ -176,6 +176,7 @@ def test_near_vertices_of_one_face_stay_apart():
 def test_a_split_clip_decodes_to_the_very_bits_of_the_welded_one(options):
     clip = plant(4, branches=9, longest=7, roots=2)
     order = np.concatenate([np.arange(clip.vertex_count), np.arange(0, clip.vertex_count, 3)])
+    options = {"effort": "fast"} | options
     with decoded(clip, **options) as whole, decoded(split_of(clip, order), **options) as split:
         assert split.file.core.info.place_count == clip.vertex_count
         assert np.array_equal(np.asarray(split), np.asarray(whole)[:, order])
@@ -205,7 +206,7 @@ def test_each_vertex_has_the_branch_and_the_attributes_of_the_source():
 def test_matrices_and_residuals_are_those_of_all_vertices():
     clip = plant(6, branches=9, longest=7)
     order = shuffled(clip.vertex_count, 40)
-    with decoded(split_of(clip, order), rel_error=1e-3, ladder="none") as decoder:
+    with decoded(split_of(clip, order), rel_error=1e-3, ladder="none", effort="fast") as decoder:
         parts, hierarchy = decoder.affines(3, 0), decoder.file.hierarchy
         assert int(parts.vertex_count.sum()) == len(order)
         rest, shown = decoder.level_rest(0)[hierarchy.vertex_source], decoder.positions(3, 0)[hierarchy.vertex_source]
