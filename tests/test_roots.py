@@ -114,7 +114,7 @@ def test_leaves_of_shrubs_hang_no_deeper_than_they_grow():
 def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():
     clip = fields.stems(seed=3, plants=3).clip
     true, found = (
-        len(athcodec.encode(one, ladder="none", attributes="none", effort="fast"))
+        len(athcodec.encode(one, ladder="none", attributes="none"))
         for one in (clip, clip.replace(vertex_branch=None, branch_parent=None, stem_index=None))
     )
     assert found <= MOST * true
