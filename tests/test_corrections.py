@@ -124,7 +124,7 @@ def test_rigid_parts_are_moved_as_a_whole_where_that_serves_all_of_their_vertice
 
 def test_a_trial_corrects_some_of_very_many_frames_only(monkeypatch):
     """A sheet that waves has rotations that fit nothing."""
-    u, v = np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40))
+    u, v = np.meshgrid(np.linspace(0, 1, 30), np.linspace(0, 1, 30))
     phase = 0.3 * np.arange(60)[:, None, None]
     waves = 0.1 * np.sin(9 * u + phase) * np.cos(7 * v - phase)
     positions = np.stack(np.broadcast_arrays(u, v, waves), axis=-1).reshape(60, -1, 3)

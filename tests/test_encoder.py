@@ -287,7 +287,8 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip):
-    first, second = (athcodec.encode(bushy_clip, effort=effort, segment_frames=16) for _ in range(2))
+    clip = bushy_clip.replace(positions=bushy_clip.block(0, 33), time=bushy_clip.time[:33])
+    first, second = (athcodec.encode(clip, effort=effort, segment_frames=16) for _ in range(2))
     assert first == second
 
 
