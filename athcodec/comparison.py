@@ -35,8 +35,8 @@ class Comparison:
 
     Examples
     --------
-    >>> growth = athcodec.sample_path("growth")
-    >>> errors = athcodec.compare(growth, athcodec.encode(growth, effort="fast"))
+    >>> tree = athcodec.sample_path("tree")
+    >>> errors = athcodec.compare(tree, athcodec.encode(tree, effort="fast"))
     >>> bool((errors.max_error.max(axis=1) <= errors.promised).all())
     True
     """

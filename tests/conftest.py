@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import signal
@@ -79,6 +80,12 @@ def pytest_ignore_collect(collection_path, config):
     others = (set(re.findall(r"mark\.(\w+)", text)) & set(tiers(config))) - common
     possible = [Marks(common.union(some)) for count in range(len(others) + 1) for some in combinations(others, count)]
     return None if any(eval(config.option.markexpr, {}, marks) for marks in possible) else True
+
+
+def pytest_collection_finish():
+    """Spare the garbage collector to go through all modules and tests again and again: they stay to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter):

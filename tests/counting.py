@@ -13,11 +13,22 @@ from fuzz.targets import COMMON, CORE, compiler, decoder_sources
 
 from athcodec import _native
 
-# Hidden, because functions that choose among clones call it while the library is still being loaded.
-COUNTER = """
-static unsigned long long blocks;
-__attribute__((visibility("hidden"))) void __sanitizer_cov_trace_pc(void) { blocks++; }
-unsigned long long counted_blocks(void) { return blocks; }
+CALL, OPCODE = 0, 7  # PyTrace_CALL and PyTrace_OPCODE of Python's C API
+
+# Hidden, because functions that choose among clones call it while the library is still being loaded. Python calls
+# `trace` for every event: one in Python would take most of the time of what it counts.
+COUNTER = f"""
+typedef int setter(void *object, const char *name, void *value);
+static unsigned long long counted;
+static setter *set;
+static void *yes;
+__attribute__((visibility("hidden"))) void __sanitizer_cov_trace_pc(void) {{ counted++; }}
+unsigned long long counted_work(void) {{ return counted; }}
+void trace_with(setter *set_attribute, void *true_object) {{ set = set_attribute, yes = true_object; }}
+int trace(void *self, void *frame, int what, void *argument) {{
+    counted += what == {OPCODE};
+    return what == {CALL} ? set(frame, "f_trace_opcodes", yes) : 0;
+}}
 """
 
 
@@ -32,7 +43,8 @@ class CountedCore:
         flags.append("-fsanitize-coverage=trace-pc")
         subprocess.run([used, *flags, *decoder_sources(), counter, "-o", library], check=True)
         self._library = ctypes.CDLL(str(library))
-        self._library.counted_blocks.restype = ctypes.c_ulonglong
+        self._library.counted_work.restype = ctypes.c_ulonglong
+        self._library.trace_with(ctypes.pythonapi.PyObject_SetAttrString, ctypes.py_object(True))
 
     def __getattr__(self, name: str):
         function, known = getattr(self._library, name), getattr(_native.lib, name)
@@ -41,18 +53,10 @@ class CountedCore:
 
     def work_of(self, action: Callable[[], object]) -> int:
         """Bytecodes and basic blocks that an action executes, in this thread."""
-        bytecodes, before = 0, self._library.counted_blocks()
-
-        def trace(frame, event, _):
-            nonlocal bytecodes
-            frame.f_trace_lines, frame.f_trace_opcodes = False, True
-            bytecodes += event == "opcode"
-            return trace
-
-        previous = sys.gettrace()
-        sys.settrace(trace)
+        previous, before = sys.gettrace(), self._library.counted_work()
+        ctypes.pythonapi.PyEval_SetTrace(self._library.trace, None)
         try:
             action()
         finally:
             sys.settrace(previous)
-        return bytecodes + self._library.counted_blocks() - before
+        return self._library.counted_work() - before

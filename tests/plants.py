@@ -400,6 +400,7 @@ def bending_tube() -> MotionClip:
     return clip
 
 
-def flowing_growth() -> MotionClip:
+def flowing_growth(frames: int = 120) -> MotionClip:
     """A tree of lines whose branches come out without a stop; its motion can be predicted from frame to frame."""
-    return SAMPLES["growth_flowing"].make()
+    clip = SAMPLES["growth_flowing"].make()
+    return clip.replace(positions=clip.block(0, frames), time=clip.time[:frames])

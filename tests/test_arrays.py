@@ -9,7 +9,6 @@ import subprocess
 import tracemalloc
 from pathlib import Path
 
-import dask.array
 import h5py
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ INDICES = """0 | -1 | 5 | np.int64(7) | np.uint8(3) | np.array(4) | np.s_[10:20]
 | np.s_[30:3:-7] | np.s_[7:7] | np.s_[-3:99] | [3, 5] | [5, 3, 3, -1] | [] | range(2, 5) | np.array([[0, 1], [40, 2]])
 | np.arange(50) % 3 == 0 | np.s_[5, :100] | np.s_[2:4, 3, 1] | np.s_[:, 1:3] | (-1, [4, 2]) | ([1, 2], [3, 4]) | True
 | ([0, 49], ..., 2) | ... | () | (..., 0) | (3, ...) | None | (None, 3) | np.s_[1:3, None] | np.s_[:4, :, [0, 2]]"""
-MAX = {"max_error": 0.01}
+MAX = {"max_error": 0.01, "effort": "fast"}
 
 
 def indices(text: str):
@@ -62,6 +61,8 @@ def test_a_frame_between_two_is_an_error_that_names_what_shows_it(index, decoder
 
 
 def test_a_decoder_goes_wherever_an_array_goes(decoder, array, tmp_path):
+    from dask.array import from_array  # here, because it takes long to import
+
     for name in ("shape", "dtype", "ndim", "size", "__len__"):
         mine, theirs = getattr(decoder, name), getattr(array, name)
         assert (mine() if callable(mine) else mine) == (theirs() if callable(theirs) else theirs)
@@ -70,7 +71,7 @@ def test_a_decoder_goes_wherever_an_array_goes(decoder, array, tmp_path):
     assert np.array_equal(np.mean(decoder, axis=0), array.mean(axis=0)) and np.array_equal(np.stack(decoder), array)
     with pytest.raises(ValueError, match="copy"):
         np.asarray(decoder, copy=False)
-    lazy = dask.array.from_array(decoder, chunks=(16, -1, -1))
+    lazy = from_array(decoder, chunks=(16, -1, -1))
     assert np.array_equal(lazy[5:40:7].compute(scheduler="synchronous"), array[5:40:7])
     with h5py.File(tmp_path / "a.h5", "w") as file:
         stored = file.create_dataset("positions", data=decoder)
@@ -186,12 +187,14 @@ def test_every_real_type_is_encoded_and_the_summary_says_what_became_of_it(dtype
 
 
 def test_anything_that_slices_by_frames_gives_the_file_of_the_array(tmp_path):
+    from dask.array import from_array  # here, because it takes long to import
+
     said = {"fps": 24, "unit": "cm", "up_axis": "y"}
     expected = athcodec.encode(STEM, **MAX, **said, **BRANCHES)
     mapped = np.memmap(tmp_path / "a.raw", float, "w+", shape=STEM.shape)
     mapped[:] = STEM
     with h5py.File(tmp_path / "a.h5", "w") as file:
-        stored, lazy = file.create_dataset("p", data=STEM, chunks=(7, 12, 3)), dask.array.from_array(STEM, (6, 12, 3))
+        stored, lazy = file.create_dataset("p", data=STEM, chunks=(7, 12, 3)), from_array(STEM, (6, 12, 3))
         laid_out = STEM.astype(">f8"), np.asfortranarray(STEM), np.asfortranarray(STEM.astype(">f8"))
         for source in (mapped, stored, lazy, STEM.tolist(), list(STEM), np.ma.MaskedArray(STEM), *laid_out):
             assert athcodec.encode(source, **MAX, **said, **BRANCHES) == expected

@@ -46,7 +46,7 @@ def simulated(leaves: int = 0) -> athcodec.MotionClip:
 
 
 def _encoded(clip, path):
-    athcodec.encode(clip, path, rel_error=1e-4, ladder="none")
+    athcodec.encode(clip, path, rel_error=1e-4, ladder="none", effort="fast")
     return path
 
 

@@ -16,6 +16,8 @@ import athcodec
 from athcodec.viewer.build_viewer import modules
 from bench.throttled_server import ThrottledServer
 
+pytestmark = pytest.mark.programs
+
 ROOT = Path(__file__).resolve().parent.parent
 VIEWER = ROOT / "athcodec" / "viewer"
 RINGS = (41, 21, 6)  # Of the tube of each level of detail.
@@ -38,7 +40,6 @@ def bound(tmp_path):
     return tmp_path
 
 
-@pytest.mark.programs
 def test_one_file_moves_three_meshes_in_three_js_as_onto_does(bound, node):  # noqa: F811
     for number in range(len(RINGS)):
         out = bound / "out.bin"
@@ -53,7 +54,6 @@ def test_one_file_moves_three_meshes_in_three_js_as_onto_does(bound, node):  # n
         assert np.median(off) < 1e-3 * np.abs(moved[-1] - moved[0]).max()
 
 
-@pytest.mark.programs
 def test_slices_of_surfaces_move_a_mesh_in_three_js_as_its_bones_say(tmp_path, node):  # noqa: F811
     points, faces = coarse_surfaces()
     athcodec.encode(surfaces(), tmp_path / "tree.ath", rel_error=1e-5, exact_rest=True)
@@ -67,7 +67,6 @@ def test_slices_of_surfaces_move_a_mesh_in_three_js_as_its_bones_say(tmp_path, n
     assert off.max() <= facts["max_error"] + 1e-5 < 1e-3 * np.abs(moved[-1] - moved[0]).max() + 1e-5
 
 
-@pytest.mark.programs
 def test_a_bound_mesh_is_valid_gltf(bound, node):  # noqa: F811
     found = json.loads(node("validate.mjs", bound / "lod1_bound.glb"))
     assert (found["errors"], found["warnings"]) == (0, 0), found["messages"]

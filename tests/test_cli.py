@@ -195,16 +195,22 @@ def test_the_demo_shows_every_depth_of_the_sample_keeps_files_on_demand_and_has_
     assert base64.b64decode(shown) == data
 
 
-def test_the_demo_shows_growth_too_and_other_samples_are_refused(tmp_path, capsys, monkeypatch):
-    """Here of its last frames; the examples of docs/viewer.md run it on all."""
-    short = tmp_path / "growth_1k_120f.h5"
+@pytest.fixture
+def short_growth(tmp_path, monkeypatch):
+    """The last frames of the sample of growth, which stand for all of it."""
+    short = tmp_path / "short" / "growth_1k_120f.h5"
+    short.parent.mkdir()
     with read_hdf5(sample_path("growth")) as clip:
         athcodec.write(clip.replace(positions=clip.block(108, 120), time=clip.time[108:]), short)
-    with monkeypatch.context() as patch:
-        patch.setattr(athcodec, "sample_path", {"growth": short, "leafed": sample_path("leafed")}.__getitem__)
-        assert run("demo", "--sample", "growth", "--keep", tmp_path) == 0
+    monkeypatch.setattr(athcodec, "sample_path", {"growth": short, "leafed": sample_path("leafed")}.__getitem__)
+    return short
+
+
+def test_the_demo_shows_growth_too_and_other_samples_are_refused(short_growth, tmp_path, capsys):
+    """Here of its last frames; the examples of docs/viewer.md run it on all."""
+    assert run("demo", "--sample", "growth", "--keep", tmp_path) == 0
     assert "Encoded the sample growth_1k_120f within 0.0001 of its diagonal" in capsys.readouterr().out
-    assert run("verify", tmp_path / "growth_1k_120f.ath", "--against", short) == 0
+    assert run("verify", tmp_path / "growth_1k_120f.ath", "--against", short_growth) == 0
     with pytest.raises(ValueError, match="sample: got 'oak', expected one of tree, growth, leafed, fern, grass"):
         sample_path("oak")
 
@@ -698,12 +704,12 @@ JSON = {
     "hierarchy": ("hierarchy SAMPLE --method edges", "branches"),
     "formats": ("formats", "formats"),
     "view": ("view IN --export a.html", "bytes"),
-    "demo": ("demo --keep .", "page"),
+    "demo": ("demo --sample growth --keep .", "page"),
 }
 
 
 @pytest.mark.parametrize("verb", JSON)
-def test_a_verb_answers_in_json_and_in_nothing_else(verb, encoded, tmp_path, monkeypatch, capsys):
+def test_a_verb_answers_in_json_and_in_nothing_else(verb, encoded, short_growth, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     line, key = JSON[verb]
     words = [{"SAMPLE": SAMPLE, "IN": encoded}.get(word, word) for word in line.split()]

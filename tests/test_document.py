@@ -57,12 +57,15 @@ def outcome(call) -> object:
 @pytest.mark.parametrize(
     "make, options",
     [
-        (lambda: awkward(seed=8, branches=5, dtype=np.float64, offset=1e3, motion="sway"), {"rel_error": 1e-6}),
-        (lambda: plant(seed=2, roots=2, branches=5, offset=50.0), {"exact_rest": True}),
-        (lambda: plant(seed=3, branches=5, dtype=np.float64), {"exact_rest": True, "segment_frames": 16}),
+        (
+            lambda: awkward(seed=8, branches=5, dtype=np.float64, offset=1e3, motion="sway", frames=12),
+            {"rel_error": 1e-6},
+        ),
+        (lambda: plant(seed=2, roots=2, branches=5, offset=50.0, frames=12), {"exact_rest": True}),
+        (lambda: plant(seed=3, branches=5, dtype=np.float64, frames=18), {"exact_rest": True, "segment_frames": 16}),
         (lambda: tube(rings=6, around=6, frames=8), {}),
-        (lambda: awkward(seed=4, shape="flat", motion="spin", longest=9), {}),
-        (lambda: awkward(seed=5, motion="mirror", longest=30, shuffled=True), {}),
+        (lambda: awkward(seed=4, shape="flat", motion="spin", longest=9, frames=12), {}),
+        (lambda: awkward(seed=5, motion="mirror", longest=30, shuffled=True, frames=12), {}),
         (lambda: awkward(seed=6, shape="coincident", motion="teleport"), {}),
         (lambda: chain_plant(branches=6, longest=3), {"segment_frames": 16}),
         (lambda: bush(branches=10), {"rel_error": 1e-2}),

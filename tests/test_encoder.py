@@ -44,13 +44,14 @@ def small():
 # ---- bounds and sizes ----
 
 
-@pytest.mark.parametrize("target", [6_000, 15_000, 40_000])
-def test_a_target_size_is_met_from_below_and_used(target, sample_clip, sample_positions, tmp_path):
-    summary = athcodec.encode(sample_clip, tmp_path / "s.ath", target_size=target, effort="fast")
+@pytest.mark.parametrize("target", [5_000, 10_000, 20_000])
+def test_a_target_size_is_met_from_below_and_used(target, sample_clip, tmp_path):
+    clip = sample_clip.replace(positions=sample_clip.block(0, 40), time=sample_clip.time[:40])
+    summary = athcodec.encode(clip, tmp_path / "s.ath", target_size=target, effort="fast")
     assert 0.85 * target <= summary.bytes <= target
     assert summary.bytes == summary.path.stat().st_size
     with athcodec.open(summary.path, strict=True) as decoder:
-        error = np.linalg.norm(decoder.positions() - sample_positions.astype(np.float64), axis=2).max()
+        error = np.linalg.norm(decoder.positions() - clip.positions.astype(np.float64), axis=2).max()
     assert error <= summary.max_error_bound
 
 
@@ -271,7 +272,7 @@ def test_progress_rises_from_nothing_to_one_through_the_stages(effort, small, tm
 
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
-@pytest.mark.parametrize("frames", [64, 640])
+@pytest.mark.parametrize("frames", [64, 320])
 def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path, monkeypatch):
     """Work: positions that are analysed, which is most of what a search and coding do."""
     done, reported = [0], []
@@ -291,7 +292,8 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip):
-    first, second = (athcodec.encode(bushy_clip, effort=effort, segment_frames=16) for _ in range(2))
+    clip = bushy_clip.replace(positions=bushy_clip.block(0, 33), time=bushy_clip.time[:33])
+    first, second = (athcodec.encode(clip, effort=effort, segment_frames=16) for _ in range(2))
     assert first == second
 
 
@@ -454,12 +456,12 @@ def test_segments_are_short_enough_for_a_decoder_within_its_default_memory():
         assert max(decoding_bytes(vertices, stop - start) for start, stop in segments) <= Limits.memory_bytes
 
 
-@pytest.mark.parametrize("ladder", ["none", "decades"])
-def test_parts_that_jump_take_no_more_than_in_short_segments(tmp_path, ladder):
+@pytest.mark.parametrize(("ladder", "effort"), [("none", "default"), ("decades", "fast")])
+def test_parts_that_jump_take_no_more_than_in_short_segments(tmp_path, ladder, effort):
     rng = np.random.default_rng(5)
-    frames, leaves = np.arange(200), 20
+    frames, leaves = np.arange(160), 12
     places = np.stack([rng.normal(size=(leaves, 3)), rng.normal(size=(leaves, 3)) * [3, 0.01, 3]])
-    fallen = (frames[:, None] >= rng.integers(1, 199, leaves)).astype(int)
+    fallen = (frames[:, None] >= rng.integers(1, 159, leaves)).astype(int)
     turned = rng.normal(size=(2, leaves, 5, 3)) * 0.1
     phase = rng.uniform(0.3, 0.9, leaves) * frames[:, None] + rng.uniform(0, 6.28, leaves)
     sway = 0.1 * np.sin(phase) * (fallen == 0)
@@ -467,7 +469,7 @@ def test_parts_that_jump_take_no_more_than_in_short_segments(tmp_path, ladder):
     positions = places[fallen, at][:, :, None] + turned[fallen, at] + sway[:, :, None, None]
     moved = positions.reshape(len(frames), -1, 3)
     clip = clip_of(moved, moved[0], np.repeat(at, 5), np.full(leaves, -1))
-    given = {"rel_error": 1e-4, "ladder": ladder}
+    given = {"rel_error": 1e-4, "ladder": ladder, "effort": effort}
     whole = athcodec.encode(clip, tmp_path / "a.ath", **given).bytes
     assert whole <= 1.02 * athcodec.encode(clip, tmp_path / "b.ath", segment_frames=32, **given).bytes
 

@@ -14,6 +14,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -207,6 +208,7 @@ def with_constants(definitions: dict[str, Definition], names: set[str]) -> set[s
     return names.union(*(definitions[name].constants for name in names))
 
 
+@cache
 def definitions_of_the_code() -> dict[str, Definition]:
     headings = [(i, line.lstrip("# ")) for i, line in enumerate(text_without_code().splitlines(), 1) if line[:1] == "#"]
     nodes = {}

@@ -68,9 +68,9 @@ def test_an_unknown_name_says_which_there_are(medley_ath, sample_ath):
 
 def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
     clips = {f"part{start}": part(sample_clip, start, start + 40) for start in (0, 40, 80)}
-    together = athcodec.encode(athcodec.join(clips), tmp_path / "together.ath", rel_error=1e-3)
+    together = athcodec.encode(athcodec.join(clips), tmp_path / "together.ath", effort="fast", rel_error=1e-3)
     apart = [
-        athcodec.encode(clip, tmp_path / f"{name}.ath", max_error=together.max_error_bound).bytes
+        athcodec.encode(clip, tmp_path / f"{name}.ath", effort="fast", max_error=together.max_error_bound).bytes
         for name, clip in clips.items()
     ]
     assert together.bytes < 0.6 * sum(apart)
@@ -150,7 +150,7 @@ def test_lossless_clips_are_joined_without_loss(medley_clips, tmp_path):
 
 def test_the_file_is_the_same_when_coded_in_steps_or_with_any_number_of_jobs(medley_clips, tmp_path):
     """A process that codes some of the segments joins them to ones that it does not hand over."""
-    clip, options = athcodec.join(medley_clips), {"rel_error": 1e-4, "segment_frames": 16}
+    clip, options = athcodec.join(medley_clips), {"rel_error": 1e-4, "segment_frames": 16, "effort": "fast"}
     plan = draft(clip, **options)
     segments = [own for s in reversed(range(plan.segment_count)) for own in code_segments(clip, plan, [s])]
     write(clip, plan, segments, tmp_path / "steps.ath")
@@ -272,7 +272,7 @@ def test_name_and_loop_of_a_clip_go_through_a_file_of_the_schema(suffix, medley_
             with athcodec.read(path) as clip:
                 assert clip.clip_ranges == (ClipRange(name, decoder.frame_count, loop),)
                 assert clip.metadata == decoder.metadata
-    assert main(["encode", str(path), str(tmp_path / "a.ath")]) == 0
+    assert main(["encode", str(path), str(tmp_path / "a.ath"), "--effort", "fast"]) == 0
     with athcodec.open(tmp_path / "a.ath", clip="Böe") as decoder:
         assert "clip_name" not in decoder.metadata
 
@@ -297,7 +297,25 @@ def sources(medley_clips, tmp_path_factory):
 
 def test_files_are_joined_under_their_names_verified_and_decoded_by_name(sources, tmp_path, capsys):
     out, decoded = str(tmp_path / "oak.ath"), str(tmp_path / "calm.h5")
-    assert main(["encode", *sources, "-o", out, "--names", "quiet,storm", "--loop", "storm", "--loop-blend", "9"]) == 0
+    assert (
+        main(
+            [
+                "encode",
+                *sources,
+                "-o",
+                out,
+                "--names",
+                "quiet,storm",
+                "--loop",
+                "storm",
+                "--loop-blend",
+                "9",
+                "--effort",
+                "fast",
+            ]
+        )
+        == 0
+    )
     assert "loop: storm: vertices move by up to" in capsys.readouterr().err
     assert main(["info", out]) == 0
     shown = capsys.readouterr().out

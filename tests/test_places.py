@@ -151,7 +151,7 @@ def test_vertices_of_other_faces_that_stay_near_share_a_place_and_the_bound_hold
     places = find_places(clip, most_error=bound / 16)
     assert places.count == 320
     assert 0 < places.error <= bound / 16
-    with decoded(clip, max_error=bound, ladder="none") as decoder:
+    with decoded(clip, max_error=bound, ladder="none", effort="fast") as decoder:
         assert decoder.file.core.info.place_count == 320
         assert np.linalg.norm(np.asarray(decoder) - clip.block(0, 20), axis=2).max() <= bound
 
@@ -176,6 +176,7 @@ def test_near_vertices_of_one_face_stay_apart():
 def test_a_split_clip_decodes_to_the_very_bits_of_the_welded_one(options):
     clip = plant(4, branches=9, longest=7, roots=2)
     order = np.concatenate([np.arange(clip.vertex_count), np.arange(0, clip.vertex_count, 3)])
+    options = {"effort": "fast"} | options
     with decoded(clip, **options) as whole, decoded(split_of(clip, order), **options) as split:
         assert split.file.core.info.place_count == clip.vertex_count
         assert np.array_equal(np.asarray(split), np.asarray(whole)[:, order])
@@ -205,7 +206,7 @@ def test_each_vertex_has_the_branch_and_the_attributes_of_the_source():
 def test_matrices_and_residuals_are_those_of_all_vertices():
     clip = plant(6, branches=9, longest=7)
     order = shuffled(clip.vertex_count, 40)
-    with decoded(split_of(clip, order), rel_error=1e-3, ladder="none") as decoder:
+    with decoded(split_of(clip, order), rel_error=1e-3, ladder="none", effort="fast") as decoder:
         parts, hierarchy = decoder.affines(3, 0), decoder.file.hierarchy
         assert int(parts.vertex_count.sum()) == len(order)
         rest, shown = decoder.level_rest(0)[hierarchy.vertex_source], decoder.positions(3, 0)[hierarchy.vertex_source]
@@ -308,7 +309,7 @@ def test_a_table_in_any_order_takes_little_more_than_its_entropy():
     places = find_places(split_of(clip, order))
     entropy = -sum(n * np.log2(n / len(order)) for n in places.sizes) / 8
     first = split_of(clip, order[places.first])
-    assert size(split_of(clip, order)) <= 1.05 * size(first) + 1.2 * entropy
+    assert size(split_of(clip, order), effort="fast") <= 1.05 * size(first, effort="fast") + 1.2 * entropy
 
 
 def test_leaves_that_touch_a_twig_at_a_point_stay_leaves():
@@ -323,9 +324,9 @@ def test_leaves_that_touch_a_twig_at_a_point_stay_leaves():
 
 def test_faces_cost_no_more_than_their_own_stream():
     mesh = by_faces(tube_mesh(50, 7, 30))
-    with decoded(mesh, ladder="none") as decoder:
+    with decoded(mesh, ladder="none", effort="fast") as decoder:
         chunks = {str(chunk).split()[1]: chunk.length for chunk in decoder.file.chunks}
-    without = size(mesh, rest_error=None)
+    without = size(mesh, rest_error=None, effort="fast")
     assert decoder.file.file_length <= 1.01 * without + chunks["FACES"] + 200
 
 

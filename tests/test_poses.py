@@ -74,7 +74,7 @@ def test_modes_of_short_stems_take_the_rounding_of_the_rest_pose_back(tmp_path, 
 
 @pytest.mark.parametrize("options", [{"exact_rest": True}, {"lossless": True}])
 def test_exact_rest_poses_come_back_bit_for_bit(bushy_clip, tmp_path, options):
-    with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options) as decoder:
+    with coded(bushy_clip, tmp_path / "a.ath", **OPTIONS, **options, effort="fast") as decoder:
         assert decoder.file.rest.tobytes() == bushy_clip.source_rest.tobytes()
         assert not np.array_equal(decoder.level_rest(), bushy_clip.rest)
 
@@ -130,7 +130,7 @@ def test_a_file_cut_off_behind_its_motion_says_that_the_rest_pose_is_missing(bus
 
 def test_joined_clips_share_both_poses(medley_clips, tmp_path):
     joined = athcodec.join(medley_clips)
-    with coded(joined, tmp_path / "a.ath", **OPTIONS) as decoder:
+    with coded(joined, tmp_path / "a.ath", **OPTIONS, effort="fast") as decoder:
         assert joined.rest_given == (decoder.file.chunks.find(ct.SOURCE_REST) is not None)
         assert distance(decoder.file.rest, joined.rest) <= SOURCE_REST_TOLERANCE * diagonal(joined)
         for clip in decoder.file.clips:

@@ -96,7 +96,7 @@ SLOW = pytest.mark.slow
 ODD = {
     "growth": growth,
     "eased growth": lambda: growth(eased=True),
-    "leaves that unfold": lambda: unfolding_leaves(seed=1, frames=60, leaves=25),
+    "leaves that unfold": lambda: unfolding_leaves(seed=1, frames=40, leaves=12),
     "noise": lambda: alone(np.random.default_rng(3).normal(size=(40, 90, 3))),
     "one vertex": lambda: alone(circle()),
     "one vertex in one frame": lambda: alone(circle()[:1]),
@@ -203,7 +203,7 @@ def test_swaying_trees_keep_their_modes(tmp_path):
 
 
 def test_who_asks_for_a_hierarchy_of_maps_gets_it(tmp_path):
-    found = size(growth(), tmp_path, 1e-4, tam=athcodec.Thresholds(0, 0, 0, 0))
+    found = size(growth(), tmp_path, 1e-4, effort="fast", tam=athcodec.Thresholds(0, 0, 0, 0))
     assert found.choices["motion"] == "transformed" and found.table1["depth"] > 3
 
 
@@ -285,7 +285,7 @@ def test_segments_are_as_long_as_can_be_unless_told_otherwise(always, tmp_path):
 
 @pytest.mark.parametrize("target", [700, 1500])
 def test_a_target_size_is_met(target, always, tmp_path):
-    found = size(growth(), tmp_path, 0, rel_error=None, target_size=target)
+    found = size(growth(), tmp_path, 0, rel_error=None, target_size=target, effort="fast")
     assert found.choices["motion"] == "predicted" and 0.9 * target <= found.bytes <= target
 
 

@@ -12,7 +12,7 @@ from athcodec.metrics import ErrorMeter
 from athcodec.motion.clip import ClipRange
 
 BOUND = 1e-3
-FEW = dict(rel_error=BOUND, attributes="none", ladder="none")
+FEW = dict(rel_error=BOUND, attributes="none", ladder="none", effort="fast")
 
 
 @pytest.fixture(scope="module")

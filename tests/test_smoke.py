@@ -153,7 +153,7 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "structure": "hedge_stems --short",
     "split": "--help",
     "branches": "CLIP --results OUT",
-    "constants": "CLIP --modules rotations --frames 4 --rel-error 1e-2 --results OUT",
+    "constants": "CLIP --modules learned_modes --frames 4 --rel-error 1e-2 --results OUT",
     "effort": "--learning CLIP --judging CLIP --rel-error 1e-2 --results OUT",
 }
 

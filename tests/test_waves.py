@@ -51,7 +51,7 @@ def test_clips_of_a_file_are_periodic_each_for_itself(tmp_path, ladder):
     tree = blown_tree(seed=3, branches=24)
     clips = {"loop": athcodec.looped(tree, 40), "once": tree}
     path = tmp_path / "clips.ath"
-    summary = athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, ladder=ladder)
+    summary = athcodec.encode(athcodec.join(clips), path, rel_error=1e-3, ladder=ladder, effort="fast")
     document = File(path.read_bytes())
     assert [clip.periodic for clip in document.file.clips] == [True, False]
     with athcodec.open(path, strict=True) as decoder:

@@ -22,12 +22,12 @@ def sheet(**options) -> MotionClip:
 
 
 KINDS = {
-    "plant": lambda: plant(seed=1, branches=20, frames=40),
+    "plant": lambda: plant(seed=1, branches=10, frames=40),
     "few frames": lambda: plant(seed=2, branches=60, frames=3),
     "many frames": lambda: plant(seed=3, branches=2, frames=400),
-    "sheet without branches": sheet,
-    "points": lambda: odd.MAKERS["drifting_points"](seed=1, points=300, frames=9, noise=1e-4),
-    "noise": lambda: odd.MAKERS["white_noise"](seed=1, points=40, frames=40),
+    "sheet without branches": lambda: sheet(side=10),
+    "points": lambda: odd.MAKERS["drifting_points"](seed=1, points=100, frames=9, noise=1e-4),
+    "noise": lambda: odd.MAKERS["white_noise"](seed=1, points=15, frames=40),
     "one vertex": lambda: odd.MAKERS["one_vertex"](seed=1, frames=40),
     "still": lambda: odd.MAKERS["still_mesh"](seed=1, frames=3, nodes=60, leaves=10),
 }
