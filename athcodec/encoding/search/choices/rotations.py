@@ -11,6 +11,7 @@ import numpy as np
 from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices import learned_bases
+from athcodec.encoding.search.hopeless import Hopeless, OnPieces
 from athcodec.encoding.search.segment_samples import FRAMES, SegmentSample
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
@@ -99,14 +100,27 @@ def _first_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings
     return in_waves, trials.cheapest(tried)
 
 
-def typical_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
-    """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left."""
-    kinds = _kinds(settings, trials)
-    in_waves = min((in_waves for in_waves, _ in kinds), key=trials.cost)
-    if any(settings.rotation_step_factors):
-        return in_waves, in_waves
+def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> list[Settings]:
+    """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left, but for those that
+    are `hopeless`. Branches that are, by their bytes in waves, have these alone."""
+    kinds, known = _kinds(settings, trials), hopeless.on_pieces
+    tried = [kind for kind in kinds if not known.leaves_out(kind[0])] or kinds
+    in_waves = _cheapest_move([in_waves for in_waves, _ in tried], trials, known)
+    if any(settings.rotation_step_factors) or hopeless.is_in_waves(trials.cost(in_waves)):
+        return [in_waves]
+    for of_kind, candidates in tried:
+        if trials.cost(of_kind) > HOPELESS_STILL * trials.cost(in_waves):
+            known.leave_out(candidates)
     in_bases = [candidate for _, candidates in reversed(kinds) for candidate in candidates]
-    return in_waves, min(in_bases, key=trials.cost, default=in_waves)
+    in_bases = [candidate for candidate in in_bases if not known.leaves_out(candidate)]
+    return [in_waves, _cheapest_move(in_bases, trials, known)] if in_bases else [in_waves]
+
+
+def _cheapest_move(moves: list[Settings], trials: Trials, known: OnPieces) -> Settings:
+    """Return the cheapest of some moves; on these pieces all others are hopeless."""
+    best = min(moves, key=trials.cost)
+    known.leave_out(move for move in moves if trials.cost(move) > trials.cost(best))
+    return best
 
 
 def _other_kind(settings: Settings) -> Settings:
