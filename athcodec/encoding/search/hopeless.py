@@ -3,38 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 
 from athcodec.encoding.segments.settings import Settings
-
-Move: TypeAlias = tuple[bool, bool, bool]
-"""Whether branches that bend turn nothing, whether time bases are learned, and whether that is one for all stages."""
 
 TOO_LARGE = 1.08  # Bytes in waves, over the fewest on other branches, above which time bases make up for nothing.
 
 
 @dataclass
 class OnPieces:
-    """What is hopeless where a clip is divided into certain pieces, whatever hangs on what: roots that turn, and moves
-    that cost more than others."""
+    """What is known where a clip is divided into certain pieces, whatever hangs on what."""
 
-    turning: bool = False
-    _moves: set[Move] = field(default_factory=set)
+    turning: bool = False  # Whether roots that turn are hopeless.
+    common_basis: bool | None = None  # Whether one time basis for all stages is better; None: it is not known.
 
-    def leaves_out(self, settings: Settings) -> bool:
-        return _move(settings) in self._moves
-
-    def leave_out(self, settings: Iterable[Settings]) -> None:
-        self._moves.update(map(_move, settings))
+    def has_hope(self, settings: Settings) -> bool:
+        """Return whether settings with time bases have those of the better kind."""
+        return self.common_basis in (None, settings.common_basis)
 
 
 @dataclass
 class Hopeless:
-    """What takes part in no more trials. Which way to move makes a file smallest hardly depends on what a piece hangs
+    """What takes part in no more trials. Which time bases make a file smallest hardly depends on what a piece hangs
     on; whether motion is predicted, hardly on the pieces either."""
 
     prediction: bool = False
@@ -50,7 +42,3 @@ class Hopeless:
         """Return whether branches whose file has so many bytes in waves are hopeless."""
         self._least_in_waves = min(self._least_in_waves, cost)
         return cost > TOO_LARGE * self._least_in_waves
-
-
-def _move(settings: Settings) -> Move:
-    return settings.still, any(settings.learned_bases), settings.common_basis

@@ -11,7 +11,7 @@ import numpy as np
 from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices import learned_bases
-from athcodec.encoding.search.hopeless import Hopeless, OnPieces
+from athcodec.encoding.search.hopeless import Hopeless
 from athcodec.encoding.search.segment_samples import FRAMES, SegmentSample
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
@@ -104,23 +104,18 @@ def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> lis
     """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left, but for those that
     are `hopeless`. Branches that are, by their bytes in waves, have these alone."""
     kinds, known = _kinds(settings, trials), hopeless.on_pieces
-    tried = [kind for kind in kinds if not known.leaves_out(kind[0])] or kinds
-    in_waves = _cheapest_move([in_waves for in_waves, _ in tried], trials, known)
-    if any(settings.rotation_step_factors) or hopeless.is_in_waves(trials.cost(in_waves)):
+    in_waves = min((in_waves for in_waves, _ in kinds), key=trials.cost)
+    least = trials.cost(in_waves)
+    if any(settings.rotation_step_factors) or hopeless.is_in_waves(least):
         return [in_waves]
-    for of_kind, candidates in tried:
-        if trials.cost(of_kind) > HOPELESS_STILL * trials.cost(in_waves):
-            known.leave_out(candidates)
-    in_bases = [candidate for _, candidates in reversed(kinds) for candidate in candidates]
-    in_bases = [candidate for candidate in in_bases if not known.leaves_out(candidate)]
-    return [in_waves, _cheapest_move(in_bases, trials, known)] if in_bases else [in_waves]
-
-
-def _cheapest_move(moves: list[Settings], trials: Trials, known: OnPieces) -> Settings:
-    """Return the cheapest of some moves; on these pieces all others are hopeless."""
-    best = min(moves, key=trials.cost)
-    known.leave_out(move for move in moves if trials.cost(move) > trials.cost(best))
-    return best
+    most = least * (HOPELESS_STILL if known.common_basis is None else 1.0)
+    of_kinds = [candidates for of_kind, candidates in reversed(kinds) if trials.cost(of_kind) <= most]
+    in_bases = [candidate for candidates in of_kinds for candidate in candidates if known.has_hope(candidate)]
+    if not in_bases:
+        return [in_waves]
+    best = min(in_bases, key=trials.cost)
+    known.common_basis = best.common_basis
+    return [in_waves, best]
 
 
 def _other_kind(settings: Settings) -> Settings:
