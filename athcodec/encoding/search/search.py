@@ -290,7 +290,9 @@ class Search:
             choices.append(finer_steps)
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
-        return self._after(choices, self.at_best_step)
+        settings = self.at_best_step
+        with self.trials.work.trying("first layer", self._share_beside(FIRST_LAYER_TRIALS * self.trials.is_layered)):
+            return self._after(choices, settings)
 
     def _share_beside(self, trials: int) -> float:
         """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
