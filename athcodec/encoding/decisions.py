@@ -22,6 +22,7 @@ from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.search.choices.prediction import FoundPrediction, best_prediction, one_map_each
+from athcodec.encoding.search.hopeless import Hopeless
 from athcodec.encoding.search.progress import (
     FILE_BYTE,
     MOTION,
@@ -127,12 +128,13 @@ class FileDecisions:
             low, high = (bound, high) if self.file_size(bound) == math.inf else (low, bound)
         return high
 
-    def tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+    def tried(self, bound: float, work: Work, frames_ratio: float, hopeless: Hopeless) -> tuple[float, bool]:
         """Return about the bytes of a file of so many times the frames, as far as the work allowed tells, and whether
-        its motion is predicted; infinite if the bound cannot be kept."""
-        return self._holding(bound)._tried(bound, work, frames_ratio)
+        its motion is predicted; infinite if the bound cannot be kept. `hopeless`: what trials on other branches have
+        shown to be so; what this one shows is added."""
+        return self._holding(bound)._tried(bound, work, frames_ratio, hopeless)
 
-    def _tried(self, bound: float, work: Work, frames_ratio: float) -> tuple[float, bool]:
+    def _tried(self, bound: float, work: Work, frames_ratio: float, hopeless: Hopeless) -> tuple[float, bool]:
         """Return two things: the estimated bytes of a file at `bound` that has `frames_ratio` times as many frames as
         the clip, infinite if the bound cannot be kept; and whether the motion of that file is predicted.
         """
@@ -141,11 +143,19 @@ class FileDecisions:
             if self.source.still:
                 return self.decide(bound).shared_bytes, False
             ath = self.seen.ath(self.thresholds(bound))
-            search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+            ratios, effort, jobs = (
+                self._layer_ratios(ath, bound, self.options.ladder),
+                self.options.effort,
+                self.options.jobs,
+            )
+            search = Search.of(self.source, ath, bound, effort, work, jobs, ratios=ratios, hopeless=hopeless)
+            if hopeless.prediction:
+                return search.expected(frames_ratio, hopeless), False
             unsearched = search.first_cost()
             prediction = self._best_prediction(bound, unsearched, work)
             if prediction is None:  # First settings rank branches as the work that is left for a search hardly does.
-                return search.expected(frames_ratio), False
+                hopeless.prediction = True
+                return search.expected(frames_ratio, hopeless), False
             predicted = frames_ratio * prediction.bytes, True
             if prediction.bytes < SEARCH_SAVES * unsearched:
                 return predicted

@@ -8,12 +8,13 @@ from itertools import chain
 
 import numpy as np
 
-from athcodec.encoding.clip.coded_clip import CodedClip
+from athcodec.encoding.clip.coded_clip import CodedClip, stored_polygons
 from athcodec.encoding.clip.places import PlacedClip
 from athcodec.encoding.clip.survey import survey
 from athcodec.encoding.decisions import FileDecisions
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.preparation.bounds import BoundOption
+from athcodec.encoding.search.hopeless import Hopeless
 from athcodec.encoding.search.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.search.segment_samples import TRIAL_FRAMES
 from athcodec.encoding.search.still import STILL_SHARE
@@ -33,37 +34,39 @@ LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
 def best_branches(
-    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool = False, is_compared: bool = False
+    clip: MotionClip, option: BoundOption, work: Work, options: EncodingOptions | None = None, is_compared: bool = False
 ) -> tuple[Found, float]:
     """Find the branches on which a clip makes the smallest file. Return them, and about the bytes of that file, which
     may be infinite unless `is_compared` is true. Unless the source names branches, those of what stands still are found
-    apart from the others, without trials on frames. `host_rest`: whether the rest pose is left out of the file.
+    apart from the others, without trials on frames. `options`: those of the file, or None for a file of one layer.
     """
+    options = EncodingOptions() if options is None else options
     least = option.least(clip)
     is_named = clip.skin is not None or named_labels(clip) is not None
-    still = None if is_named or host_rest else still_parts(clip, STILL_SHARE * least)
+    still = None if is_named or options.host_rest else still_parts(clip, STILL_SHARE * least)
     if still is None:
-        return _best_candidate(clip, option, work, host_rest, is_compared)
+        return _best_candidate(clip, option, work, options, is_compared)
     if least > 0:  # The bound of the parts is that of the whole.
         option = BoundOption(max_error=least)
     moving, standing = (clip_among(clip, np.flatnonzero(some), some is still) for some in (~still, still))
-    branches, size = _best_candidate(moving, option, work, host_rest, is_compared)
-    others, still_size = _best_candidate(standing, option, Work(), host_rest, is_compared)
+    branches, size = _best_candidate(moving, option, work, options, is_compared)
+    others, still_size = _best_candidate(standing, option, Work(), options, is_compared)
     return joined(clip, still, branches, others), size + (still_size if is_compared else 0.0)
 
 
 def _best_candidate(
-    clip: MotionClip, option: BoundOption, work: Work, host_rest: bool, is_compared: bool
+    clip: MotionClip, option: BoundOption, work: Work, options: EncodingOptions, is_compared: bool
 ) -> tuple[Found, float]:
     """Try ways to divide a clip into branches on a few frames, as many as the work allows. Return the branches that
     make the smallest file, and about its bytes, which are infinite if there was nothing to compare and `is_compared` is
     false.
 
     Of candidates of about the same size the one of lowest order wins, but one of roots alone, which has no stages,
-    comes last. Predicted motion hardly depends on branches: trials end if the first two candidates have it.
+    comes last. Predicted motion hardly depends on branches: trials end if the first two candidates have it. If the
+    same branches are smaller with vertices in the order of the source, all that follow are tried in it.
     """
     by_points = work.fits(FINDING * clip.vertex_count)
-    proposals, trial = candidates(clip, by_points), Trial(clip, option, host_rest, work)
+    proposals, trial = candidates(clip, by_points), Trial(clip, option, options, work)
     best, least, predicted = next(proposals), math.inf, 0
     tried: list[tuple[float, Found]] = []
     finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0
@@ -71,11 +74,14 @@ def _best_candidate(
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:
         return best, trial.size(best)[0] if is_compared else least
+    in_order = False  # Whether vertices are better in the order of the source, which costs no bytes.
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         before = work.done
+        branches = dataclasses.replace(branches, stem_index=None) if in_order else branches
         size, is_predicted = trial.size(branches)
         next_trial = max(trial.least_work, work.done - before)  # Settings cost about as much on other branches.
         predicted += is_predicted
+        in_order = in_order or any(_differ_in_order(one, branches) and size < other for other, one in tried[-1:])
         tried.append((size, branches))
         if number > 1:
             work.add(finding)
@@ -86,9 +92,19 @@ def _best_candidate(
     least, best = min(alike, key=_order_and_size)
     if best.stem_index is None or best.method != "motion" or not work.fits(next_trial):
         return best, least
-    unordered = dataclasses.replace(best, stem_index=None)  # The source's order of vertices costs no bytes.
+    unordered = dataclasses.replace(best, stem_index=None)
     size = trial.size(unordered)[0]
     return (unordered, size) if size < least else (best, least)
+
+
+def _differ_in_order(first: Found, second: Found) -> bool:
+    """Return whether two ways to divide a clip are the same branches, the second in the order of the source."""
+    is_order = first.stem_index is not None and second.stem_index is None
+    return (
+        is_order
+        and np.array_equal(first.vertex_branch, second.vertex_branch)
+        and np.array_equal(first.branch_parent, second.branch_parent)
+    )
 
 
 def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
@@ -98,25 +114,27 @@ def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
 
 
 class Trial:
-    """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip."""
+    """Frames from the middle of a clip, coded on different branches. Sizes are extrapolated to the whole clip. What is
+    hopeless on the branches tried first is not tried on others."""
 
-    def __init__(self, clip: MotionClip, option: BoundOption, host_rest: bool, work: Work):
-        """Read a few frames from the middle of a clip. `option`: the bound of the files; `host_rest`: whether the rest
-        pose is left out of them; `work`: counts the work of the trials.
+    def __init__(self, clip: MotionClip, option: BoundOption, options: EncodingOptions, work: Work):
+        """Read a few frames from the middle of a clip. `option`: the bound of the files; `options`: their other
+        options; `work`: counts the work of the trials.
         """
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
         self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
-        self._option, self._host_rest, self._work = option, host_rest, work
+        self._option, self._options, self._work = option, options, work
+        self._hopeless, self._polygons = Hopeless(), stored_polygons(clip, options)
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
     def size(self, branches: Found) -> tuple[float, bool]:
         """Return two things about the file of the whole clip on these branches: about its bytes, infinite if the bound
         cannot be kept; and whether its motion is predicted.
         """
-        clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._host_rest
+        clip, lossless, host_rest = with_branches(self._clip, branches), self._option.lossless, self._options.host_rest
         hierarchy = hierarchy_on(branches, clip.rest, clip.edges)
         self._work.add(SURVEY * clip.vertex_count * clip.frame_count)
         coded = CodedClip(
@@ -128,15 +146,17 @@ class Trial:
             clip.rest_given,
             exact_rest=lossless or host_rest,
             host_rest=host_rest,
+            polygons=self._polygons,
         )
         source = Source(coded, survey(clip, hierarchy), DEFAULT_SEGMENT)
-        options = EncodingOptions(attributes="none", lossless=lossless)
+        options = EncodingOptions(attributes="none", lossless=lossless, ladder=self._options.ladder)
         decisions = FileDecisions(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(decisions)
         with self._work.trying("branches", TRIAL_SHARE):
             bound = self._option.in_scene_units(source, decisions.file_size)
-            return decisions.tried(bound, self._work, self._frames_ratio)
+            self._hopeless.divide(branches.vertex_branch)
+            return decisions.tried(bound, self._work, self._frames_ratio, self._hopeless)
 
     def _bound_of_target(self, decisions: FileDecisions) -> BoundOption:
         """Return the bound at which the file on these branches has the target size. Other branches are then tried at
@@ -145,7 +165,7 @@ class Trial:
         work = Work()
 
         def size(bound: float) -> float:
-            return decisions.tried(bound, work, self._frames_ratio)[0]
+            return decisions.tried(bound, work, self._frames_ratio, Hopeless())[0]
 
         try:
             return BoundOption(max_error=self._option.in_scene_units(decisions.source, size, FILLED))

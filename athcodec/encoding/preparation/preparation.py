@@ -148,17 +148,14 @@ def _best_places(
     regular = first.regular()
     is_joined_tried = apart is not None and placed.places.count <= FEWER_PLACES * apart.places.count
     is_compared = is_joined_tried or regular is not None
-    branches, size = best_branches(_grown(first, options), option, work, options.host_rest, is_compared)
+    branches, size = best_branches(_grown(first, options), option, work, options, is_compared)
     best, least = (first, branches), size + _table_bytes(first)
     if regular is not None:
-        moved, trial = (
-            first.moved_to(branches, regular),
-            Trial(_grown(regular, options), option, options.host_rest, work),
-        )
+        moved, trial = (first.moved_to(branches, regular), Trial(_grown(regular, options), option, options, work))
         size = trial.size(moved)[0] + _table_bytes(regular)
         best, least = ((regular, moved), size) if size < least else (best, least)
     if is_joined_tried and work.fits(work.done):
-        others, size = best_branches(_grown(placed, options), option, work, options.host_rest, is_compared=True)
+        others, size = best_branches(_grown(placed, options), option, work, options, is_compared=True)
         if size + _table_bytes(placed) < JOINED_SHARE * least:
             return placed, others
     return best

@@ -21,12 +21,13 @@ from athcodec.encoding.search.choices.reference import mean_pose
 from athcodec.encoding.search.choices.rest import best_slack, with_slack
 from athcodec.encoding.search.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.search.choices.steps import best_stage_steps, best_steps, finer_steps, walked
-from athcodec.encoding.search.progress import ANALYSIS, LEARNING, START, TRIAL, Work, expected_trials
+from athcodec.encoding.search.hopeless import Hopeless, OnPieces
+from athcodec.encoding.search.progress import ANALYSIS, LEARNING, POSE, START, TRIAL, Work, expected_trials
 from athcodec.encoding.search.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.search.segment_samples import samples_of, spread_samples
 from athcodec.encoding.search.start import first_settings
 from athcodec.encoding.search.trials import Trials, distinct
-from athcodec.encoding.segments.segment import CodedPrelude, Source, branch_records
+from athcodec.encoding.segments.segment import CodedPrelude, Source, branch_records, prelude_size
 from athcodec.encoding.segments.settings import OF_SAMPLE, Choice, Settings
 from athcodec.options import MIN_SEGMENT
 
@@ -37,6 +38,7 @@ NEAR_RATIO = 1.1  # Bytes of these, over the least.
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
+HOPELESS_TURN = 1.15  # Bytes in waves with roots that turn, over those without, above which bases do not help.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
@@ -130,19 +132,19 @@ class Search:
         jobs: int | None = None,
         *,
         ratios: Sequence[int] = (1,),
+        hopeless: Hopeless | None = None,
     ) -> Search:
         """Return the search for settings of a whole plant, at `bound` and within the allowed `work`. `jobs`: threads
-        that try settings at a time; `ratios`: the step of each layer over that of the last.
+        that try settings at a time; `ratios`: the step of each layer over that of the last; `hopeless`: what trials on
+        other branches have shown to be so, or None.
         """
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
         everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
-        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios)._in_mid_turn()
-        if any(start.rotation_step_factors):  # Roots that sway far look as if they turned.
-            plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
-            other = cls(Trials(source, ath, plain, samples, everything, jobs, work), effort, ratios)
-            search = min(other, search, key=cls.first_cost)  # Shapes that turn sum a few, too.
+        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios)
+        if any(start.rotation_step_factors):
+            search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_pieces)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -206,13 +208,18 @@ class Search:
         search = self.of_sample or self
         return search._cost_of_frames(search.at_best_step, frames_ratio)
 
-    def expected(self, frames_ratio: float) -> float:
+    def expected(self, frames_ratio: float, hopeless: Hopeless) -> float:
         """Return about the bytes of a file of so many times the frames, by its bytes in waves and in time bases. What
         is compared so takes the same few trials, whatever work is left: with either alone sizes are ranked well, but
-        not one in waves against one in time bases."""
+        not one in waves against one in time bases. `hopeless`: what these trials leave out."""
         search = self.of_sample or self
-        typical = rotations.typical_moves(search.trials.start, search.trials)
-        return sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
+        typical = rotations.typical_moves(search.trials.start, search.trials, hopeless)
+        size = sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
+        if search is self:
+            return size
+        trials = self.trials  # A sample's poses tell less of the whole plant's than its motion does.
+        trials.work.add(POSE * trials.source.clip.vertex_count)
+        return size - search.trials.prelude_bytes(typical[0]) + prelude_size(trials.source, trials.ath, trials.start)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
@@ -283,7 +290,9 @@ class Search:
             choices.append(finer_steps)
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
-        return self._after(choices, self.at_best_step)
+        settings = self.at_best_step
+        with self.trials.work.trying("first layer", self._share_beside(FIRST_LAYER_TRIALS * self.trials.is_layered)):
+            return self._after(choices, settings)
 
     def _share_beside(self, trials: int) -> float:
         """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
@@ -329,15 +338,41 @@ class Search:
                     continue
             yield candidate
 
+    def _best_turn(self, most: float = HOPELESS_TURN) -> Search:
+        """Return this search, whose roots turn, or one without rotations if that begins with a smaller file: roots
+        that sway far look as if they turned, and shapes that turn sum a few, too. `most`: bytes with roots that turn,
+        over those without, both in waves, above which no more is tried."""
+        turned, plain = self._in_mid_turn(), self._without_turns()
+        if turned._cost_at_start > most * plain._cost_at_start:
+            return plain
+        return min(plain, turned, key=Search.first_cost)
+
+    def _best_turn_of_trial(self, known: OnPieces) -> Search:
+        """Return the same, from fewer trials, and note if roots that turn are hopeless on these pieces."""
+        if known.turning:
+            return self._without_turns()
+        best = self._best_turn(most=1.0)
+        known.turning = not any(best.trials.start.rotation_step_factors)
+        return best
+
+    def _without_turns(self) -> Search:
+        start = self.trials.start
+        plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
+        return Search(replace(self.trials, start=plain), self.effort, self.ratios)
+
+    @property
+    def _cost_at_start(self) -> float:
+        trials = (self.of_sample or self).trials
+        return trials.cost(trials.start)
+
     def _in_mid_turn(self) -> Search:
         """Return the search about a pose in the middle of the turns of what turns as a whole, if that is cheaper: a
         rotation by a full turn has no numbers, and jumps before."""
-        if not any(self.trials.start.rotation_step_factors) or not self._may_have_mean_pose:
+        if not self._may_have_mean_pose:
             return self
         self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
-        of_mean, of_rest = ((one.of_sample or one).trials for one in (other, self))
-        return other if of_mean.cost(of_mean.start) < of_rest.cost(of_rest.start) else self
+        return other if other._cost_at_start < self._cost_at_start else self
 
     @property
     def _may_have_mean_pose(self) -> bool:

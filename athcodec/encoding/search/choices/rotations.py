@@ -11,6 +11,7 @@ import numpy as np
 from athcodec.decoding.container import ROTATION_FACTORS
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices import learned_bases
+from athcodec.encoding.search.hopeless import Hopeless
 from athcodec.encoding.search.segment_samples import FRAMES, SegmentSample
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source
@@ -109,14 +110,22 @@ def _first_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings
     return in_waves, trials.cheapest(tried)
 
 
-def typical_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings]:
-    """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left."""
-    kinds = _kinds(settings, trials)
+def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> list[Settings]:
+    """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left, but for those that
+    are `hopeless`. Branches that are, by their bytes in waves, have these alone."""
+    kinds, known = _kinds(settings, trials), hopeless.on_pieces
     in_waves = min((in_waves for in_waves, _ in kinds), key=trials.cost)
-    if any(settings.rotation_step_factors):
-        return in_waves, in_waves
-    in_bases = [candidate for _, candidates in reversed(kinds) for candidate in candidates]
-    return in_waves, min(in_bases, key=trials.cost, default=in_waves)
+    least = trials.cost(in_waves)
+    if any(settings.rotation_step_factors) or hopeless.is_in_waves(least):
+        return [in_waves]
+    most = least * (HOPELESS_STILL if known.common_basis is None else 1.0)
+    of_kinds = [candidates for of_kind, candidates in reversed(kinds) if trials.cost(of_kind) <= most]
+    in_bases = [candidate for candidates in of_kinds for candidate in candidates if known.has_hope(candidate)]
+    if not in_bases:
+        return [in_waves]
+    best = min(in_bases, key=trials.cost)
+    known.common_basis = best.common_basis
+    return [in_waves, best]
 
 
 def _other_kind(settings: Settings) -> Settings:

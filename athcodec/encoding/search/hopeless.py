@@ -1,0 +1,44 @@
+"""What trials on some branches have shown to be hopeless, so that trials on other branches of the clip leave it out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from athcodec.encoding.segments.settings import Settings
+
+TOO_LARGE = 1.08  # Bytes in waves, over the fewest on other branches, above which time bases make up for nothing.
+
+
+@dataclass
+class OnPieces:
+    """What is known where a clip is divided into certain pieces, whatever hangs on what."""
+
+    turning: bool = False  # Whether roots that turn are hopeless.
+    common_basis: bool | None = None  # Whether one time basis for all stages is better; None: it is not known.
+
+    def has_hope(self, settings: Settings) -> bool:
+        """Return whether settings with time bases have those of the better kind."""
+        return self.common_basis in (None, settings.common_basis)
+
+
+@dataclass
+class Hopeless:
+    """What takes part in no more trials. Which time bases make a file smallest hardly depends on what a piece hangs
+    on; whether motion is predicted, hardly on the pieces either."""
+
+    prediction: bool = False
+    on_pieces: OnPieces = field(default_factory=OnPieces)
+    _least_in_waves: float = math.inf  # Bytes of the smallest file with waves so far.
+    _known: dict[bytes, OnPieces] = field(default_factory=dict)
+
+    def divide(self, vertex_branch: np.ndarray) -> None:
+        """Go on with trials on these pieces, (N,)."""
+        self.on_pieces = self._known.setdefault(vertex_branch.tobytes(), OnPieces())
+
+    def is_in_waves(self, cost: float) -> bool:
+        """Return whether branches whose file has so many bytes in waves are hopeless."""
+        self._least_in_waves = min(self._least_in_waves, cost)
+        return cost > TOO_LARGE * self._least_in_waves
