@@ -23,7 +23,7 @@ HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not 
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
 FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
 
-FINEST = 1  # Rotation factor of the finest turns.
+FINEST = ROTATION_FACTORS[1]
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
 MOST_BENT = 0.25  # Largest share of the squares of its motion about its centre that is then no turn.
 
