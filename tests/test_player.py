@@ -66,7 +66,7 @@ def lib(tmp_path_factory):
     loaded = ctypes.CDLL(str(folder / "player.so"))
     for name in ("begin", "file", "fault"):
         getattr(loaded, f"ath_player_{name}").restype = c_void_p
-    loaded.ath_player_prepared.restype = loaded.counted_blocks.restype = c_uint64
+    loaded.ath_player_prepared.restype = loaded.counted_work.restype = c_uint64
     return loaded
 
 
@@ -336,7 +336,7 @@ def works(player: Player, *calls) -> np.ndarray:
     lib, totals = player.lib, []
     for call in (lambda: None, *calls):
         call()
-        totals.append((lib.ath_player_prepared(player.player), lib.counted_blocks()))
+        totals.append((lib.ath_player_prepared(player.player), lib.counted_work()))
     return np.diff(np.array(totals, np.int64), axis=0)
 
 
