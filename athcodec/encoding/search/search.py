@@ -39,6 +39,7 @@ STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
 SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
 HOPELESS_TURN = 1.15  # Bytes in waves with roots that turn, over those without, above which bases do not help.
+WORTHY_TURN = 0.95  # The same up to which trials of branches look at roots that turn.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
@@ -351,7 +352,7 @@ class Search:
         """Return the same, from fewer trials, and note if roots that turn are hopeless on these pieces."""
         if known.turning:
             return self._without_turns()
-        best = self._best_turn(most=1.0)
+        best = self._best_turn(most=WORTHY_TURN)
         known.turning = not any(best.trials.start.rotation_step_factors)
         return best
 

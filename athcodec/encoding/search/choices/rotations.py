@@ -118,9 +118,7 @@ def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> lis
     least = trials.cost(in_waves)
     if any(settings.rotation_step_factors) or hopeless.is_in_waves(least):
         return [in_waves]
-    most = least * (HOPELESS_STILL if known.common_basis is None else 1.0)
-    of_kinds = [candidates for of_kind, candidates in reversed(kinds) if trials.cost(of_kind) <= most]
-    in_bases = [candidate for candidates in of_kinds for candidate in candidates if known.has_hope(candidate)]
+    in_bases = [candidate for _, in_bases in reversed(kinds) for candidate in in_bases if known.has_hope(candidate)]
     if not in_bases:
         return [in_waves]
     best = min(in_bases, key=trials.cost)
