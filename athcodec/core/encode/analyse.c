@@ -4,10 +4,10 @@
 #include "model/lanes.h"
 
 enum { ROTATION_STEPS = 5 };
-enum { WAVES = 8 }; /* waves that a row is projected on at once */
+enum { WAVES = 8 };                           /* waves that a row is projected on at once */
 enum { STIFF_FRAMES = 16, STIFF_PASSES = 6 }; /* frames and passes that tell which vertices of a tree bend least */
 
-static const double STANDING = 0.1; /* largest RMS motion of a foot that stands, over that of its plant */
+static const double STANDING = 0.1;  /* largest RMS motion of a foot that stands, over that of its plant */
 static const double STIFFEST = 1e-4; /* squared bend below which vertices count alike, over the mean of their tree */
 
 static double absolute(double x) { return x < 0.0 ? -x : x; }
@@ -315,7 +315,8 @@ static double squared_bend(int32_t T, const int32_t *frame, int32_t frames, cons
     for (int32_t i = 0; i < frames; i++)
         for (int32_t j = 0; j < 3; j++) {
             const double *row = R[i] + 3 * j;
-            double away = x[j * T + frame[i]] - base[j * T + frame[i]] - (row[0] * d[0] + row[1] * d[1] + row[2] * d[2]);
+            double away =
+                x[j * T + frame[i]] - base[j * T + frame[i]] - (row[0] * d[0] + row[1] * d[1] + row[2] * d[2]);
             sum += away * away;
         }
     return sum / (double)frames;
