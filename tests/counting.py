@@ -13,7 +13,8 @@ from fuzz.targets import COMMON, CORE, compiler, decoder_sources
 
 from athcodec import _native
 
-CALL, OPCODE = 0, 7  # PyTrace_CALL and PyTrace_OPCODE of Python's C API
+CALL = 0  # PyTrace_CALL of Python's C API
+OPCODE = 7  # PyTrace_OPCODE of Python's C API
 
 # Hidden, because functions that choose among clones call it while the library is still being loaded. Python calls
 # `trace` for every event: one in Python would take most of the time of what it counts.

@@ -64,6 +64,23 @@ def printed(*words: object, code: int = 0, timeout: float = 600, **options: Any)
     return done.stdout
 
 
+PEAK = """
+import re, resource, sys
+from pathlib import Path
+def peak():
+    status = Path("/proc/self/status")  # getrusage counts what the parent process had as well
+    if status.exists():
+        return int(re.search(r"VmHWM:\\s+(\\d+)", status.read_text())[1]) * 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+"""
+"""Text of a program of Python: a function that returns the largest resident memory of its process, in bytes."""
+
+
+def peak_of(program: str, *words: object) -> int:
+    """Return the largest resident memory, in bytes, of a process that runs the text of a program of Python."""
+    return int(printed(sys.executable, "-c", f"{PEAK}\n{program}\nprint(peak())", *words))
+
+
 def run_script(python: str, script: str, *arguments: object) -> str:
     return printed(python, "-c", script, *arguments)
 

@@ -9,7 +9,9 @@ import pytest
 import athcodec
 from athcodec.motion.branches.grown_pose import grown_pose, with_grown_pose
 
-ORGANS, VERTICES, FRAMES = 10, 20, 24
+ORGANS = 10  # leaves of the plant
+VERTICES = 20  # vertices of each leaf
+FRAMES = 24  # a second
 
 
 def growing_organs(decay: bool = False) -> athcodec.MotionClip:

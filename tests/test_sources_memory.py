@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from glb import glb
-from programs import printed
+from programs import PEAK, printed
 
 import athcodec
 from athcodec.errors import ClipError
@@ -26,11 +26,8 @@ pytestmark = pytest.mark.formats
 
 BUDGET = 64 << 20
 READER = 512 << 20  # a process that reads: Python, USD, and the stacks of threads
-READ = """
-import re, resource, sys
-from pathlib import Path
+READ = f"""{PEAK}
 import athcodec, h5py, numpy
-def peak(): return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]) * 1024
 import athcodec.sources.gltf, athcodec.sources.hdf5, athcodec.sources.npz, athcodec.sources.xdmf, athcodec.sources.vtk
 import athcodec.sources.vtkhdf, athcodec.sources.npy, athcodec.sources.mat
 before = peak()

@@ -7,22 +7,17 @@ from __future__ import annotations
 
 import multiprocessing
 import random
-import re
-import resource
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from bench.memory import peak_bytes
 from spec.robust import Row
 
 HANG_SECONDS = 120.0
 POLL_SECONDS = 0.2
 FREE_MEMORY = 64 << 20
 """Allowed growth of a process besides that of a case: caches of the allocator, modules imported late."""
-_STATUS = Path("/proc/self/status")
-_PEAK_UNIT = 1 if sys.platform == "darwin" else 1024
 
 
 class Wrong(Exception):
@@ -95,7 +90,7 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
             return
         at.value = place
         name, argument = cases.arguments[order[place]]
-        before = _peak()
+        before = peak_bytes()
         try:
             allowed = cases.attempt(cases.files[name], argument)
         except MemoryError as error:
@@ -104,15 +99,7 @@ def _work(cases: Cases, order: list[int], start: int, deadline: float, at, messa
         except BaseException as error:  # pytest.fail does not raise an Exception
             messages.put((place + 1, "wrong", f"{name} {argument}: {error!r}"))
             return
-        if _peak() - before > allowed + FREE_MEMORY:
-            messages.put((place + 1, "over_limit", f"{name} {argument}: {_peak() - before} bytes"))
+        if peak_bytes() - before > allowed + FREE_MEMORY:
+            messages.put((place + 1, "over_limit", f"{name} {argument}: {peak_bytes() - before} bytes"))
             return
     messages.put((len(order), "", ""))
-
-
-def _peak() -> int:
-    """Return the peak in bytes. On Linux getrusage's peak is inherited from the parent process; that of /proc is
-    not."""
-    if _STATUS.exists():
-        return int(re.search(r"VmHWM:\s+(\d+)", _STATUS.read_text())[1]) * 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _PEAK_UNIT

@@ -4,8 +4,9 @@
 #include "model/lanes.h"
 
 enum { ROTATION_STEPS = 5 };
-enum { WAVES = 8 };                           /* waves that a row is projected on at once */
-enum { STIFF_FRAMES = 16, STIFF_PASSES = 6 }; /* frames and passes that tell which vertices of a tree bend least */
+enum { WAVES = 8 };         /* waves that a row is projected on at once */
+enum { STIFF_FRAMES = 16 }; /* frames that tell which vertices of a tree bend least */
+enum { STIFF_PASSES = 6 };  /* passes over these frames */
 
 static const double STANDING = 0.1;  /* largest RMS motion of a foot that stands, over that of its plant */
 static const double STIFFEST = 1e-4; /* squared bend below which vertices count alike, over the mean of their tree */
@@ -407,8 +408,8 @@ ATH_HOT static void nearest_rotations(double H[9][ATH_LANES], const double befor
 /* Fills the piece's own rotation relative to its predicted one, as rotation vectors over time, unwrapped. local: its
  * vertices relative to the attach point, in the predicted frame. A turn that they show no better than an error of
  * `step` does, such as the twist of a straight stem, stays as in the frame before. carried: the source, if the branches
- * on a root tell more; else 0. stiff: whether what bends least of them tells most. about_centre: whether the piece turns
- * about its centre, so that an error of its attach point does not turn it. */
+ * on a root tell more; else 0. stiff: whether the source alone tells, and most of it what bends least; then local is not
+ * read. about_centre: whether the piece turns about its centre, so that an error of its attach point does not turn it. */
 static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece, double step, const double *local,
                          const double *carried, int stiff, int about_centre, double *omega)
 {
@@ -418,7 +419,6 @@ static void fit_rotation(const ath_plan *plan, int32_t T, const ath_piece *piece
     products sums;
     memcpy(a, ath_rest_attach(plan, piece), sizeof a);
     if (about_centre) rest_centre(plan, piece, a);
-    stiff = stiff && carried;
     double size2 = stiff ? sum_stiff(plan, T, piece, carried, sums)
                          : sum_products(plan, T, piece->first, piece->count, a, local, 0, sums);
     if (carried && !stiff) add_carried(plan, T, piece, carried, size2, sums);
@@ -534,10 +534,9 @@ static void analyse_tracks(const ath_plan *plan, const ath_motion *motion, const
         if (keeps)
             keep_track(base, T, turning.steps, rows->predicted_rotation, scratch->track, rows->rotation);
         else {
-            int carries = turned_vertices(plan, piece) > piece->count;
-            to_local(T, piece, &scratch->at, source, local);
-            fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, rounding->roots_turn, floats,
-                         scratch->track);
+            int carries = turned_vertices(plan, piece) > piece->count, stiff = carries && rounding->roots_turn;
+            if (!stiff) to_local(T, piece, &scratch->at, source, local);
+            fit_rotation(plan, T, piece, base->step, local, carries ? source : 0, stiff, floats, scratch->track);
             ath_into_axes(T, &turning, scratch->track);
             code_track(base, T, turning.steps, rounding, scratch->track, rows->predicted_rotation, rows->rotation, 1);
         }
