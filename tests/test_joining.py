@@ -77,11 +77,11 @@ def test_one_file_is_smaller_than_one_for_each_clip(sample_clip, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_size_does_not_depend_on_the_order_of_the_clips(medley_clips, tmp_path):
-    names, sizes = list(medley_clips), []
-    for order in (names, names[::-1], names[1:] + names[:1]):
-        joined = athcodec.join({name: medley_clips[name] for name in order})
-        sizes.append(athcodec.encode(joined, tmp_path / "a.ath", max_error=1e-3, segment_frames=16).bytes)
+def test_the_size_does_not_depend_on_the_order_of_the_clips(sample_clip, tmp_path):
+    clips, sizes = {"a": part(sample_clip, 0, 50), "b": part(sample_clip, 50, 80), "c": part(sample_clip, 80, 120)}, []
+    for order in ("abc", "cba", "bca"):
+        joined = athcodec.join({name: clips[name] for name in order})
+        sizes.append(athcodec.encode(joined, tmp_path / "a.ath", rel_error=1e-3).bytes)
     assert max(sizes) - min(sizes) < 0.01 * max(sizes)
 
 

@@ -166,9 +166,10 @@ def test_verify_accepts_still_clips_of_float64_with_an_exact_rest_pose(tmp_path,
         assert cli.main(["verify", encoded, "--against", str(source)]) == 0, capsys.readouterr().err
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("options", [{"rest_error": 1e-2}, {"exact_rest": True}])
-def test_a_single_point_is_as_close_as_its_file_says(tmp_path, options):
-    clip = athcodec.MotionClip(np.full((1, 1, 3), 1e-7, np.float32), [0.0], [0], [-1])
+def test_a_single_point_is_as_close_as_its_file_says(tmp_path, options, dtype):
+    clip = athcodec.MotionClip(np.full((1, 1, 3), 1e-7, dtype), [0.0], [0], [-1])
     athcodec.encode(clip, tmp_path / "a.ath", rel_error=1e-2, effort="fast", **options)
     assert understated(tmp_path / "a.ath", clip) == []
 

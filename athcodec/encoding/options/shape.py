@@ -52,11 +52,13 @@ class RestPrecision:
             raise BoundError(f"rest error: got {option}; expected a length or a fraction above 0, or {OF_BOUND!r}")
         return precision
 
-    def error(self, metadata: JsonMapping, diagonal: float) -> float:
-        """Return the largest error that is asked for, in the scene units of some metadata; infinite: none is."""
+    def error(self, metadata: JsonMapping, diagonal: float, least: float) -> float:
+        """Return the largest error that is asked for, in the scene units of some metadata; infinite: none is. A
+        fraction asks for no less than `least`, such as that of a plant whose vertices coincide.
+        """
         if self.length is not None:
             return self.length.in_scene_units(scene_unit(metadata))
-        return math.inf if self.fraction is None else self.fraction * diagonal
+        return math.inf if self.fraction is None else max(self.fraction * diagonal, least)
 
     def details(
         self, faces: tuple[np.ndarray, np.ndarray] | None, rest: np.ndarray, hierarchy: Hierarchy, diagonal: float

@@ -14,11 +14,12 @@ BEFORE_STEPS = (  # Learned modes are of pieces, which forms decide on, so they 
     "best_bases",
     "best_forms_again",
 )
-AFTER_STEPS = (  # Small clips alone are settled.
+AFTER_STEPS = (  # Small clips alone are settled, for much work: rotations that pay with learned modes come first.
+    "best_rotations",
     "settled",
     "calm_parts",
     "best_slack",
     "waves_if_smaller",
-    "best_rotations",
     "best_bases",
+    "finer_steps",
 )

@@ -287,8 +287,6 @@ class Search:
         """Return the best settings found for a file of one layer."""
         names = () if self.effort == "fast" else order.AFTER_STEPS
         choices = [BY_NAME[name] for name in names if self.makes_all_again or name != settled.__name__]
-        if self.effort == "best" and self.trials.source.weights is None:
-            choices.append(finer_steps)
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
         settings = self.at_best_step

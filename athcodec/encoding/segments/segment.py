@@ -113,7 +113,8 @@ class Source:
                 self.clip.motion.polygons, self.clip.rest, self.hierarchy, diagonal
             )
             self.details, self.keeps_shape = self.shapes
-            error = precision.error(self.clip.motion.metadata, diagonal)
+            least = 2 * qz.least_bound(self.seen.low, self.seen.high, self.clip.dtype)
+            error = precision.error(self.clip.motion.metadata, diagonal, least)
             is_stored = self.reference is None or self.clip.rest_given
             if math.isfinite(error) and is_stored and not self.exact_rest:
                 self.rest_error = qz.error_limit(error, diagonal)
