@@ -41,6 +41,7 @@ SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that 
 HOPELESS_TURN = 1.15  # Bytes in waves with roots that turn, over those without, above which bases do not help.
 WORTHY_TURN = 0.95  # The same up to which trials of branches look at roots that turn.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
+FIRST_POSE_TRIALS = 6  # Trials that show whether another reference pose is better at once.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -387,12 +388,9 @@ class Search:
         """
         if not self._may_have_mean_pose:
             return self
-        work, tried = self.trials.work, (self.of_sample or self).trials
-        maps = 0.0 if tried.is_layered else 2 * work_of_steps(tried)
-        with work.trying("mean pose"):
-            if not work.fits((POSE_TRIALS + STEP_TRIALS) * tried.work_of_trial + maps):
-                return self
-        work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
+        if not self._leaves_steps(POSE_TRIALS if self.makes_all_again else FIRST_POSE_TRIALS):
+            return self
+        self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
         other = self.about_mean_pose()
         about_rest, about_mean = self.of_sample or self, other.of_sample or other
         if not self.makes_all_again:
@@ -400,10 +398,19 @@ class Search:
             of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
             if (of_rest > of_mean).all():
                 return other
+            if not self._leaves_steps(POSE_TRIALS):
+                return self
         cost = about_rest._cost_to_compare()
         if not self.makes_all_again:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
         return other if about_mean._cost_to_compare() < cost else self
+
+    def _leaves_steps(self, trials: int) -> bool:
+        """Return whether so many trials about another reference pose leave work for those of steps, and of maps."""
+        work, tried = self.trials.work, (self.of_sample or self).trials
+        maps = 0.0 if tried.is_layered else 2 * work_of_steps(tried)
+        with work.trying("mean pose"):
+            return work.fits((trials + STEP_TRIALS) * tried.work_of_trial + maps)
 
     def _cost_to_compare(self) -> float:
         """Return the bytes of this search's file so far, by which it is compared with one about another reference
