@@ -801,7 +801,7 @@ REFINED = {
     "layers": ("bushy_clip", {"ladder": LADDER}),
     "shapes": ("full_clip", {"ladder": LADDER, "rest_error": "bound"}),
     "time bases": ("bushy_clip", {"ladder": (1e-1, 1e-2), "rel_error": 1e-3, "segment_frames": 32}),
-    "clips": ("medley_clips", {"ladder": LADDER}),
+    "clips": ("medley_clips", {"ladder": (1e-2, 5e-4)}),
     "lossless": ("full_clip", {"ladder": LADDER, "lossless": True, "rest_error": "bound"}),
     "float64": ("distant_clip", {"ladder": LADDER, "lossless": True}),
     "one layer": ("full_clip", {"lossless": True, "rest_error": "bound"}),
