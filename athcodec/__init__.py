@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # Type checkers and the reference look here for what __getatt
     from athcodec.truncation import truncate
     from athcodec.viewer.frame import Frame
 
-__version__ = "0.13.0"
+__version__ = "1.0.0"
 __all__ = [
     "Ath",
     "AthFile",

@@ -15,7 +15,6 @@ from athcodec._native import lib
 from athcodec.decoding import container, core_file
 from athcodec.encoding.segments import layers
 from athcodec.encoding.segments.segmentation import decoding_bytes
-from spec import stamp
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE, VIEWER = ROOT / "athcodec" / "core", ROOT / "athcodec" / "viewer"
@@ -50,25 +49,6 @@ def test_the_version_of_the_format_is_the_same_everywhere():
     version = C["FORMAT_MAJOR"], C["FORMAT_MINOR"]
     assert version == (container.MAJOR, container.MINOR)
     assert FORMAT.splitlines()[2] == "Format_Version {}.{}".format(*version)
-
-
-def test_the_version_stands_once_wherever_a_stamp_would_write_another():
-    version = str(container.MAJOR), str(container.MINOR)
-    assert sum(map(len, stamp.PLACES.values())) == 5
-    for path, patterns in stamp.PLACES.items():
-        assert [re.findall(pattern, path.read_text("utf-8"), re.M) for pattern in patterns] == [[version]] * len(
-            patterns
-        )
-
-
-def test_a_stamp_changes_the_version_and_the_checksum_of_a_front_alone():
-    data = (stamp.VECTORS / "valid" / "traced.ath").read_bytes()
-    old = container.MAJOR, container.MINOR
-    changed = stamp.stamped(data, old, (1, 7))
-    assert (
-        changed[8:10] == b"\1\7" and changed[:8] + changed[10:12] + changed[16:] == data[:8] + data[10:12] + data[16:]
-    )
-    assert stamp.stamped(changed, (1, 7), old) == data and stamp.stamped(changed, old, (1, 0)) is None
 
 
 def test_chunks_have_the_same_kinds_and_names_everywhere():

@@ -111,15 +111,6 @@ def test_every_error_that_the_code_names_exists():
     assert used <= names and {"TRUNCATED", "BAD_HEADER", "BAD_CHUNK_TABLE", "LIMIT_EXCEEDED"} <= used
 
 
-@pytest.mark.parametrize(
-    "own, known, unknown",
-    [((0, 14), [(0, 14)], [(0, 13), (0, 15), (1, 0)]), ((1, 0), [(1, 0), (1, 7), (1, 255)], [(0, 14), (2, 0), (2, 7)])],
-)
-def test_a_decoder_before_1_0_takes_its_own_version_and_one_of_1_x_every_minor_version(spec, own, known, unknown):
-    rule = type(spec.is_known_version)(spec.is_known_version.__code__, {"VERSION": own})
-    assert all(rule(*version) for version in known) and not any(rule(*version) for version in unknown)
-
-
 @pytest.mark.parametrize("name", ["errors-announced", "errors-by-chance", "everything", "clips-three"])
 def test_the_error_table_of_a_vector_is_the_same_to_the_document_and_the_code(spec, name):
     """No item of the vectors asks for it."""

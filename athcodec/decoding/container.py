@@ -24,7 +24,7 @@ from athcodec.options import set_numbers
 from athcodec.untyped import JsonObject, JsonValue
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR, FEATURES = 0, 16, 0
+MAJOR, MINOR, FEATURES = 1, 0, 0
 NO_LEVEL = 255
 WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(3)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation

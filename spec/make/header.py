@@ -94,21 +94,6 @@ def later_minor() -> Draft:
     )
 
 
-def version(title: str, minor: int, made: Callable[[], Draft] = lambda: lone().draft(), **fields) -> None:
-    """Declare a vector with the minor version `minor` in its header, which a decoder accepts or refuses by the rule of
-    its own version. `made` returns the draft, and `title` names the vector.
-    """
-    name, reason = title.split(": ", 1)
-    name, *errors = name.split()
-
-    def make() -> Draft:
-        return made().with_header(minor=minor, **fields)
-
-    if not rules.is_known_version(rules.VERSION[0], minor):
-        errors = ["UNSUPPORTED_VERSION"]
-    (invalid if errors else valid)(f"{' '.join([name, *errors])}: {reason}", make)
-
-
 def shown(*levels: int) -> Draft:
     """Return the fork, of which these levels are shown."""
     draft = fork().with_header(stages=levels, level_count=len(levels), full_level_count=len(levels))
@@ -164,10 +149,16 @@ invalid("cut-in-front-stream TRUNCATED: ends inside the front stream", lambda: f
 invalid("cut-in-checksums TRUNCATED: ends inside the checksums", lambda: first_bytes(rules.u32(lone().file(), 16) - 1))
 header("major-next UNSUPPORTED_VERSION: the next Major_Version", major=rules.VERSION[0] + 1, minor=0)
 header("major-last UNSUPPORTED_VERSION: the last Major_Version", major=255)
-version("minor-7: Minor_Version 7, an earlier or a later one", 7)
-version("minor-last: Minor_Version 255", 255)
-version("minor-7-with-what-is-new: Minor_Version 7, with optional kinds and members that are new", 7, made=later_minor)
-version("minor-7-feature UNSUPPORTED_FEATURE: Minor_Version 7, with a feature that is new", 7, features=1 << 6)
+valid("minor-7: Minor_Version 7, an earlier or a later one", lambda: lone().with_header(minor=7))
+valid("minor-last: Minor_Version 255", lambda: lone().with_header(minor=255))
+valid(
+    "minor-7-with-what-is-new: Minor_Version 7, with optional kinds and members that are new",
+    lambda: later_minor().with_header(minor=7),
+)
+invalid(
+    "minor-7-feature UNSUPPORTED_FEATURE: Minor_Version 7, with a feature that is new",
+    lambda: lone().with_header(minor=7, features=1 << 6),
+)
 header("feature-first UNSUPPORTED_FEATURE: the lowest bit of Features is set", features=1)
 header("feature-last UNSUPPORTED_FEATURE: the highest bit of Features is set", features=1 << 15)
 header("feature-and-version UNSUPPORTED_VERSION: what Features means is for the version to say", major=254, features=1)

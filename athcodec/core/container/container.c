@@ -54,17 +54,11 @@ static uint32_t word_at(const uint8_t *bytes, size_t available, size_t at)
     return word;
 }
 
-/* In format 0.x a minor version may change anything, so both numbers have to match. From 1.0 on a minor version only
- * adds what a decoder skips, or what a bit of Features announces. */
-static int is_known_version(uint32_t major, uint32_t minor)
-{
-    return major == ATH_FORMAT_MAJOR && (major > 0 || minor == ATH_FORMAT_MINOR);
-}
-
+/* A minor version only adds what a decoder skips, or what a bit of Features announces. */
 static int check_version(uint32_t major, uint32_t minor, uint32_t features, ath_fault_info *fault)
 {
     double known = (double)(ATH_FORMAT_MAJOR << 8 | ATH_FORMAT_MINOR), found = (double)(major << 8 | minor);
-    if (!is_known_version(major, minor))
+    if (major != ATH_FORMAT_MAJOR)
         return ath_refuse(fault, ATH_UNSUPPORTED_VERSION, ATH_FIELD_VERSION, found, known, known);
     if ((features & ~(uint32_t)ATH_FEATURES) == 0) return ATH_OK;
     return ath_refuse(fault, ATH_UNSUPPORTED_FEATURE, ATH_FIELD_FEATURES, (double)(features & ~(uint32_t)ATH_FEATURES),

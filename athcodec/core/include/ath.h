@@ -90,9 +90,8 @@ ATH_API const char *ath_result_name(int result);
 
 /* ---- constants of the format ------------------------------------------------------------------------------------- */
 
-/* A decoder of format 0.x reads files of its own version only, one of format 1.x those of every 1.y. ATH_FEATURES has a
- * bit for each known feature. */
-enum { ATH_FORMAT_MAJOR = 0, ATH_FORMAT_MINOR = 16, ATH_FEATURES = 0 };
+/* A decoder reads files of every minor version. ATH_FEATURES has a bit for each known feature. */
+enum { ATH_FORMAT_MAJOR = 1, ATH_FORMAT_MINOR = 0, ATH_FEATURES = 0 };
 
 /* Kinds of chunks. A decoder skips unknown kinds with the bit ATH_OPTIONAL. */
 enum {
