@@ -30,6 +30,7 @@ from athcodec.options import DEFAULT_SEGMENT
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
 TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
 ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
+SAME = 1.02  # The same up to which fewer branches of the same order are better.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
@@ -87,9 +88,7 @@ def _best_candidate(
             work.add(finding)
             if predicted == number or not work.fits(finding + next_trial):
                 break
-    fewest = min(size for size, _ in tried)
-    alike = [one for one in tried if one[0] <= ALIKE * fewest]
-    least, best = min(alike, key=_order_and_size)
+    least, best = _best_of(tried)
     if best.stem_index is None or best.method != "motion" or not work.fits(next_trial):
         return best, least
     unordered = dataclasses.replace(best, stem_index=None)
@@ -107,10 +106,26 @@ def _differ_in_order(first: Found, second: Found) -> bool:
     )
 
 
+def _best_of(tried: list[tuple[float, Found]]) -> tuple[float, Found]:
+    """Return the best of the candidates that were tried, with about the bytes of its file: among those of about the
+    same size one of the lowest order, but of roots alone last; among the smallest of these the one of the fewest
+    branches.
+    """
+    fewest = min(size for size, _ in tried)
+    alike = [one for one in tried if one[0] <= ALIKE * fewest]
+    least, best = min(alike, key=_order_and_size)
+    same = [one for one in alike if _order(one[1]) == _order(best) and one[0] <= SAME * least]
+    return min(same, key=lambda one: (len(one[1].branch_parent), one[0]))
+
+
 def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
     size, branches = tried
-    order = int(branch_orders(branches.branch_parent).max())
+    order = _order(branches)
     return order == 0, order, size
+
+
+def _order(branches: Found) -> int:
+    return int(branch_orders(branches.branch_parent).max())
 
 
 class Trial:

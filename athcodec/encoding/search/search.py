@@ -286,8 +286,10 @@ class Search:
     @cached_property
     def best(self) -> Settings:
         """Return the best settings found for a file of one layer."""
-        names = () if self.effort == "fast" else order.AFTER_STEPS
-        choices = [BY_NAME[name] for name in names if self.makes_all_again or name != settled.__name__]
+        choices = [] if self.effort == "fast" else [BY_NAME[name] for name in order.AFTER_STEPS]
+        if not self.makes_all_again:
+            left_out = [settled, finer_steps] if self.trials.is_layered and self.effort != "best" else [settled]
+            choices = [choose for choose in choices if choose not in left_out]
         if not self.trials.is_layered:  # The first of several layers has maps, and chooses their steps itself.
             choices = [*choices, best_node_steps]
         settings = self.at_best_step
