@@ -89,3 +89,12 @@ def test_patches_that_hang_on_nothing_are_tried_at_the_usual_effort():
     clip = singles.cloth_leaf(seed=38, frames=40).bare()
     usual, best = (len(athcodec.encode(clip, effort=effort, rel_error=1e-4)) for effort in ("default", "best"))
     assert usual <= 1.05 * best
+
+
+@pytest.mark.parametrize("of_torn, is_torn", [(1000.0, False), (900.0, True)])
+def test_a_plant_is_not_divided_where_that_saves_less_than_trials_err_by(of_torn, is_torn, hedge, monkeypatch):
+    single = Found(np.zeros(hedge.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
+    torn = Found(np.arange(hedge.vertex_count, dtype=np.int32) % 3, np.full(3, -1, np.int32), None, "motion")
+    monkeypatch.setattr(branch_trials, "candidates", lambda clip, by_points: iter([single, torn]))
+    monkeypatch.setattr(Trial, "size", lambda self, branches: (of_torn if branches is torn else 1010.0, False))
+    assert best_branches(hedge, BOUND, Work())[0] is (torn if is_torn else single)
