@@ -36,7 +36,7 @@ from athcodec.encoding.search.progress import (
     silent,
 )
 from athcodec.encoding.search.sample import is_small
-from athcodec.encoding.search.search import Search
+from athcodec.encoding.search.search import PosesBeside, Search
 from athcodec.encoding.search.segment_samples import typical_segments
 from athcodec.encoding.search.start import still_choice
 from athcodec.encoding.search.still import STILL_SHARE, SplitSource
@@ -80,6 +80,7 @@ class FileDecisions:
     spent: float = 0.0  # Work of finding branches.
     predicts_as_usual: bool = False  # Whether no other way to predict motion is tried.
     untried: tuple[str, ...] = ()  # What that left out.
+    beside: PosesBeside | None = None  # What the poses of branches that stand still add, if these are no part of it.
 
     @property
     def clip(self) -> CodedClip:
@@ -170,7 +171,9 @@ class FileDecisions:
         self._check(bound)
         holding = self._holding(bound)
         split = holding._split(bound, self.thresholds(bound))
-        moving = holding if split is None else dataclasses.replace(holding, source=split.moving_source)
+        moving = holding
+        if split is not None:
+            moving = dataclasses.replace(holding, source=split.moving_source, beside=split.poses_beside(bound))
         work = moving._allowed_work(bound)
         decided = moving._decide(bound, work)
         if split is not None:
@@ -272,6 +275,7 @@ class FileDecisions:
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
         search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios=ratios)
+        search.beside = self.beside
         if self._has_usual_ladder and search.stages_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
         with work.trying("segments"):

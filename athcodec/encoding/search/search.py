@@ -45,6 +45,7 @@ FIRST_POSE_TRIALS = 6  # Trials that show whether another reference pose is bett
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
+PosesBeside = Callable[[Trials, Settings], float]
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
@@ -111,12 +112,15 @@ class Search:
     """Finds the settings of a file, in the order in which its choices depend on each other.
 
     The order is its only job: how a choice is made stands in choices/, how its bytes are counted in trials.py. `ratios`
-    are those of the steps of the file's layers to that of the last, descending to 1.
+    are those of the steps of the file's layers to that of the last, descending to 1. `beside`: returns the bytes that
+    poses of what stands still beside the plant add to the file, about the reference pose of some trials, at some
+    settings; None if nothing does.
     """
 
     trials: Trials
     effort: str
     ratios: Sequence[int] = (1,)
+    beside: PosesBeside | None = None
 
     def __post_init__(self) -> None:
         source, keeps_shape = self.trials.source, self.trials.start.turn_step > 0  # A few bytes less cost the shape.
@@ -360,7 +364,7 @@ class Search:
     def _without_turns(self) -> Search:
         start = self.trials.start
         plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
-        return Search(replace(self.trials, start=plain), self.effort, self.ratios)
+        return Search(replace(self.trials, start=plain), self.effort, self.ratios, self.beside)
 
     @property
     def _cost_at_start(self) -> float:
@@ -398,7 +402,7 @@ class Search:
         if not self.makes_all_again:
             at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
             of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
-            if (of_rest > of_mean).all():
+            if (of_rest > of_mean).all() and self.beside is None:
                 return other
             if not self._leaves_steps(POSE_TRIALS):
                 return self
@@ -417,7 +421,9 @@ class Search:
     def _cost_to_compare(self) -> float:
         """Return the bytes of this search's file so far, by which it is compared with one about another reference
         pose."""
-        return cost_with_maps(self.at_best_step if self.makes_all_again else self.at_first_step, self.trials)
+        settings = self.at_best_step if self.makes_all_again else self.at_first_step
+        beside = 0.0 if self.beside is None else self.beside(self.trials, settings)
+        return cost_with_maps(settings, self.trials) + beside
 
     def about_mean_pose(self) -> Search:
         """Return a search whose motion is coded about its mean pose, and which has made no choices yet."""
@@ -427,7 +433,7 @@ class Search:
         start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
         if not any(trials.start.rotation_step_factors):  # What sways far and does not turn sways about its mean, too.
             start = replace(start, rotation_step_factors=trials.start.rotation_step_factors)
-        return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios)
+        return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios, self.beside)
 
     def _like(self, other: Search, settings: Settings) -> Settings:
         """Return settings about this search's reference pose that follow the choices in `settings`, which the search

@@ -5,6 +5,7 @@ what stands still is as coarse as in a file without motion.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +14,10 @@ from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.model import quantise as qz
 from athcodec.encoding.model.motion import LearnedModes, Plan
 from athcodec.encoding.options.shape import detail_of, finer_than
+from athcodec.encoding.search.progress import POSE
 from athcodec.encoding.search.sample import PlantSample
 from athcodec.encoding.search.start import still_choice
+from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.segment import Source, branch_records, poses_size, prelude_size
 from athcodec.encoding.segments.settings import OF_BRANCHES, Choice, Settings
 from athcodec.motion.branches.still import LEAST_STILL
@@ -63,6 +66,21 @@ class SplitSource:
     def marked(self) -> Source:
         """The source, whose branches that stand still are not looked at when motion is coded."""
         return self.source.marking(self.still)
+
+    def poses_beside(self, bound: float) -> Callable[[Trials, Settings], float]:
+        """Return a function of trials on the branches that move, and of their settings: the bytes of the poses of all
+        branches less those of these alone. They depend on the reference pose that the trials are about, because the
+        source's rest pose is coded beside another one in the steps that both parts have."""
+        stillness = self._still_settings(bound)
+
+        def beside(trials: Trials, settings: Settings) -> float:
+            source = self.about(trials.source.reference)
+            joined = [self._settings(settings, stillness, may_be_coarser=flag) for flag in (True, False)]
+            trials.work.add(len(joined) * POSE * source.clip.vertex_count)
+            whole = min(prelude_size(source, self.ath, each) for each in joined)
+            return whole - prelude_size(trials.source, trials.ath, settings)
+
+        return beside
 
     def choice(self, chosen: Choice, thresholds: Thresholds, bound: float) -> Choice:
         """Return a choice for the branches that move, made for an ATH of some thresholds, for all branches."""
