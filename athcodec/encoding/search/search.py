@@ -402,7 +402,7 @@ class Search:
         if not self.makes_all_again:
             at_first = ((one.trials, one.at_first_move) for one in (about_rest, about_mean))
             of_rest, of_mean = (np.array([one.cost(first), one.stage_costs(first).sum()]) for one, first in at_first)
-            if (of_rest > of_mean).all() and self.beside is None:
+            if (of_rest > of_mean).all() and about_rest.beside is None:
                 return other
             if not self._leaves_steps(POSE_TRIALS):
                 return self
