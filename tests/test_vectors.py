@@ -22,7 +22,7 @@ from spec.document import rules
 ROOT = Path(__file__).resolve().parent.parent
 VECTORS = conformance.vectors()
 COUNT_OF_1_0 = 1089
-DIGEST_OF_1_0 = "ff4bce2d2adccb499987c7a6efff7c643eb17e5e8fce89f296f746e0674c6383"
+DIGEST_OF_1_0 = "e7b453939551a1d2b83917a798b082ce9417b73b2b9da6e4c5cbb7cf6434fadb"
 
 
 def run(*words, code: int = 0) -> str:
