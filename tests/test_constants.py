@@ -49,6 +49,9 @@ def test_the_version_of_the_format_is_the_same_everywhere():
     version = C["FORMAT_MAJOR"], C["FORMAT_MINOR"]
     assert version == (container.MAJOR, container.MINOR)
     assert FORMAT.splitlines()[2] == "Format_Version {}.{}".format(*version)
+    assert f"\nVERSION = {version}  #" in FORMAT
+    [in_table] = re.findall(r"\| Major_Version \| u8 \| (\d+) \|\n.*\| Minor_Version \| u8 \| (\d+),", FORMAT)
+    assert tuple(map(int, in_table)) == version
 
 
 def test_chunks_have_the_same_kinds_and_names_everywhere():

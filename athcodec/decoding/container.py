@@ -24,7 +24,9 @@ from athcodec.options import set_numbers
 from athcodec.untyped import JsonObject, JsonValue
 
 MAGIC = b"\x89ATH\r\n\x1a\n"
-MAJOR, MINOR, FEATURES = 1, 0, 0
+MAJOR = 1  # Version of the format (FORMAT.md, Versions).
+MINOR = 0
+FEATURES = 0  # Bits of the features that files of this version use; none has a bit yet.
 NO_LEVEL = 255
 WAVES, BASIS_IN_WAVES, BASIS_AS_SAMPLES = range(3)  # Values of Basis.
 ROTATION_FACTORS = (0, 1, 8)  # by Rotation
