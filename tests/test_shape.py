@@ -101,21 +101,25 @@ def test_a_rest_pose_is_as_precise_as_it_is_asked_for_at_every_level(tree, scrat
             assert np.linalg.norm(decoder.level_rest(level) - clip.rest, axis=1).max() <= most
 
 
-@pytest.mark.parametrize("is_sample", [True, False])
-def test_a_looser_rest_error_takes_no_more_bytes_and_holds_at_every_level(is_sample, scratch):
-    """Some percent are the noise of files so small: choices are made by the bytes of the last layer alone."""
-    clip = plant(seed=1, branches=40, longest=30)
-    if is_sample:
-        clip = athcodec.read(athcodec.sample_path("tree"))
-        clip = clip.replace(positions=clip.block(0, 16), time=clip.time[:16])
-    sizes = []
-    for rest_error in (1e-5, 1e-4, 1e-3, None):
-        with coded(clip, scratch / "plant.ath", rel_error=1e-3, rest_error=rest_error) as decoder:
-            sizes.append((scratch / "plant.ath").stat().st_size)
+def test_an_error_of_the_rest_pose_is_held_at_every_level(scratch):
+    clip = athcodec.read(athcodec.sample_path("tree"))
+    clip = clip.replace(positions=clip.block(0, 16), time=clip.time[:16])
+    for rest_error in (1e-5, 1e-4, 1e-3):
+        with coded(clip, scratch / "plant.ath", rel_error=1e-3, rest_error=rest_error, effort="fast") as decoder:
             for level in range(len(decoder.levels)):
                 away = np.linalg.norm(decoder.file.rest_at(level) - clip.rest, axis=1).max()
-                assert away <= (rest_error or 1.0) * diagonal(clip)
-    assert (sizes <= 1.06 * np.minimum.accumulate(sizes)).all()
+                assert away <= rest_error * diagonal(clip)
+
+
+@pytest.mark.parametrize("effort", ["fast", pytest.param("default", marks=pytest.mark.slow)])
+def test_a_looser_rest_error_takes_no_more_bytes(effort, scratch):
+    """Over several plants, since choices in files so small are worth some percent and are made by other bytes."""
+    clips = [plant(seed=seed, branches=40, longest=30) for seed in (1, 2, 5)]
+    sizes = []
+    for rest_error in (1e-5, 1e-4, 1e-3, None):
+        given = {"rel_error": 1e-3, "rest_error": rest_error, "effort": effort}
+        sizes.append(sum(athcodec.encode(clip, scratch / "plant.ath", **given).bytes for clip in clips))
+    assert (sizes <= 1.02 * np.minimum.accumulate(sizes)).all(), sizes
 
 
 def test_the_command_line_takes_a_rest_error(tree, scratch):

@@ -14,7 +14,9 @@ from athcodec.encoding.search import progress
 from athcodec.encoding.search.choices import learned_bases
 from athcodec.encoding.search.search import Search
 from athcodec.encoding.search.trials import Trials
+from athcodec.encoding.segments.settings import Settings
 from bench import odd
+from bench.scenes import fields
 
 
 def sheet(**options) -> MotionClip:
@@ -117,6 +119,21 @@ def test_time_bases_that_pay_stay_where_work_ends(monkeypatch):
         athcodec.encode(summed_shapes(), ladder="none", rel_error=1e-4)
     waves, learned, chosen = costs
     assert chosen <= learned < waves
+
+
+def test_rotations_that_trials_show_to_be_larger_are_not_taken_where_work_ends(monkeypatch):
+    """Only one of the settings of refinements is coded then."""
+    clip = fields.stems(seed=4, plants=12).clip
+    clip = clip.replace(positions=clip.block(0, 12), time=clip.time[:12])
+    usual, first_layer = len(athcodec.encode(clip, rel_error=1e-4)), Search.first_layer
+
+    def last(search: Search) -> Settings:
+        settings = first_layer(search)
+        search.trials.work.allowed = search.trials.work.done
+        return settings
+
+    monkeypatch.setattr(Search, "first_layer", last)
+    assert len(athcodec.encode(clip, rel_error=1e-4)) <= 1.01 * usual
 
 
 @pytest.mark.parametrize("share", [0.001, 0.1])

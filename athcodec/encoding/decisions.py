@@ -173,11 +173,11 @@ class FileDecisions:
         split = holding._split(bound, self.thresholds(bound))
         moving = holding
         if split is not None:
-            moving = dataclasses.replace(holding, source=split.moving_source, beside=split.poses_beside(bound))
+            moving = dataclasses.replace(holding, source=split.moving_source, beside=split.poses_beside)
         work = moving._allowed_work(bound)
         decided = moving._decide(bound, work)
         if split is not None:
-            choice = split.choice(decided.choice, decided.ath.thresholds, bound)
+            choice = split.choice(decided.choice, decided.ath.thresholds)
             options = dataclasses.replace(holding.options, segment_frames=decided.source.segment_frames)
             if len(decided.layers.each) == 1:
                 options = dataclasses.replace(options, ladder=())
@@ -274,8 +274,8 @@ class FileDecisions:
             choice = still_choice(self.source, ath, bound, ratio)
             return self._layered(ath, choice, CodedPrelude(self.source, ath, choice.settings))
         share = PREDICTED_SHARE if ratio > 1 else 1.0
-        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, ratios=ratios)
-        search.beside = self.beside
+        effort, jobs = self.options.effort, self.options.jobs
+        search = Search.of(self.source, ath, bound, effort, work, jobs, ratios=ratios, beside=self.beside)
         if self._has_usual_ladder and search.stages_need_own_bases():
             return self._with_one_layer()._decide(bound, work)
         with work.trying("segments"):

@@ -42,6 +42,7 @@ HOPELESS_TURN = 1.15  # Bytes in waves with roots that turn, over those without,
 WORTHY_TURN = 0.95  # The same up to which trials of branches look at roots that turn.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
 FIRST_POSE_TRIALS = 6  # Trials that show whether another reference pose is better at once.
+CLOSE_POSES = 1.03  # Bytes about one reference pose, over those about another, up to which all choices are made again.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -139,16 +140,17 @@ class Search:
         *,
         ratios: Sequence[int] = (1,),
         hopeless: Hopeless | None = None,
+        beside: PosesBeside | None = None,
     ) -> Search:
         """Return the search for settings of a whole plant, at `bound` and within the allowed `work`. `jobs`: threads
         that try settings at a time; `ratios`: the step of each layer over that of the last; `hopeless`: what trials on
-        other branches have shown to be so, or None.
+        other branches have shown to be so, or None; `beside`: as in `Search`.
         """
         samples = samples_of(source)
         start = first_settings(source, ath, bound, samples, ratios)
         everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
-        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios)
+        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios, beside)
         if any(start.rotation_step_factors):
             search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_pieces)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
@@ -332,17 +334,16 @@ class Search:
             if trials.is_layered and self.makes_all_again and settings.learned_pieces is not None:
                 yield replace(settings, learned_pieces=None)
             return
-        factors, least = settings.rotation_step_factors, math.inf
+        factors = settings.rotation_step_factors
         main = factors[trials.prelude(settings).plan.main_stage]
         all_turn = main and not settings.roots_turn
         turned = settings.with_rotations(main) if all_turn else settings.with_turning_roots(rotations.FINEST)
-        for candidate in (turned, settings.with_rotations(0)):
-            if self.effort != "fast":
-                candidate = learned_pieces.best_pieces(candidate, trials)
-                least = min(least, trials.cost(candidate))
-                if trials.cost(candidate) > REFINEMENTS_MAX_GAIN * least:
-                    continue
-            yield candidate
+        candidates = [turned, settings.with_rotations(0)]
+        if self.effort != "fast":
+            candidates = [learned_pieces.best_pieces(candidate, trials) for candidate in candidates]
+            most = REFINEMENTS_MAX_GAIN * min(map(trials.cost, candidates))
+            candidates = [candidate for candidate in candidates if trials.cost(candidate) <= most]
+        yield from candidates
 
     def _best_turn(self, most: float = HOPELESS_TURN) -> Search:
         """Return this search, whose roots turn, or one without rotations if that begins with a smaller file: roots
@@ -390,7 +391,8 @@ class Search:
     def about_best_reference(self) -> Search:
         """Return this search, or one about the mean pose of the motion if that makes a smaller file than the rest pose
         does. The mean pose is taken at once if its file and its motion are smaller at first moves. Else both are
-        compared by what was chosen about the rest pose or, in small clips, by separate searches up to their steps.
+        compared by what was chosen about the rest pose or, in small clips, by separate searches up to their steps, and
+        beside what stands still to their ends if they are close.
         """
         if not self._may_have_mean_pose:
             return self
@@ -406,10 +408,16 @@ class Search:
                 return other
             if not self._leaves_steps(POSE_TRIALS):
                 return self
-        cost = about_rest._cost_to_compare()
         if not self.makes_all_again:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
-        return other if about_mean._cost_to_compare() < cost else self
+            of_rest, of_mean = (one._cost_of(one.at_first_step) for one in (about_rest, about_mean))
+            return other if of_mean < of_rest else self
+        of_rest, of_mean = (one._cost_of(one.at_best_step) for one in (about_rest, about_mean))
+        # Poses of what stands still may be most of the file, and the choices that follow decide then. Of other clips
+        # none gets smaller by comparing after them.
+        if self.beside is not None and max(of_rest, of_mean) < CLOSE_POSES * min(of_rest, of_mean):
+            of_rest, of_mean = (one._cost_of(one.best) for one in (about_rest, about_mean))
+        return other if of_mean < of_rest else self
 
     def _leaves_steps(self, trials: int) -> bool:
         """Return whether so many trials about another reference pose leave work for those of steps, and of maps."""
@@ -418,10 +426,8 @@ class Search:
         with work.trying("mean pose"):
             return work.fits((trials + STEP_TRIALS) * tried.work_of_trial + maps)
 
-    def _cost_to_compare(self) -> float:
-        """Return the bytes of this search's file so far, by which it is compared with one about another reference
-        pose."""
-        settings = self.at_best_step if self.makes_all_again else self.at_first_step
+    def _cost_of(self, settings: Settings) -> float:
+        """Return the bytes of this search's file, by which it is compared with one about another reference pose."""
         beside = 0.0 if self.beside is None else self.beside(self.trials, settings)
         return cost_with_maps(settings, self.trials) + beside
 

@@ -5,8 +5,8 @@ what stands still is as coarse as in a file without motion.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -43,6 +43,7 @@ class SplitSource:
 
     source: Source
     ath: Ath
+    bound: float  # In scene units.
     still: np.ndarray  # (B,) bool
     moving_source: Source
     still_source: Source
@@ -60,35 +61,31 @@ class SplitSource:
         moving, others = (_part(source, ath, np.flatnonzero(some)) for some in (~still, still))
         if moving.seen.ath(ath.thresholds).height != ath.height:
             return None
-        return cls(source, ath, still, moving, _standing(others))
+        return cls(source, ath, bound, still, moving, _standing(others))
 
     @property
     def marked(self) -> Source:
         """The source, whose branches that stand still are not looked at when motion is coded."""
         return self.source.marking(self.still)
 
-    def poses_beside(self, bound: float) -> Callable[[Trials, Settings], float]:
-        """Return a function of trials on the branches that move, and of their settings: the bytes of the poses of all
-        branches less those of these alone. They depend on the reference pose that the trials are about, because the
-        source's rest pose is coded beside another one in the steps that both parts have."""
-        stillness = self._still_settings(bound)
+    def poses_beside(self, trials: Trials, settings: Settings) -> float:
+        """Return the bytes of the poses of all branches less those of the branches that move alone, from trials on
+        these and their settings. They depend on the reference pose that the trials are about, because the source's rest
+        pose is coded beside another one in the steps that both parts have."""
+        source = self.about(trials.source.reference)
+        joined = [self._settings(settings, self._still_settings, may_be_coarser=flag) for flag in (True, False)]
+        trials.work.add(len(joined) * POSE * source.clip.vertex_count)
+        whole = min(prelude_size(source, self.ath, each) for each in joined)
+        return whole - prelude_size(trials.source, trials.ath, settings)
 
-        def beside(trials: Trials, settings: Settings) -> float:
-            source = self.about(trials.source.reference)
-            joined = [self._settings(settings, stillness, may_be_coarser=flag) for flag in (True, False)]
-            trials.work.add(len(joined) * POSE * source.clip.vertex_count)
-            whole = min(prelude_size(source, self.ath, each) for each in joined)
-            return whole - prelude_size(trials.source, trials.ath, settings)
-
-        return beside
-
-    def choice(self, chosen: Choice, thresholds: Thresholds, bound: float) -> Choice:
+    def choice(self, chosen: Choice, thresholds: Thresholds) -> Choice:
         """Return a choice for the branches that move, made for an ATH of some thresholds, for all branches."""
-        return replace(self, ath=self.source.seen.ath(thresholds))._choice(chosen, bound)
+        is_of_these = thresholds == self.ath.thresholds
+        return (self if is_of_these else replace(self, ath=self.source.seen.ath(thresholds)))._choice(chosen)
 
-    def _choice(self, chosen: Choice, bound: float) -> Choice:
+    def _choice(self, chosen: Choice) -> Choice:
         """Extend a choice that was made for the branches that move to all branches, and return it."""
-        stillness, source = self._still_settings(bound), self.about(chosen.reference)
+        stillness, source = self._still_settings, self.about(chosen.reference)
         may_be_coarser = not chosen.predicted
         settings = self._settings(chosen.settings, stillness, may_be_coarser)
         if chosen.settings.connected_rest != stillness.connected_rest:
@@ -113,10 +110,11 @@ class SplitSource:
         """Return the source about a reference pose of the branches that move."""
         return self.source.about(self._reference(reference))
 
-    def _still_settings(self, bound: float) -> Settings:
+    @cached_property
+    def _still_settings(self) -> Settings:
         source = self.still_source
         ath = source.seen.ath(self.ath.thresholds)
-        return still_choice(source, ath, (1 - STILL_SHARE) * bound, 1).settings
+        return still_choice(source, ath, (1 - STILL_SHARE) * self.bound, 1).settings
 
     def _settings(self, moving: Settings, still: Settings, may_be_coarser: bool) -> Settings:
         """Join the settings of the branches that move and of those that stand still to settings of all branches.
