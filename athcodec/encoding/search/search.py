@@ -410,14 +410,14 @@ class Search:
                 return self
         if not self.makes_all_again:
             about_mean.at_first_step = about_mean._like(about_rest, about_rest.at_first_step)
-            of_rest, of_mean = (one._cost_of(one.at_first_step) for one in (about_rest, about_mean))
-            return other if of_mean < of_rest else self
-        of_rest, of_mean = (one._cost_of(one.at_best_step) for one in (about_rest, about_mean))
+            rest, mean = (one._cost_of(one.at_first_step) for one in (about_rest, about_mean))
+            return other if mean < rest else self
+        rest, mean = (one._cost_of(one.at_best_step) for one in (about_rest, about_mean))
         # Poses of what stands still may be most of the file, and the choices that follow decide then. Of other clips
         # none gets smaller by comparing after them.
-        if self.beside is not None and max(of_rest, of_mean) < CLOSE_POSES * min(of_rest, of_mean):
-            of_rest, of_mean = (one._cost_of(one.best) for one in (about_rest, about_mean))
-        return other if of_mean < of_rest else self
+        if self.beside is not None and max(rest, mean) < CLOSE_POSES * min(rest, mean):
+            rest, mean = (one._cost_of(one.best) for one in (about_rest, about_mean))
+        return other if mean < rest else self
 
     def _leaves_steps(self, trials: int) -> bool:
         """Return whether so many trials about another reference pose leave work for those of steps, and of maps."""
