@@ -64,7 +64,8 @@ def _best_candidate(
 
     Of candidates of about the same size the one of lowest order wins, but one of roots alone, which has no stages,
     comes last. Predicted motion hardly depends on branches: trials end if the first two candidates have it. If the
-    same branches are smaller with vertices in the order of the source, all that follow are tried in it.
+    same branches are smaller with vertices in the order of the source, all that follow are tried in it, and the best
+    ones are unless that order was worse.
     """
     by_points = work.fits(FINDING * clip.vertex_count)
     proposals, trial = candidates(clip, by_points), Trial(clip, option, options, work)
@@ -75,21 +76,22 @@ def _best_candidate(
     second = next(proposals, None) if work.fits(finding + 2 * trial.least_work) else None
     if second is None:
         return best, trial.size(best)[0] if is_compared else least
-    in_order = False  # Whether vertices are better in the order of the source, which costs no bytes.
+    in_order: bool | None = None  # Whether vertices are better in the order of the source, which costs no bytes.
     for number, branches in enumerate(chain([best, second], proposals), start=1):
         before = work.done
         branches = dataclasses.replace(branches, stem_index=None) if in_order else branches
         size, is_predicted = trial.size(branches)
         next_trial = max(trial.least_work, work.done - before)  # Settings cost about as much on other branches.
         predicted += is_predicted
-        in_order = in_order or any(_differ_in_order(one, branches) and size < other for other, one in tried[-1:])
+        ordered = [other for other, one in tried if _differ_in_order(one, branches)]
+        in_order = in_order or (size < min(ordered) if ordered else in_order)
         tried.append((size, branches))
         if number > 1:
             work.add(finding)
             if predicted == number or not work.fits(finding + next_trial):
                 break
     least, best = _best_of(tried)
-    if best.stem_index is None or best.method != "motion" or not work.fits(next_trial):
+    if best.stem_index is None or in_order is False or not work.fits(next_trial):
         return best, least
     unordered = dataclasses.replace(best, stem_index=None)
     size = trial.size(unordered)[0]
@@ -170,7 +172,7 @@ class Trial:
             self._option = self._bound_of_target(decisions)
         with self._work.trying("branches", TRIAL_SHARE):
             bound = self._option.in_scene_units(source, decisions.file_size)
-            self._hopeless.divide(branches.vertex_branch)
+            self._hopeless.divide(branches.vertex_branch, branches.branch_parent)
             return decisions.tried(bound, self._work, self._frames_ratio, self._hopeless)
 
     def _bound_of_target(self, decisions: FileDecisions) -> BoundOption:

@@ -17,11 +17,19 @@ class OnPieces:
     """What is known where a clip is divided into certain pieces, whatever hangs on what."""
 
     turning: bool = False  # Whether roots that turn are hopeless.
+    free_rigid: bool | None = None  # Whether loose rigid parts are better; None: it is not known.
     common_basis: bool | None = None  # Whether one time basis for all stages is better; None: it is not known.
 
     def has_hope(self, settings: Settings) -> bool:
         """Return whether settings with time bases have those of the better kind."""
         return self.common_basis in (None, settings.common_basis)
+
+
+@dataclass
+class OnBranches:
+    """What is known of certain branches, in whatever order their vertices are."""
+
+    still: bool | None = None  # Whether branches whose bending turns nothing are better; None: it is not known.
 
 
 @dataclass
@@ -31,12 +39,16 @@ class Hopeless:
 
     prediction: bool = False
     on_pieces: OnPieces = field(default_factory=OnPieces)
+    on_branches: OnBranches = field(default_factory=OnBranches)
     _least_in_waves: float = math.inf  # Bytes of the smallest file with waves so far.
-    _known: dict[bytes, OnPieces] = field(default_factory=dict)
+    _pieces: dict[bytes, OnPieces] = field(default_factory=dict)
+    _branches: dict[bytes, OnBranches] = field(default_factory=dict)
 
-    def divide(self, vertex_branch: np.ndarray) -> None:
-        """Go on with trials on these pieces, (N,)."""
-        self.on_pieces = self._known.setdefault(vertex_branch.tobytes(), OnPieces())
+    def divide(self, vertex_branch: np.ndarray, branch_parent: np.ndarray) -> None:
+        """Go on with trials on branches: the number of that of each vertex, (N,), and of the parent of each, (B,)."""
+        pieces = vertex_branch.tobytes()
+        self.on_pieces = self._pieces.setdefault(pieces, OnPieces())
+        self.on_branches = self._branches.setdefault(pieces + branch_parent.tobytes(), OnBranches())
 
     def is_in_waves(self, cost: float) -> bool:
         """Return whether branches whose file has so many bytes in waves are hopeless."""

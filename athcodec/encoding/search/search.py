@@ -221,13 +221,21 @@ class Search:
         is compared so takes the same few trials, whatever work is left: with either alone sizes are ranked well, but
         not one in waves against one in time bases. `hopeless`: what these trials leave out."""
         search = self.of_sample or self
-        typical = rotations.typical_moves(search.trials.start, search.trials, hopeless)
+        typical = rotations.typical_moves(search._in_freedom(hopeless.on_pieces), search.trials, hopeless)
         size = sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
         if search is self:
             return size
         trials = self.trials  # A sample's poses tell less of the whole plant's than its motion does.
         trials.work.add(POSE * trials.source.clip.vertex_count)
         return size - search.trials.prelude_bytes(typical[0]) + prelude_size(trials.source, trials.ath, trials.start)
+
+    def _in_freedom(self, known: OnPieces) -> Settings:
+        """Return the settings that the search starts with, with loose rigid parts if they are known to be smaller on
+        these pieces; if it is not known, note it."""
+        start = self.trials.start
+        if known.free_rigid is None:
+            known.free_rigid = best_freedom(start, self.trials).free_rigid
+        return replace(start, free_rigid=known.free_rigid)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
@@ -264,10 +272,12 @@ class Search:
 
     @cached_property
     def at_first_move(self) -> Settings:
-        """The settings that the search starts with, or with time bases where these are far smaller."""
+        """The settings that the search starts with, or with rigid parts that are loose if these are smaller, and with
+        time bases where these are far smaller. Leaves that hinge on a twig may be most of a plant, and take a third
+        less if they are loose, so nothing is compared before that."""
         if self.effort == "fast":
             return self.trials.start
-        return rotations.still_if_smaller(self.trials.start, self.trials)
+        return rotations.still_if_smaller(best_freedom(self.trials.start, self.trials), self.trials)
 
     @cached_property
     def at_first_step(self) -> Settings:

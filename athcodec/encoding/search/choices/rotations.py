@@ -113,16 +113,18 @@ def _first_moves(settings: Settings, trials: Trials) -> tuple[Settings, Settings
 def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> list[Settings]:
     """Return the cheapest settings in waves, and the cheapest in time bases, whatever work is left, but for those that
     are `hopeless`. Branches that are, by their bytes in waves, have these alone."""
-    kinds, known = _kinds(settings, trials), hopeless.on_pieces
+    known, of_branches = hopeless.on_pieces, hopeless.on_branches
+    kinds = [kind for kind in _kinds(settings, trials) if of_branches.still in (None, kind[0].still)]
     in_waves = min((in_waves for in_waves, _ in kinds), key=trials.cost)
     least = trials.cost(in_waves)
+    kinds = [kind for kind in kinds if trials.cost(kind[0]) <= HOPELESS_STILL * least]
     if any(settings.rotation_step_factors) or hopeless.is_in_waves(least):
         return [in_waves]
     in_bases = [candidate for _, in_bases in reversed(kinds) for candidate in in_bases if known.has_hope(candidate)]
     if not in_bases:
         return [in_waves]
     best = min(in_bases, key=trials.cost)
-    known.common_basis = best.common_basis
+    known.common_basis, of_branches.still = best.common_basis, best.still
     return [in_waves, best]
 
 
