@@ -13,7 +13,9 @@ from athcodec.encoding.search.progress import Work
 from athcodec.motion.branches import finding
 from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
 from athcodec.motion.hierarchy import branch_orders
+from bench.data import Canopy
 from bench.scenes import fields
+from bench.scenes.assembly import bare
 
 FRAMES = 32
 MOST = 1.05  # Size on branches that are found, over that on true ones.
@@ -116,6 +118,16 @@ def test_twigs_and_leaves_of_shrubs_side_by_side_hang_on_stems():
     true, found = (
         len(athcodec.encode(one, ladder="none", attributes="none"))
         for one in (clip, clip.replace(vertex_branch=None, branch_parent=None, stem_index=None))
+    )
+    assert found <= MOST * true
+
+
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 3, 4, 5, 6))])
+def test_leaves_that_hinge_in_a_storm_hang_on_twigs_and_not_on_each_other(seed):
+    """Those beside each other move alike, but not as exactly as a leaf that turns about its own hinge."""
+    tree = Canopy(100, 2, 40, 6.0, 14.0, 200, "broadleaf", seed).make()
+    found, true = (
+        len(athcodec.encode(clip, rel_error=1e-4, ladder="none", attributes="none")) for clip in (bare(tree), tree)
     )
     assert found <= MOST * true
 

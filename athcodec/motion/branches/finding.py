@@ -145,7 +145,7 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     roots = np.count_nonzero(first.branch_parent < 0)
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
-    if 1 < roots <= PLANTS * len(first.branch_parent):
+    if roots <= PLANTS * len(first.branch_parent):
         yield _by_contact(seen, first)
     yield dataclasses.replace(first, stem_index=None)
     if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
