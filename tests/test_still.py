@@ -15,6 +15,8 @@ from athcodec.motion.branches.common_motion import carried, without_common_motio
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.still import still_parts
 from athcodec.motion.clip import MotionClip
+from bench.data import Canopy
+from bench.scenes.assembly import bare
 
 SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
 
@@ -113,6 +115,32 @@ def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_sta
     standing = size(0.0, 1.0)
     for turn, stop in ways:
         assert size(turn, stop) <= 1.05 * standing + 100, (turn, stop)
+
+
+def leafed_tree(seed: int, nodes: int, leaves: int, turn: float) -> MotionClip:
+    """A tree with leaves in wind, without branches, that turns as a whole besides."""
+    tree = bare(Canopy(nodes, 2, 24, 6.0, 8.0, leaves, "broadleaf", seed).make())
+    angles = np.linspace(0, turn, tree.frame_count)[:, None] * [0.0, 1.0, 0.0]
+    turned = np.einsum("tij,tvj->tvi", turns(angles), tree.block(0, tree.frame_count).astype(np.float64))
+    return tree.replace(positions=turned.astype(np.float32))
+
+
+def test_a_tree_that_turns_stands_on_its_trunk():
+    """Of what is left without the turn, any part of the crown may move less than the foot of the trunk."""
+    for seed in range(1, 5):
+        found = athcodec.find_branches(leafed_tree(seed, 40, 80, 2 * np.pi))
+        roots = np.flatnonzero(found.branch_parent < 0)
+        assert found.vertex_branch[0] in roots and len(roots) == 1, seed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("seed", [16, 17, 18])
+def test_a_tree_with_leaves_on_a_turntable_costs_little_more_than_one_that_stands(seed, ladder):
+    standing, turning = (leafed_tree(seed, 100, 200, turn) for turn in (0.0, 2 * np.pi))
+    bound = 1e-4 * float(np.linalg.norm(np.ptp(standing.positions.reshape(-1, 3), axis=0)))
+    sizes = [size_of(clip, bound, ladder=ladder) for clip in (standing, turning)]
+    assert sizes[1] <= 1.05 * sizes[0] + 500
 
 
 def test_layers_of_what_turns_are_predicted_from_those_before():

@@ -16,7 +16,6 @@ TOO_LARGE = 1.08  # Bytes in waves, over the fewest on other branches, above whi
 class OnPieces:
     """What is known where a clip is divided into certain pieces, whatever hangs on what."""
 
-    turning: bool = False  # Whether roots that turn are hopeless.
     free_rigid: bool | None = None  # Whether loose rigid parts are better; None: it is not known.
     common_basis: bool | None = None  # Whether one time basis for all stages is better; None: it is not known.
 
@@ -29,6 +28,7 @@ class OnPieces:
 class OnBranches:
     """What is known of certain branches, in whatever order their vertices are."""
 
+    turning: bool = False  # Whether roots that turn are hopeless. A tree that hangs together turns, its parts may not.
     still: bool | None = None  # Whether branches whose bending turns nothing are better; None: it is not known.
 
 

@@ -21,7 +21,7 @@ from athcodec.encoding.search.choices.reference import mean_pose
 from athcodec.encoding.search.choices.rest import best_slack, with_slack
 from athcodec.encoding.search.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.search.choices.steps import best_stage_steps, best_steps, finer_steps, walked
-from athcodec.encoding.search.hopeless import Hopeless, OnPieces
+from athcodec.encoding.search.hopeless import Hopeless, OnBranches, OnPieces
 from athcodec.encoding.search.progress import ANALYSIS, LEARNING, POSE, START, TRIAL, Work, expected_trials
 from athcodec.encoding.search.sample import ExtrapolationFactors, is_small, sample_plant
 from athcodec.encoding.search.segment_samples import samples_of, spread_samples
@@ -152,7 +152,7 @@ class Search:
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios, beside)
         if any(start.rotation_step_factors):
-            search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_pieces)
+            search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_branches)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -364,8 +364,8 @@ class Search:
             return plain
         return min(plain, turned, key=Search.first_cost)
 
-    def _best_turn_of_trial(self, known: OnPieces) -> Search:
-        """Return the same, from fewer trials, and note if roots that turn are hopeless on these pieces."""
+    def _best_turn_of_trial(self, known: OnBranches) -> Search:
+        """Return the same, from fewer trials, and note if roots that turn are hopeless on these branches."""
         if known.turning:
             return self._without_turns()
         best = self._best_turn(most=WORTHY_TURN)

@@ -55,7 +55,7 @@ def arranged(
         if seen.by_price:
             joints = _joints_by_price(frames, seen.frames_of_roots, label, contacts, root)
         else:
-            joints = _joints_by_contact(frames, label, contacts, root)
+            joints = _joints_by_contact(frames, label, contacts, root, seen.is_carried)
     else:
         joints = _joints_of(rest, frames, label, parent)
     return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
@@ -106,10 +106,12 @@ def _joints_by_price(
     return _Joints(above, base)
 
 
-def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None) -> _Joints:
+def _joints_by_contact(
+    frames: np.ndarray, label: np.ndarray, contacts: _Contacts, root: int | None, is_carried: bool
+) -> _Joints:
     """Return a tree for each set of branches that contacts connect: the tree whose contacts have the least total cost,
     hung on its root. `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `root`: a vertex of the
-    branch that is to be a root, or None.
+    branch that is to be a root, or None; `is_carried`: whether the frames lack motion that the whole plant has.
     """
     count = int(label.max()) + 1
     branch, other = label[contacts.vertices].T
@@ -119,7 +121,7 @@ def _joints_by_contact(frames: np.ndarray, label: np.ndarray, contacts: _Contact
     tree = graphs.minimum_spanning_tree(graph)
     parts = graphs.connected_components(tree, directed=False)[1]
     still = _stillest(frames, label)
-    roots = _roots(frames, label, still, parts, root)
+    roots = _roots(frames, label, still, parts, root, is_carried)
     hub = sparse.coo_matrix((np.ones(len(roots)), (np.full(len(roots), count), roots)), (count + 1, count + 1))
     whole = sparse.bmat([[tree, None], [None, sparse.coo_matrix((1, 1))]]) + hub
     parent = graphs.breadth_first_order(whole, count, directed=False)[1][:count]
@@ -160,8 +162,11 @@ def _stillest(frames: np.ndarray, label: np.ndarray) -> np.ndarray:
     return cheapest_of_each(label, way)
 
 
-def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None) -> np.ndarray:
-    """Return the root branch of each connected part: of its large branches, the one with the vertex that moves least.
+def _roots(
+    frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.ndarray, root: int | None, is_carried: bool
+) -> np.ndarray:
+    """Return the root branch of each connected part: of its large branches, the one with the vertex that moves least,
+    or the largest of all if the frames lack motion that the whole plant has, since any part may stand still in these.
     `frames`: (F, N, 3) positions; `label`: the branch of each vertex, (N,); `still`: the vertex of each branch that
     moves least, (B,); `parts`: the connected part of each branch, (B,); `root`: a vertex of the branch that is to be a
     root in any case, or None.
@@ -169,10 +174,10 @@ def _roots(frames: np.ndarray, label: np.ndarray, still: np.ndarray, parts: np.n
     size = sizes_of_each(frames[0], label)
     largest = np.zeros(parts.max() + 1)
     np.maximum.at(largest, parts, size)
-    way = ((frames[:, still] - frames[0, still]) ** 2).sum(axis=(0, 2))
+    way = -size if is_carried else ((frames[:, still] - frames[0, still]) ** 2).sum(axis=(0, 2))
     is_small = size < ROOT_SIZE * largest[parts]
     if root is not None:
-        way[label[root]], is_small[label[root]] = -1.0, False
+        way[label[root]], is_small[label[root]] = -np.inf, False
     order = np.lexsort((-size, way, is_small, parts))
     return order[np.unique(parts[order], return_index=True)[1]]
 
