@@ -7,7 +7,6 @@ functions that search.py makes choices by.
 """
 
 BEFORE_STEPS = (  # Learned modes are of pieces, which forms decide on, so they are chosen after these.
-    "best_freedom",
     "still_if_smaller",
     "best_forms",
     "best_rotations",

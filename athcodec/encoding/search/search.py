@@ -86,7 +86,6 @@ def _learned_cost(trials: Trials) -> float:
 
 CHOICES: dict[Choose, str] = {  # What progress and summaries call a choice.
     best_stage_steps: "steps of stages",
-    best_freedom: "freedom of rigid parts",
     forms.best_forms: "forms",
     forms.best_forms_again: "forms",
     rotations.still_if_smaller: "branches whose bending turns nothing",
@@ -151,6 +150,7 @@ class Search:
         everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
         search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios, beside)
+        search = search._with_freedom(OnPieces() if hopeless is None else hopeless.on_pieces)
         if any(start.rotation_step_factors):
             search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_branches)
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
@@ -221,21 +221,13 @@ class Search:
         is compared so takes the same few trials, whatever work is left: with either alone sizes are ranked well, but
         not one in waves against one in time bases. `hopeless`: what these trials leave out."""
         search = self.of_sample or self
-        typical = rotations.typical_moves(search._in_freedom(hopeless.on_pieces), search.trials, hopeless)
+        typical = rotations.typical_moves(search.trials.start, search.trials, hopeless)
         size = sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
         if search is self:
             return size
         trials = self.trials  # A sample's poses tell less of the whole plant's than its motion does.
         trials.work.add(POSE * trials.source.clip.vertex_count)
         return size - search.trials.prelude_bytes(typical[0]) + prelude_size(trials.source, trials.ath, trials.start)
-
-    def _in_freedom(self, known: OnPieces) -> Settings:
-        """Return the settings that the search starts with, with loose rigid parts if they are known to be smaller on
-        these pieces; if it is not known, note it."""
-        start = self.trials.start
-        if known.free_rigid is None:
-            known.free_rigid = best_freedom(start, self.trials).free_rigid
-        return replace(start, free_rigid=known.free_rigid)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
@@ -272,12 +264,10 @@ class Search:
 
     @cached_property
     def at_first_move(self) -> Settings:
-        """The settings that the search starts with, or with rigid parts that are loose if these are smaller, and with
-        time bases where these are far smaller. Leaves that hinge on a twig may be most of a plant, and take a third
-        less if they are loose, so nothing is compared before that."""
+        """The settings that the search starts with, or with time bases where these are far smaller."""
         if self.effort == "fast":
             return self.trials.start
-        return rotations.still_if_smaller(best_freedom(self.trials.start, self.trials), self.trials)
+        return rotations.still_if_smaller(self.trials.start, self.trials)
 
     @cached_property
     def at_first_step(self) -> Settings:
@@ -354,6 +344,21 @@ class Search:
             most = REFINEMENTS_MAX_GAIN * min(map(trials.cost, candidates))
             candidates = [candidate for candidate in candidates if trials.cost(candidate) <= most]
         yield from candidates
+
+    def _with_freedom(self, known: OnPieces) -> Search:
+        """Return this search, whose rigid parts move away from what they hang on if that is known to be smaller; if it
+        is not known, note it. Leaves that hinge on twigs may be most of a plant, and take a third less if they are
+        loose, so this is decided before anything is compared."""
+        trials, start = self.trials, self.trials.start
+        if self.effort == "fast" or not (start.rigid > start.layer).any():
+            return self
+        if known.free_rigid is None:
+            search = self.of_sample or self
+            with trials.work.trying("freedom of rigid parts"):
+                known.free_rigid = best_freedom(search.trials.start, search.trials).free_rigid
+        if not known.free_rigid:
+            return self
+        return Search(replace(trials, start=replace(start, free_rigid=True)), self.effort, self.ratios, self.beside)
 
     def _best_turn(self, most: float = HOPELESS_TURN) -> Search:
         """Return this search, whose roots turn, or one without rotations if that begins with a smaller file: roots
@@ -447,6 +452,7 @@ class Search:
         source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
         ath = replace(trials.ath, rest=source.rest + source.origin)
         start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
+        start = replace(start, free_rigid=trials.start.free_rigid)
         if not any(trials.start.rotation_step_factors):  # What sways far and does not turn sways about its mean, too.
             start = replace(start, rotation_step_factors=trials.start.rotation_step_factors)
         return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios, self.beside)
