@@ -61,6 +61,8 @@ def pytest_configure(config):
     """
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Each of the hundreds of Pythons that tests start would compile the package anew.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     expression, names = config.option.markexpr, tiers(config)
     last = max((place for place, name in enumerate(names) if re.search(rf"\b{name}\b", expression)), default=None)
     if last is not None:
@@ -313,8 +315,15 @@ def predicted_ath(full_clip, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def _counted_core(tmp_path_factory):
-    return CountedCore(tmp_path_factory.mktemp("counted"))
+def built_once(tmp_path_factory):
+    """A folder that all workers of a run share: `install_once` builds in it what takes long to compile."""
+    mine = tmp_path_factory.getbasetemp()
+    return (mine.parent if "PYTEST_XDIST_WORKER" in os.environ else mine) / "built-once"
+
+
+@pytest.fixture(scope="session")
+def _counted_core(built_once):
+    return CountedCore(built_once / "counted")
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fuzz.targets import COMMON, CORE, compiler, decoder_sources
+from programs import install_once
 
 from athcodec import _native
 
@@ -33,16 +34,23 @@ int trace(void *self, void *frame, int what, void *argument) {{
 """
 
 
+def build(library: Path) -> None:
+    """Compile the decoder of the C core so that it counts."""
+    used, source, counter = compiler().path, library.with_name("counter.c"), library.with_name("counter.o")
+    source.write_text(COUNTER)
+    subprocess.run([used, "-fPIC", "-c", source, "-o", counter], check=True)
+    flags = [*COMMON, "-O0", "-g0", f"-I{CORE}", f"-I{CORE / 'include'}", "-fPIC", "-shared"]
+    flags.append("-fsanitize-coverage=trace-pc")
+    subprocess.run([used, *flags, *decoder_sources(), counter, "-o", library], check=True)
+
+
 class CountedCore:
     """The decoder of the C core; a function has the signature that the package gives it."""
 
     def __init__(self, folder: Path):
-        (folder / "counter.c").write_text(COUNTER)
-        used, library, counter = compiler().path, folder / "libath_counted.so", folder / "counter.o"
-        subprocess.run([used, "-fPIC", "-c", folder / "counter.c", "-o", counter], check=True)
-        flags = [*COMMON, "-O0", "-g0", f"-I{CORE}", f"-I{CORE / 'include'}", "-fPIC", "-shared"]
-        flags.append("-fsanitize-coverage=trace-pc")
-        subprocess.run([used, *flags, *decoder_sources(), counter, "-o", library], check=True)
+        """Load it from a folder, where the first process that asks for it compiles it."""
+        library = folder / "libath_counted.so"
+        install_once(folder, library.name, lambda: build(library))
         self._library = ctypes.CDLL(str(library))
         self._library.counted_work.restype = ctypes.c_ulonglong
         self._library.trace_with(ctypes.pythonapi.PyObject_SetAttrString, ctypes.py_object(True))

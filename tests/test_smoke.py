@@ -35,7 +35,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from fuzz import seeds, sources, targets
-from programs import printed
+from programs import install_once, printed
 
 import athcodec
 from athcodec.gpu import GpuFile
@@ -94,12 +94,16 @@ def small_ath(small_clip, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def core_object(tmp_path_factory):
+def core_object(built_once):
     """The decoder with its GPU form as one object, made of the file that amalgamate.py writes."""
-    folder = tmp_path_factory.mktemp("core")
-    printed(sys.executable, CORE / "amalgamate.py", "--gpu", folder / "ath.c")
-    coder.compile_c(folder / "ath.o", [folder / "ath.c"], "-DATH_STATIC", "-O0", "-c")
-    return folder / "ath.o"
+    text, made = (built_once / "core" / name for name in ("ath.c", "ath.o"))
+
+    def build() -> None:
+        printed(sys.executable, CORE / "amalgamate.py", "--gpu", text)
+        coder.compile_c(made, [text], "-DATH_STATIC", "-O0", "-c")
+
+    install_once(made.parent, made.name, build)
+    return made
 
 
 def built(folder: Path, sources: list[Path], *options: str) -> Path:
