@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import tomllib
+from collections.abc import Iterator
 from fnmatch import fnmatch
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -145,10 +146,22 @@ LARGEST = {"module": (600,), "class": (300, 25), "function": (60, 6)}
 """Lines, and then methods of a class or arguments of a function that may be passed without a name."""
 
 
+def statements(node: ast.AST) -> list[ast.AST]:
+    """Return what stands directly in a node but expressions, which are most of a tree and define nothing with lines."""
+    return [part for part in ast.iter_child_nodes(node) if not isinstance(part, ast.expr)]
+
+
+def definitions(part: ast.AST) -> Iterator[ast.ClassDef | ast.FunctionDef]:
+    """Yield the classes and functions of a part, itself among them."""
+    if isinstance(part, (ast.ClassDef, ast.FunctionDef)):
+        yield part
+    for inner in statements(part):
+        yield from definitions(inner)
+
+
 def lines_without_docstrings(part: ast.ClassDef | ast.FunctionDef) -> int:
     """Return the lines of a class or function, without the docstrings of it and of what is in it."""
-    documented = (node for node in ast.walk(part) if isinstance(node, (ast.ClassDef, ast.FunctionDef)))
-    texts = (ast.get_docstring(node, clean=False) for node in documented)
+    texts = (ast.get_docstring(one, clean=False) for one in definitions(part))
     return part.end_lineno - part.lineno + 1 - sum(text.count("\n") + 1 for text in texts if text is not None)
 
 
@@ -157,7 +170,7 @@ def large_parts(tree: ast.Module, module: str) -> set[str]:
     large = {module} if tree.body and tree.body[-1].end_lineno > LARGEST["module"][0] else set()
 
     def look(node: ast.AST, place: str) -> None:
-        for part in ast.iter_child_nodes(node):
+        for part in statements(node):
             name = f"{place}.{getattr(part, 'name', '')}"
             if isinstance(part, ast.ClassDef):
                 sizes = lines_without_docstrings(part), sum(isinstance(one, ast.FunctionDef) for one in part.body)
