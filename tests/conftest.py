@@ -61,8 +61,6 @@ def pytest_configure(config):
     """
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # Each of the hundreds of Pythons that tests start would compile the package anew.
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     expression, names = config.option.markexpr, tiers(config)
     last = max((place for place, name in enumerate(names) if re.search(rf"\b{name}\b", expression)), default=None)
     if last is not None:

@@ -100,7 +100,8 @@ def test_a_bound_in_scene_units_is_taken_as_it_is(small, tmp_path):
 
 
 def test_a_looser_bound_gives_a_smaller_file(sample_clip):
-    sizes = [len(athcodec.encode(sample_clip, effort="fast", rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
+    clip = sample_clip.replace(positions=sample_clip.block(0, 40), time=sample_clip.time[:40])
+    sizes = [len(athcodec.encode(clip, effort="fast", rel_error=r)) for r in (1e-5, 1e-4, 1e-3, 1e-2)]
     assert sizes == sorted(sizes, reverse=True) and sizes[0] > 4 * sizes[-1]
 
 
@@ -292,7 +293,7 @@ def test_half_of_the_progress_is_about_half_of_the_work(frames, effort, tmp_path
 
 @pytest.mark.parametrize("effort", ["fast", "default", "best"])
 def test_the_same_clip_gives_the_same_bytes(effort, bushy_clip):
-    clip = bushy_clip.replace(positions=bushy_clip.block(0, 33), time=bushy_clip.time[:33])
+    clip = bushy_clip.replace(positions=bushy_clip.block(0, 17), time=bushy_clip.time[:17])  # two segments
     first, second = (athcodec.encode(clip, effort=effort, segment_frames=16) for _ in range(2))
     assert first == second
 
@@ -444,7 +445,7 @@ def test_the_work_of_decoding_is_proportional_to_the_length_of_a_clip(tmp_path, 
         with coded(clip, tmp_path / "s.ath", rel_error=1e-2, segment_frames=16, effort="fast") as decoder:
             return work_of(decoder.positions)
 
-    assert work(8_000) < 1.2 * 8 * work(1_000)
+    assert work(4_000) < 1.2 * 8 * work(500)
 
 
 def test_segments_are_short_enough_for_a_decoder_within_its_default_memory():

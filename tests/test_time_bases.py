@@ -21,12 +21,12 @@ from bench.trees.plant import grow
 from spec.document import File
 
 
-def hit_by_a_gust(seed: int = 5, frames: int = 90) -> athcodec.MotionClip:
-    """A calm shrub that bends once."""
+def hit_by_a_gust(seed: int = 5, frames: int = 60, after: float = 1.0) -> athcodec.MotionClip:
+    """A calm shrub that bends once, after so many seconds."""
     bones, rng = Bones.of(grow(300, 2, 8.0, seed)), np.random.default_rng(seed)
     time, stems = np.arange(frames) / FPS, len(bones.branch_parent)
     late, strength = rng.uniform(0, 0.5, stems), rng.uniform(0.25, 0.75, stems)
-    hit = strength * np.exp(-(((time[:, None] - 2 - late) / 0.35) ** 2))
+    hit = strength * np.exp(-(((time[:, None] - after - late) / 0.35) ** 2))
     turns = gusty(time, stems, 0.01, 0.0, rng) + hit[..., None] * np.sqrt([0.5, 0, 0.5])
     return clip_of(bones, bones.bent(turns))
 
@@ -59,7 +59,7 @@ def stems_heads(data: bytes) -> list[tuple[int, int, int]]:
 
 
 def test_levels_share_a_basis_that_lies_with_the_first_of_them(tmp_path):
-    path, clip = tmp_path / "gust.ath", hit_by_a_gust()
+    path, clip = tmp_path / "gust.ath", hit_by_a_gust(frames=90, after=2.0)
     summary = athcodec.encode(clip, path, rel_error=3e-4, ladder="none", attributes="none")
     assert summary.choices["common_basis"]
     (_, base, length), *others = stems_heads(path.read_bytes())
@@ -117,7 +117,7 @@ def test_branches_whose_bending_turns_nothing_make_a_sum_of_shapes_smaller(tmp_p
         plan = encoding.draft(clip, rel_error=1e-4, ladder="none", **without)
         return encoding.write(clip, plan, encoding.code_segments(clip, plan, [0]), tmp_path / "a.ath").bytes
 
-    clip = sum_of_shapes()
+    clip = sum_of_shapes(side=9, frames=80)
     assert size() < 0.8 * size(without=frozenset({Feature.STILL}))
 
 
