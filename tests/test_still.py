@@ -150,8 +150,7 @@ def test_trees_with_leaves_on_a_turntable_cost_little_more_than_trees_that_stand
     standing, turning = 0, 0
     for seed in range(16, 21):
         clips = [leafed_tree(seed, 100, 200, turn) for turn in (0.0, 2 * np.pi)]
-        bound = 1e-4 * float(np.linalg.norm(np.ptp(clips[0].positions.reshape(-1, 3), axis=0)))
-        sizes = [size_of(clip, bound, ladder=ladder) for clip in clips]
+        sizes = [size_of(clip, bound_of(clips[0].positions), ladder=ladder) for clip in clips]
         standing, turning = standing + 1.05 * sizes[0] + 500, turning + sizes[1]
     assert turning <= standing
 

@@ -21,10 +21,9 @@ from athcodec.encoding.search.still import STILL_SHARE
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
 from athcodec.motion.branches.finding import candidates, named_labels
-from athcodec.motion.branches.result import Found, hierarchy_on, with_branches
+from athcodec.motion.branches.result import Found, hierarchy_on, order_of, with_branches
 from athcodec.motion.branches.still import clip_among, joined, still_parts
 from athcodec.motion.clip import MotionClip, stands_still
-from athcodec.motion.hierarchy import branch_orders
 from athcodec.options import DEFAULT_SEGMENT
 
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
@@ -84,7 +83,8 @@ def _best_candidate(
         next_trial = max(trial.least_work, work.done - before)  # Settings cost about as much on other branches.
         predicted += is_predicted
         ordered = [other for other, one in tried if _differ_in_order(one, branches)]
-        in_order = in_order or (size < min(ordered) if ordered else in_order)
+        if ordered and not in_order:
+            in_order = size < min(ordered)
         tried.append((size, branches))
         if number > 1:
             work.add(finding)
@@ -116,18 +116,14 @@ def _best_of(tried: list[tuple[float, Found]]) -> tuple[float, Found]:
     fewest = min(size for size, _ in tried)
     alike = [one for one in tried if one[0] <= ALIKE * fewest]
     least, best = min(alike, key=_order_and_size)
-    same = [one for one in alike if _order(one[1]) == _order(best) and one[0] <= SAME * least]
+    same = [one for one in alike if order_of(one[1]) == order_of(best) and one[0] <= SAME * least]
     return min(same, key=lambda one: (len(one[1].branch_parent), one[0]))
 
 
 def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
     size, branches = tried
-    order = _order(branches)
+    order = order_of(branches)
     return order == 0, order, size
-
-
-def _order(branches: Found) -> int:
-    return int(branch_orders(branches.branch_parent).max())
 
 
 class Trial:

@@ -358,7 +358,7 @@ class Search:
                 known.free_rigid = best_freedom(search.trials.start, search.trials).free_rigid
         if not known.free_rigid:
             return self
-        return Search(replace(trials, start=replace(start, free_rigid=True)), self.effort, self.ratios, self.beside)
+        return self._starting_at(replace(start, free_rigid=True))
 
     def _best_turn(self, most: float = HOPELESS_TURN) -> Search:
         """Return this search, whose roots turn, or one without rotations if that begins with a smaller file: roots
@@ -379,8 +379,11 @@ class Search:
 
     def _without_turns(self) -> Search:
         start = self.trials.start
-        plain = replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors))
-        return Search(replace(self.trials, start=plain), self.effort, self.ratios, self.beside)
+        return self._starting_at(replace(start, rotation_step_factors=(0,) * len(start.rotation_step_factors)))
+
+    def _starting_at(self, start: Settings) -> Search:
+        """Return a search that starts with other settings, and has made no choices yet."""
+        return replace(self, trials=replace(self.trials, start=start))
 
     @property
     def _cost_at_start(self) -> float:
@@ -455,7 +458,7 @@ class Search:
         start = replace(start, free_rigid=trials.start.free_rigid)
         if not any(trials.start.rotation_step_factors):  # What sways far and does not turn sways about its mean, too.
             start = replace(start, rotation_step_factors=trials.start.rotation_step_factors)
-        return Search(replace(trials, source=source, ath=ath, start=start), self.effort, self.ratios, self.beside)
+        return replace(self, trials=replace(trials, source=source, ath=ath, start=start))
 
     def _like(self, other: Search, settings: Settings) -> Settings:
         """Return settings about this search's reference pose that follow the choices in `settings`, which the search

@@ -21,10 +21,10 @@ from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
 from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
-from athcodec.motion.branches.result import Found
+from athcodec.motion.branches.result import Found, order_of
 from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, near_neighbours, numbered, parts_of
 from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
-from athcodec.motion.hierarchy import branch_orders, branches_from_edges
+from athcodec.motion.hierarchy import branches_from_edges
 from athcodec.options import METHODS, whole
 
 LABEL_NAMES = ("vertex_branch", "branch", "branch_id", "branchid", "branch_index", "branchindex", "branch_number")
@@ -146,7 +146,9 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
         yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
     contact = _by_contact(seen, first) if roots <= PLANTS * len(first.branch_parent) else first
-    is_lower = _order(contact) < _order(first)  # Then leaves hang on leaves in the first ones, which sway much alike.
+    is_lower = order_of(contact) < order_of(
+        first
+    )  # Then leaves hang on leaves in the first ones, which sway much alike.
     if is_lower:
         yield contact
     yield dataclasses.replace(first, stem_index=None)
@@ -157,10 +159,6 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
     if len(unwelded.branch_parent) != len(first.branch_parent):
         yield unwelded
-
-
-def _order(branches: Found) -> int:
-    return int(branch_orders(branches.branch_parent).max())
 
 
 def _by_contact(seen: Seen, first: Found) -> Found:

@@ -49,7 +49,6 @@ class Found:
 
     def __str__(self) -> str:
         """Return a line that says how many branches were found, and how."""
-        orders = branch_orders(self.branch_parent)
         roots = int((self.branch_parent < 0).sum())
         sizes = np.bincount(self.vertex_branch)
         method = f"{self.method} ({self.array_name})" if self.array_name else self.method
@@ -57,8 +56,13 @@ class Found:
             return f"1 branch by {method}: all {sizes[0]:,} vertices"
         return (
             f"{len(sizes):,} branches by {method}: {roots:,} without a parent, "
-            f"up to order {orders.max()}, {sizes.min():,} to {sizes.max():,} vertices each"
+            f"up to order {order_of(self)}, {sizes.min():,} to {sizes.max():,} vertices each"
         )
+
+
+def order_of(branches: Found) -> int:
+    """Return the highest order of any of the branches, 0 if all are roots."""
+    return int(branch_orders(branches.branch_parent).max())
 
 
 def checked_branches(vertex_branch: np.ndarray, parent: np.ndarray, stem_index: np.ndarray, method: str) -> Found:
