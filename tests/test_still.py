@@ -10,12 +10,15 @@ from plants import blown_tree, turns
 
 import athcodec
 from athcodec.encoding.encoder import encode_clip
+from athcodec.encoding.search.choices.reference import turned_pose
 from athcodec.encoding.search.trials import Trials
 from athcodec.motion.branches.common_motion import carried, without_common_motion
 from athcodec.motion.branches.result import Found
 from athcodec.motion.branches.still import still_parts
 from athcodec.motion.clip import MotionClip
+from athcodec.motion.hierarchy import build_hierarchy
 from bench.data import Canopy
+from bench.scenes import fields
 from bench.scenes.assembly import bare
 
 SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
@@ -214,7 +217,57 @@ def test_feet_of_several_plants_carry_all_of_them():
     on_feet = carried(found, standing)
     assert on_feet.branch_parent.tolist() == [9] * 9 + [-1]
     feet = np.flatnonzero(on_feet.vertex_branch == 9)
-    assert set(feet) <= set(range(0, 54, 6)) and np.ptp(standing[0, feet], axis=0)[[0, 2]].min() > 1.5
+    assert on_feet.is_carried and np.ptp(standing[0, feet], axis=0)[[0, 2]].min() > 1.5
+    # The lowest two vertices of each plant stand still: half a ring would leave a tube that is none.
+    assert len(feet) == 8 and set(feet % 6) == {0, 1} and set(feet[feet % 6 == 0] + 1) == set(feet[feet % 6 == 1])
+
+
+def on_a_table(clip: MotionClip) -> MotionClip:
+    """A clip whose scene turns once about the middle."""
+    positions = clip.block(0, clip.frame_count).astype(np.float64)
+    around = turns(np.linspace(0, 2 * np.pi, clip.frame_count)[:, None] * [0.0, 1.0, 0.0])
+    middle = positions.mean(axis=(0, 1))
+    return clip.replace(positions=((positions - middle) @ around.transpose(0, 2, 1) + middle).astype(np.float32))
+
+
+SCENES = {
+    "wheat": lambda: fields.ribbons(seed=102, plants=10, points=20),
+    "hedge": lambda: fields.stems(seed=101, plants=6),
+    "tubes": lambda: fields.tubes(seed=101, plants=10, rings=16, sides=5),
+    "kelp": lambda: fields.kelp(seed=101, plants=4),
+}
+
+
+@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("name", SCENES)
+def test_several_plants_on_one_turntable_turn_once(name, ladder):
+    clip = bare(SCENES[name]().clip)
+    standing, turning = (size_of(one, bound_of(clip.positions), ladder=ladder) for one in (clip, on_a_table(clip)))
+    assert turning <= 1.05 * standing + 800
+
+
+def test_feet_that_stand_still_are_no_motion_of_the_rest():
+    """A leaf that is held by its stalk may swing as a whole, although the stalk keeps its shape, too."""
+    random = np.random.default_rng(8)
+    leaf, stalk = random.uniform(-1, 1, (300, 3)) * [1.0, 0.05, 0.4], random.uniform(-1, 1, (20, 3)) * 0.3
+    swings = turns(np.linspace(0, 1.5, 12)[:, None] * [0.0, 0.0, 1.0])
+    swung = (leaf + [1.3, 0.0, 0.0]) @ swings.transpose(0, 2, 1)
+    frames = np.concatenate([np.broadcast_to(stalk, (12, 20, 3)), swung], axis=1)
+    left = without_common_motion(np.concatenate([frames[:1], frames]))
+    assert left is not None and np.ptp(left[:, 20:], axis=0).max() < 0.2 * np.ptp(frames[:, 20:], axis=0).max()
+
+
+def test_what_turns_and_keeps_its_shape_is_coded_about_the_middle_of_its_turns():
+    hierarchy = build_hierarchy(
+        np.repeat([0, 1], 40), np.array([-1, -1]), rest := np.random.default_rng(9).random((80, 3))
+    )
+    rest = rest[hierarchy.vertex_source]
+    mean = 0.5 * rest @ turns(np.array([[0.0, 0.7, 0.0]]))[0].T
+    pose = turned_pose(rest, mean, hierarchy)
+    for tree in (slice(0, 40), slice(40, 80)):
+        apart, before = (np.linalg.norm(one[tree] - one[tree][:1], axis=1) for one in (pose, rest))
+        np.testing.assert_allclose(apart, before, atol=1e-12)
+        np.testing.assert_allclose(pose[tree] - pose[tree][:1], 2 * (mean[tree] - mean[tree][:1]), atol=1e-9)
 
 
 def test_organs_that_grow_in_proportion_do_not_stand_still():

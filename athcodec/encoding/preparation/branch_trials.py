@@ -20,14 +20,16 @@ from athcodec.encoding.search.segment_samples import TRIAL_FRAMES
 from athcodec.encoding.search.still import STILL_SHARE
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
+from athcodec.files.threads import SERIAL
 from athcodec.motion.branches.finding import candidates, named_labels
 from athcodec.motion.branches.result import Found, hierarchy_on, order_of, with_branches
 from athcodec.motion.branches.still import clip_among, joined, still_parts
 from athcodec.motion.clip import MotionClip, stands_still
+from athcodec.motion.polygons import POLYGON_ARRAYS
 from athcodec.options import DEFAULT_SEGMENT
 
 FILLED = 0.8  # Share of a target size that a file fills at the bound at which branches are compared.
-TRIAL_SHARE = 0.3  # Largest share of the work that is left that trying a candidate takes.
+TRIAL_SHARE = 0.2  # Largest share of the work left before the first trial that each takes: sizes are of equal searches.
 ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
 SAME = 1.02  # The same up to which fewer branches of the same order are better.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
@@ -87,9 +89,9 @@ def _best_candidate(
             in_order = size < min(ordered)
         tried.append((size, branches))
         if number > 1:
-            work.add(finding)
             if predicted == number or not work.fits(finding + next_trial):
                 break
+            work.add(finding)
     least, best = _best_of(tried)
     if best.stem_index is None or in_order is False or not work.fits(next_trial):
         return best, least
@@ -111,19 +113,25 @@ def _differ_in_order(first: Found, second: Found) -> bool:
 def _best_of(tried: list[tuple[float, Found]]) -> tuple[float, Found]:
     """Return the best of the candidates that were tried, with about the bytes of its file: among those of about the
     same size one of the lowest order, but of roots alone last; among the smallest of these the one of the fewest
-    branches.
+    branches. A branch that carries all others adds no order, and is better than the same order without: it turns once.
     """
     fewest = min(size for size, _ in tried)
     alike = [one for one in tried if one[0] <= ALIKE * fewest]
-    least, best = min(alike, key=_order_and_size)
-    same = [one for one in alike if order_of(one[1]) == order_of(best) and one[0] <= SAME * least]
+    least, best = min(alike, key=_rank_and_size)
+    rank = _rank(best)
+    same = [one for one in alike if _rank(one[1]) == rank and one[0] <= SAME * least]
     return min(same, key=lambda one: (len(one[1].branch_parent), one[0]))
 
 
-def _order_and_size(tried: tuple[float, Found]) -> tuple[bool, int, float]:
-    size, branches = tried
+def _rank(branches: Found) -> tuple[bool, int, bool]:
+    """Return what ranks branches among others whose file is about as large, the best first."""
     order = order_of(branches)
-    return order == 0, order, size
+    return order == 0, order - branches.is_carried, not branches.is_carried
+
+
+def _rank_and_size(tried: tuple[float, Found]) -> tuple[bool, int, bool, float]:
+    size, branches = tried
+    return *_rank(branches), size
 
 
 class Trial:
@@ -136,10 +144,19 @@ class Trial:
         """
         start = max(0, (clip.frame_count - TRIAL_FRAMES) // 2)
         stop = min(clip.frame_count, start + TRIAL_FRAMES)
-        self._clip = MotionClip(clip.block(start, stop), np.arange(start, stop) / clip.fps, rest=clip.source_rest)
+        faces = {name: clip.attributes[name] for name in POLYGON_ARRAYS if name in clip.attributes}
+        self._clip = MotionClip(
+            clip.block(start, stop),
+            np.arange(start, stop) / clip.fps,
+            rest=clip.source_rest,
+            faces=clip.faces,
+            attributes=faces,
+            metadata=clip.metadata,
+        )
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option, self._options, self._work = option, options, work
+        self._most_work = TRIAL_SHARE * (work.allowed - work.done)
         self._hopeless, self._polygons = Hopeless(), stored_polygons(clip, options)
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
@@ -161,12 +178,21 @@ class Trial:
             host_rest=host_rest,
             polygons=self._polygons,
         )
-        source = Source(coded, survey(clip, hierarchy), DEFAULT_SEGMENT)
-        options = EncodingOptions(attributes="none", lossless=lossless, ladder=self._options.ladder)
+        options = EncodingOptions(
+            segment_frames=DEFAULT_SEGMENT,
+            rest_precision=self._options.rest_precision,
+            attributes="none",
+            lossless=lossless,
+            ladder=self._options.ladder,
+            without=self._options.without,
+        )
+        source = Source.of(coded, survey(clip, hierarchy), options, SERIAL)
         decisions = FileDecisions(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(decisions)
-        with self._work.trying("branches", TRIAL_SHARE):
+        left = self._work.allowed - self._work.done
+        share = min(1.0, self._most_work / left) if 0 < left < math.inf else 1.0
+        with self._work.trying("branches", share):
             bound = self._option.in_scene_units(source, decisions.file_size)
             self._hopeless.divide(branches.vertex_branch, branches.branch_parent)
             return decisions.tried(bound, self._work, self._frames_ratio, self._hopeless)

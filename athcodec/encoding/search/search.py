@@ -17,7 +17,7 @@ from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search import order
 from athcodec.encoding.search.choices import forms, learned_bases, learned_pieces, rotations
 from athcodec.encoding.search.choices.node_steps import best_node_steps, cost_with_maps, inner_nodes, work_of_steps
-from athcodec.encoding.search.choices.reference import mean_pose
+from athcodec.encoding.search.choices.reference import mean_pose, turned_pose
 from athcodec.encoding.search.choices.rest import best_slack, with_slack
 from athcodec.encoding.search.choices.rigid import best_freedom, calm_parts
 from athcodec.encoding.search.choices.steps import best_stage_steps, best_steps, finer_steps, walked
@@ -43,6 +43,8 @@ WORTHY_TURN = 0.95  # The same up to which trials of branches look at roots that
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
 FIRST_POSE_TRIALS = 6  # Trials that show whether another reference pose is better at once.
 CLOSE_POSES = 1.03  # Bytes about one reference pose, over those about another, up to which all choices are made again.
+MID_TURNS = 2  # Mean poses, each about the one before: the first is not in the middle of a full turn.
+FAR_TURN = 0.9  # Bytes about a mean pose, over those before, up to which another one may be better still.
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
@@ -153,6 +155,8 @@ class Search:
         search = search._with_freedom(OnPieces() if hopeless is None else hopeless.on_pieces)
         if any(start.rotation_step_factors):
             search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_branches)
+        elif rotations.rigid_roots_turn(source, samples, start.rigid):
+            search = search._in_mid_turn()
         trial = TRIAL + (search.of_sample or search).trials.work_of(ANALYSIS)
         expected = work.done + trial * expected_trials(effort, search.trials.is_layered, search.makes_all_again)
         work.expected = work.expected or min(expected, work.allowed)
@@ -393,18 +397,25 @@ class Search:
     def _in_mid_turn(self) -> Search:
         """Return the search about a pose in the middle of the turns of what turns as a whole, if that is cheaper: a
         rotation by a full turn has no numbers, and jumps before."""
-        if not self._may_have_mean_pose:
+        if not self._may_have_other_pose:
             return self
-        self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
-        other = self.about_mean_pose()
-        return other if other._cost_at_start < self._cost_at_start else self
+        best = self
+        for _ in range(MID_TURNS):
+            self.trials.work.add(LEARNING * self.trials.source.clip.vertex_count * self.trials.frames)
+            before, other = best._cost_at_start, best.about_mean_pose()
+            if other._cost_at_start < before:
+                best = other
+            if other._cost_at_start > FAR_TURN * before:
+                break
+        return best
 
     @property
-    def _may_have_mean_pose(self) -> bool:
-        source = self.trials.source
-        if self.effort == "fast" or source.host_rest or self.trials.without(Feature.MEAN_POSE):
-            return False
-        return not source.keeps_shape.any()  # The mean of what turns is smaller than what turns.
+    def _may_have_other_pose(self) -> bool:
+        return not (self.effort == "fast" or self.trials.source.host_rest or self.trials.without(Feature.MEAN_POSE))
+
+    @property
+    def _may_have_mean_pose(self) -> bool:  # The mean of what turns is smaller than what turns.
+        return self._may_have_other_pose and not self.trials.source.keeps_shape.any()
 
     def about_best_reference(self) -> Search:
         """Return this search, or one about the mean pose of the motion if that makes a smaller file than the rest pose
@@ -450,9 +461,13 @@ class Search:
         return cost_with_maps(settings, self.trials) + beside
 
     def about_mean_pose(self) -> Search:
-        """Return a search whose motion is coded about its mean pose, and which has made no choices yet."""
+        """Return a search whose motion is coded about its mean pose or, where faces are to keep their shape, about the
+        rest pose turned as the mean pose is. It has made no choices yet."""
         trials = self.trials
-        source = trials.source.about(mean_pose(trials.source, trials.ath, trials.start))
+        pose = mean_pose(trials.source, trials.ath, trials.start)
+        if trials.source.keeps_shape.any():
+            pose = turned_pose(trials.source.rest, pose, trials.source.hierarchy)
+        source = trials.source.about(pose)
         ath = replace(trials.ath, rest=source.rest + source.origin)
         start = first_settings(source, ath, trials.start.bound, trials.samples, self.ratios)
         start = replace(start, free_rigid=trials.start.free_rigid)

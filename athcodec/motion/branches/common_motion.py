@@ -19,14 +19,15 @@ PAIRED = 256  # Vertices of which all pairs are looked at, about.
 ROUNDS = 12  # Fits, each by what the one before leaves least of.
 LEAST_WEIGHED = 1e-5  # Of the diagonal: what a vertex is off by, below which it counts no more for it.
 MOST_LEFT = 0.2  # Share of the squares of all motion that the rest of it is at most if there is motion in common.
+MOST_SWAY = 0.8  # The same if vertices that keep their distances show that motion; plants may sway far about it.
 LEAST_TURN = 0.7  # Radians by which all turn at least where a foot stands still, or nothing is rigid.
 RIGID = 1e-5  # Distance, in diagonals, that a vertex moves at most beside the common motion to count as steady.
-RIGID_SHARE = 0.01  # Least share of the vertices that has to be steady.
+SETS = 16  # Sets of steady vertices that are looked at.
+AT_ENDS = 64  # Vertices at each end along the axis of a turn, of which all pairs are looked at, too.
 LEAST_STEADY = 8  # Least number of steady vertices: a turn known by fewer is one of noise.
 WIDE = 0.03  # Least spread of steady vertices in two directions, in diagonals.
 FEET = 4  # Vertices of a branch that carries others by which its turn is known, far apart.
 LEAST_FEET = 3  # Least number of these: fewer tell no turn.
-STEADY_FEET = 1e-4  # Of the diagonal: what feet are off by at most.
 FLAT = 0.05  # Extent of feet across their line, over that along it, that turns are known by.
 
 
@@ -36,68 +37,103 @@ def without_common_motion(frames: np.ndarray) -> np.ndarray | None:
     them. Return None if that removes little of the motion. `frames`: (1 + F, N, 3) positions, of which the first is the
     rest pose.
     """
-    some = slice(None, None, max(1, frames.shape[1] // VERTICES))
-    rest, poses = frames[0, some], frames[1:, some]
-    diagonal = float(np.linalg.norm(np.ptp(rest, axis=0)))
-    if not diagonal > 0 or len(rest) < LEAST_FEET:
+    diagonal = float(np.linalg.norm(np.ptp(frames[0], axis=0)))
+    if not diagonal > 0 or frames.shape[1] < LEAST_FEET:
         return None
+    some = np.arange(0, frames.shape[1], max(1, frames.shape[1] // VERTICES))
+    least = _fit(frames[:, some], np.ones(len(some)))[0]
+    ends = _ends(frames[0], least)
+    some = np.union1d(some, ends)
+    seen = frames[:, some]
+    rows = np.union1d(np.arange(0, len(some), max(1, len(some) // PAIRED)), np.searchsorted(some, ends))
     way = np.square(frames[1:] - frames[0]).sum(axis=2).max(axis=0)
     foot = int(way.argmin())
     stands = bool(way[foot] <= (RIGID * diagonal) ** 2)
-    steady = _steady(frames[:, some], RIGID * diagonal)
-    if stands or steady is None:
-        least = _fit(rest, poses, np.ones(len(rest)))[0]
-        if np.arccos(np.clip((np.trace(least, axis1=1, axis2=2).min() - 1) / 2, -1, 1)) < LEAST_TURN:
-            return None
-    weight = np.ones(len(rest)) if steady is None else steady
-    for _ in range(ROUNDS):
-        back, from_centre, to_centre = _fit(rest, poses, weight)
-        left = (poses - to_centre[:, None]) @ back - (rest - from_centre)
-        weight = 1 / (np.square(left).sum(axis=2).mean(axis=0) + (LEAST_WEIGHED * diagonal) ** 2)
-    if np.square(left).sum() > MOST_LEFT * np.square(poses - rest).sum():
+    hardly_turns = bool(np.trace(least, axis1=1, axis2=2).min() > 1 + 2 * np.cos(LEAST_TURN))
+    if stands and hardly_turns:
         return None
+    moves = way[some] > (RIGID * diagonal) ** 2
+    sets = [steady for steady in _steady_sets(seen, rows, RIGID * diagonal) if moves[steady].any()]
+    if not sets and hardly_turns:
+        return None
+    floor = (LEAST_WEIGHED * diagonal) ** 2
+    if sets:
+        fits = [_fit(seen, steady.astype(np.float64)) for steady in sets]
+        fit = min(fits, key=lambda one: float(np.log(_left2(seen, one).mean(axis=0) + floor).sum()))
+    else:
+        fit = _fit(seen, np.ones(len(some)))
+        for _ in range(ROUNDS):  # Each makes that sum smaller.
+            fit = _fit(seen, 1 / (_left2(seen, fit).mean(axis=0) + floor))
+    left = _left2(seen, fit)
+    if left.sum() > (MOST_SWAY if sets else MOST_LEFT) * np.square(seen[1:] - seen[0]).sum():
+        return None
+    back, from_centre, to_centre = fit
     if stands:  # On the axis of the turn.
         from_centre, to_centre = frames[0, foot], frames[1:, foot]
     moved = (frames[1:] - to_centre[:, None]) @ back + from_centre
     return np.concatenate([frames[:1], moved])
 
 
-def _fit(rest: np.ndarray, poses: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rotations, (F, 3, 3), that take the poses, (F, N, 3), back to the rest pose best from the right, with
-    weights (N,), and the centres there, (3,), and in the poses, (F, 3)."""
+def _fit(frames: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the rotations, (F, 3, 3), that take all frames but the first, (1 + F, N, 3), back to that best from the
+    right, with weights (N,), and the centres in the first, (3,), and in the others, (F, 3)."""
+    rest, poses = frames[0], frames[1:]
     weight = weight / weight.sum()
     from_centre, to_centre = weight @ rest, np.einsum("n,fni->fi", weight, poses)
     moments = np.einsum("n,fni,nj->fij", weight, poses - to_centre[:, None], rest - from_centre)
     return nearest_rotations(moments), from_centre, to_centre
 
 
-def _steady(frames: np.ndarray, most: float) -> np.ndarray | None:
-    """Return weights of the vertices, (N,), 1 for those of the largest set whose distances from one vertex of the set
-    change by at most `most` over the frames, (F, N, 3), and 0 for the others. Return None if the set is small, or lies
-    along a line, as on a stiff branch, from which no rotation can be told.
+def _left2(frames: np.ndarray, fit: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the squares of how far a fit leaves vertices from their places in the first frame, (F, N)."""
+    back, from_centre, to_centre = fit
+    left: np.ndarray = np.square((frames[1:] - to_centre[:, None]) @ back - (frames[0] - from_centre)).sum(axis=2)
+    return left
+
+
+def _ends(rest: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Return the vertices at both ends of a plant along the axis about which it turns, where its feet are."""
+    turns = np.stack([rotations[:, i, j] - rotations[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
+    order = np.argsort(rest @ np.linalg.svd(turns)[2][0], kind="stable")
+    return np.unique(np.concatenate([order[:AT_ENDS], order[-AT_ENDS:]]))
+
+
+def _steady_sets(frames: np.ndarray, rows: np.ndarray, most: float) -> list[np.ndarray]:
+    """Return some sets of vertices, (N,) bool, whose distances from each other change by at most `most` over the
+    frames, (F, N, 3). Each is what keeps its distance from one of `rows`, without what keeps it from few others of
+    these; the largest ones are tried. Sets are left out that are small, or so narrow, as on a stiff branch, that a
+    rotation cannot be told from what distances change.
     """
-    count = frames.shape[1]
-    some = np.arange(0, count, max(1, count // PAIRED))
-    least, largest = np.full((2, len(some), count), np.inf)
+    least, largest = np.full((2, len(rows), frames.shape[1]), np.inf)
     largest *= -1
     for pose in frames:
-        apart = np.linalg.norm(pose[some, None] - pose[None], axis=2)
+        size2 = np.square(pose).sum(axis=1)
+        apart = np.sqrt(np.maximum(size2[rows, None] + size2 - 2 * pose[rows] @ pose.T, 0))
         np.minimum(least, apart, out=least)
         np.maximum(largest, apart, out=largest)
-    keeps = largest - least <= most
-    best = keeps[keeps.sum(axis=1).argmax()]
-    if np.count_nonzero(best) < max(LEAST_STEADY, RIGID_SHARE * count):
-        return None
-    rigid = frames[0, best]
-    spread = np.linalg.svd(rigid - rigid.mean(axis=0), compute_uv=False) / np.sqrt(len(rigid))
-    is_wide = spread[1] >= WIDE * np.linalg.norm(np.ptp(frames[0], axis=0))
-    return best.astype(np.float64) if is_wide else None
+    change, diagonal = largest - least, np.linalg.norm(np.ptp(frames[0], axis=0))
+    keeps = change <= most
+    sets: list[np.ndarray] = []
+    about, tried = np.ones(len(rows), bool), 0
+    while tried < SETS and about.any():
+        row = int(np.where(about, keeps.sum(axis=1), 0).argmax())
+        near = keeps[row]
+        steady = near & (2 * keeps[near[rows]].sum(axis=0) > np.count_nonzero(near[rows]))
+        about[steady[rows]] = about[row] = False
+        tried += 1
+        if np.count_nonzero(steady) < LEAST_STEADY:
+            continue
+        rigid = frames[0, steady]
+        spread = np.linalg.svd(rigid - rigid.mean(axis=0), compute_uv=False) / np.sqrt(len(rigid))
+        if spread[1] * most >= WIDE * diagonal * change[steady[rows]][:, steady].max(initial=0.0):
+            sets.append(steady)
+    return sets
 
 
 def carried(branches: Found, frames: np.ndarray) -> Found | None:
-    """Return branches with one more, on which all roots hang: it consists of some first vertices of roots, which stand
-    still in `frames`, from which the common motion was removed. Return None if there are too few such vertices, or if
-    they lie along a line.
+    """Return branches with one more, on which all roots hang: it consists of the first vertices of some roots, which
+    stand still in `frames`, from which the common motion was removed. Return None if there are too few such roots, or
+    if they stand in a line. All first vertices that stand still go with them, so that tubes and ribbons stay whole.
     """
     label, parent = branches.vertex_branch.astype(np.int64), branches.branch_parent.astype(np.int64)
     roots = parent < 0
@@ -106,17 +142,23 @@ def carried(branches: Found, frames: np.ndarray) -> Found | None:
     place = source_stem_index(label) if branches.stem_index is None else branches.stem_index.astype(np.int64)
     rest, diagonal = frames[0], float(np.linalg.norm(np.ptp(frames[0], axis=0)))
     off = np.sqrt(np.square(frames - rest).sum(axis=2).max(axis=0))
-    is_first = (place == 0) & (np.bincount(label) > 1)[label]
-    feet = np.flatnonzero(roots[label] & is_first & (off <= STEADY_FEET * diagonal))
+    size = np.bincount(label)
+    first_moving = size - 1  # Of a root that stands still, too, a vertex is left.
+    moving = np.flatnonzero(off > RIGID * diagonal)
+    np.minimum.at(first_moving, label[moving], place[moving])
+    feet = np.flatnonzero(roots[label] & (place == 0) & (first_moving > 0)[label])
     if len(feet) < LEAST_FEET:
         return None
     feet = feet[_far_apart(rest[feet], FEET)]
     extent = np.linalg.svd(rest[feet] - rest[feet].mean(axis=0), compute_uv=False)
     if extent[1] <= FLAT * extent[0]:
         return None
-    place[np.isin(label, label[feet])] -= 1
-    place[feet] = np.arange(len(feet))
-    label[feet] = len(parent)
+    is_carrier = np.isin(label, label[feet])
+    place[is_carrier] -= first_moving[label[is_carrier]]
+    standing = np.flatnonzero(is_carrier & (place < 0))
+    standing = standing[np.lexsort((place[standing], label[standing]))]
+    place[standing] = np.arange(len(standing))
+    label[standing] = len(parent)
     above = np.append(np.where(roots, len(parent), parent), -1)
     index = None if branches.stem_index is None else place
     return dataclasses.replace(
@@ -124,6 +166,7 @@ def carried(branches: Found, frames: np.ndarray) -> Found | None:
         stem_index=index,
         array_name=branches.array_name,
         links=branches.links,
+        is_carried=True,
     )
 
 

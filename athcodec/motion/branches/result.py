@@ -29,6 +29,8 @@ class Found:
     links : (L, 2) integer array, optional
         Pairs of vertices, of a branch and of its parent, by which the encoder hangs branches on each other; a branch
         without one hangs on the vertex of its parent that is nearest to its base.
+    is_carried : bool, optional
+        Whether the last branch carries all others, which turn or travel with it.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class Found:
     method: str
     array_name: str = ""
     links: np.ndarray | None = None
+    is_carried: bool = False
 
     def __repr__(self) -> str:
         return f"<Found: {self}>"

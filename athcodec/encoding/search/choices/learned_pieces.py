@@ -17,6 +17,7 @@ from athcodec.encoding.search.choices.steps import walked
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
+NEAR_RATIO = 1.03  # Bytes, over the least, up to which other pieces are learned about the coded rest pose as well.
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
 
 
@@ -52,9 +53,22 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
     starts = in_each_basis(settings, trials)
     if any(settings.learned_bases):  # Time bases were chosen before learned modes were known, too.
         starts.append(settings.in_waves())
-    if any(settings.rotation_step_factors) and any(settings.learned_bases) and not trials.is_layered:
-        starts.append(trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials)))
-    return learned_anew(trials.cheapest([best_pieces(start, trials) for start in starts]), trials)
+    if any(settings.rotation_step_factors) and not trials.is_layered:
+        if any(settings.learned_bases):
+            starts.append(trials.cheapest(learned_bases.candidates(settings.with_rotations(0), trials)))
+        else:
+            start = trials.start
+            starts.append(
+                replace(settings, rotation_step_factors=start.rotation_step_factors, roots_turn=start.roots_turn)
+            )
+    plain = [replace(start, learned_pieces=None, learned_saving=None) for start in starts]
+    if trials.without(Feature.SHAPES):
+        return trials.cheapest(plain)
+    learned = [candidate for start in plain for candidate in candidates(start, trials)]
+    best = trials.cheapest([*plain, *learned])
+    most = NEAR_RATIO * trials.cost(best)  # Learned about the coded rest pose, more pieces may pay.
+    near = [other for other in learned if other is not best and trials.cost(other) <= most]
+    return trials.cheapest([learned_anew(one, trials) for one in [best, *near]])
 
 
 def learned_anew(settings: Settings, trials: Trials) -> Settings:

@@ -34,10 +34,19 @@ def first_rotations(
     """Return the factor of each stage that a search starts with: none turn, or the roots do where most of what stands
     on them turns with them. Other choices, above all the mean pose, depend on it too much to wait for rotations. rigid:
     (B,) of branches that turn in any case if it is not 0."""
-    turns = Feature.ROTATIONS not in source.without and not rigid[source.hierarchy.branch_parent < 0].all()
+    turns = Feature.ROTATIONS not in source.without and not _are_rigid_roots(source, rigid)
     turns = turns and _turn_as_wholes(source, samples)
     count = min(2, stages) if turns else 0
     return (FINEST,) * count + (0,) * (stages - count)
+
+
+def rigid_roots_turn(source: Source, samples: Sequence[SegmentSample], rigid: np.ndarray) -> bool:
+    """Return whether the roots are rigid, and turn what stands on them as a whole without a rotation factor."""
+    return _are_rigid_roots(source, rigid) and _turn_as_wholes(source, samples)
+
+
+def _are_rigid_roots(source: Source, rigid: np.ndarray) -> bool:
+    return bool(rigid[source.hierarchy.branch_parent < 0].all())
 
 
 def with_fine_roots(settings: Settings) -> Settings:
