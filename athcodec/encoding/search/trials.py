@@ -329,7 +329,13 @@ class Trials:
             self.work.add(progress.EIGENVECTOR * longest**3 * len(stages) * len(self.samples))
             release_memory()
             learned = [
-                time_components(plan, settings.of_segment(sample.whole_loop), sample.positions, stages)
+                time_components(
+                    plan,
+                    settings.of_segment(sample.whole_loop),
+                    sample.positions,
+                    stages,
+                    last=plan is not prelude.plan and sample is self.samples[-1],
+                )
                 for sample in self.samples
             ]
             self._time_components[key] = settings.step, learned

@@ -635,12 +635,15 @@ def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: 
 
 
 def time_components(
-    plan: Plan, settings: Settings, positions: np.ndarray, stages: Sequence[int | None]
+    plan: Plan, settings: Settings, positions: np.ndarray, stages: Sequence[int | None], last: bool = False
 ) -> dict[int | None, TimeComponents]:
-    """Return the components of some stages, or of all that moves (None), from a finer pass."""
+    """Return the components of some stages, or of all that moves (None), from a finer pass. `last`: whether the plan is
+    of no use afterwards, so that its bases are freed."""
     if not stages:
         return {}
     segment = analyse_finely(plan, settings, positions)
+    if last:
+        plan.forget_bases()
     may_be_in_waves = Feature.WAVE_BASES not in settings.without
     return {stage: TimeComponents(*_stage_moments(segment, stage), segment.waves, may_be_in_waves) for stage in stages}
 

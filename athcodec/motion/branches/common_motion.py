@@ -22,7 +22,6 @@ MOST_LEFT = 0.2  # Share of the squares of all motion that the rest of it is at 
 MOST_SWAY = 0.8  # The same if vertices that keep their distances show that motion; plants may sway far about it.
 LEAST_TURN = 0.7  # Radians by which all turn at least where a foot stands still, or nothing is rigid.
 RIGID = 1e-5  # Distance, in diagonals, that a vertex moves at most beside the common motion to count as steady.
-SETS = 16  # Sets of steady vertices that are looked at.
 AT_ENDS = 64  # Vertices at each end along the axis of a turn, of which all pairs are looked at, too.
 LEAST_STEADY = 8  # Least number of steady vertices: a turn known by fewer is one of noise.
 WIDE = 0.03  # Least spread of steady vertices in two directions, in diagonals.
@@ -53,19 +52,15 @@ def without_common_motion(frames: np.ndarray) -> np.ndarray | None:
     if stands and hardly_turns:
         return None
     moves = way[some] > (RIGID * diagonal) ** 2
-    sets = [steady for steady in _steady_sets(seen, rows, RIGID * diagonal) if moves[steady].any()]
-    if not sets and hardly_turns:
+    steady = _steady(seen, rows, moves, RIGID * diagonal)
+    if steady is None and hardly_turns:
         return None
     floor = (LEAST_WEIGHED * diagonal) ** 2
-    if sets:
-        fits = [_fit(seen, steady.astype(np.float64)) for steady in sets]
-        fit = min(fits, key=lambda one: float(np.log(_left2(seen, one).mean(axis=0) + floor).sum()))
-    else:
-        fit = _fit(seen, np.ones(len(some)))
-        for _ in range(ROUNDS):  # Each makes that sum smaller.
-            fit = _fit(seen, 1 / (_left2(seen, fit).mean(axis=0) + floor))
+    fit = _fit(seen, np.ones(len(some)) if steady is None else steady.astype(np.float64))
+    for _ in range(ROUNDS if steady is None else 0):
+        fit = _fit(seen, 1 / (_left2(seen, fit).mean(axis=0) + floor))
     left = _left2(seen, fit)
-    if left.sum() > (MOST_SWAY if sets else MOST_LEFT) * np.square(seen[1:] - seen[0]).sum():
+    if left.sum() > (MOST_LEFT if steady is None else MOST_SWAY) * np.square(seen[1:] - seen[0]).sum():
         return None
     back, from_centre, to_centre = fit
     if stands:  # On the axis of the turn.
@@ -98,11 +93,11 @@ def _ends(rest: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     return np.unique(np.concatenate([order[:AT_ENDS], order[-AT_ENDS:]]))
 
 
-def _steady_sets(frames: np.ndarray, rows: np.ndarray, most: float) -> list[np.ndarray]:
-    """Return some sets of vertices, (N,) bool, whose distances from each other change by at most `most` over the
-    frames, (F, N, 3). Each is what keeps its distance from one of `rows`, without what keeps it from few others of
-    these; the largest ones are tried. Sets are left out that are small, or so narrow, as on a stiff branch, that a
-    rotation cannot be told from what distances change.
+def _steady(frames: np.ndarray, rows: np.ndarray, moves: np.ndarray, most: float) -> np.ndarray | None:
+    """Return the widest set of vertices, (N,) bool, whose distances from each other change by at most `most` over the
+    frames, (F, N, 3), and some of which move: feet are far apart, and what else is stiff is a branch. A set is what
+    keeps its distance from one of `rows`, without what keeps it from few others of these. Return None if all are small,
+    or so narrow that a rotation cannot be told from what distances change. `moves`: (N,) bool.
     """
     least, largest = np.full((2, len(rows), frames.shape[1]), np.inf)
     largest *= -1
@@ -113,21 +108,20 @@ def _steady_sets(frames: np.ndarray, rows: np.ndarray, most: float) -> list[np.n
         np.maximum(largest, apart, out=largest)
     change, diagonal = largest - least, np.linalg.norm(np.ptp(frames[0], axis=0))
     keeps = change <= most
-    sets: list[np.ndarray] = []
-    about, tried = np.ones(len(rows), bool), 0
-    while tried < SETS and about.any():
-        row = int(np.where(about, keeps.sum(axis=1), 0).argmax())
+    left, best, widest = keeps.sum(axis=1) >= LEAST_STEADY, None, 0.0
+    while left.any():
+        row = int(left.argmax())
         near = keeps[row]
         steady = near & (2 * keeps[near[rows]].sum(axis=0) > np.count_nonzero(near[rows]))
-        about[steady[rows]] = about[row] = False
-        tried += 1
-        if np.count_nonzero(steady) < LEAST_STEADY:
+        left[steady[rows]] = left[row] = False
+        if np.count_nonzero(steady) < LEAST_STEADY or not moves[steady].any():
             continue
         rigid = frames[0, steady]
-        spread = np.linalg.svd(rigid - rigid.mean(axis=0), compute_uv=False) / np.sqrt(len(rigid))
-        if spread[1] * most >= WIDE * diagonal * change[steady[rows]][:, steady].max(initial=0.0):
-            sets.append(steady)
-    return sets
+        width = float(np.linalg.svd(rigid - rigid.mean(axis=0), compute_uv=False)[1] / np.sqrt(len(rigid)))
+        is_wide = width * most >= WIDE * diagonal * change[steady[rows]][:, steady].max(initial=0.0)
+        if is_wide and width > widest:
+            best, widest = steady, width
+    return best
 
 
 def carried(branches: Found, frames: np.ndarray) -> Found | None:
