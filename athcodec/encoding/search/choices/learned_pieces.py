@@ -17,7 +17,7 @@ from athcodec.encoding.search.choices.steps import walked
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
 
-NEAR_RATIO = 1.1  # Bytes, over the least, up to which other pieces are learned about the coded rest pose as well.
+NEAR_RATIO = 1.2  # Bytes, over the least, up to which other pieces are learned about the coded rest pose as well.
 REQUIRED_SAVINGS = (1.0, 1.25)  # Factors by which a piece's estimated bits have to shrink for learned modes.
 
 
