@@ -19,7 +19,7 @@ PAIRED = 256  # Vertices of which all pairs are looked at, about.
 ROUNDS = 12  # Fits, each by what the one before leaves least of.
 LEAST_WEIGHED = 1e-5  # Of the diagonal: what a vertex is off by, below which it counts no more for it.
 MOST_LEFT = 0.2  # Share of the squares of all motion that the rest of it is at most if there is motion in common.
-MOST_SWAY = 0.8  # The same if vertices that keep their distances show that motion; plants may sway far about it.
+MOST_SWAY = 0.8  # The same if vertices that keep their distances turn far: plants on a table may sway far about it.
 LEAST_TURN = 0.7  # Radians by which all turn at least where a foot stands still, or nothing is rigid.
 RIGID = 1e-5  # Distance, in diagonals, that a vertex moves at most beside the common motion to count as steady.
 AT_ENDS = 64  # Vertices at each end along the axis of a turn, of which all pairs are looked at, too.
@@ -60,7 +60,8 @@ def without_common_motion(frames: np.ndarray) -> np.ndarray | None:
     for _ in range(ROUNDS if steady is None else 0):
         fit = _fit(seen, 1 / (_left2(seen, fit).mean(axis=0) + floor))
     left = _left2(seen, fit)
-    if left.sum() > (MOST_LEFT if steady is None else MOST_SWAY) * np.square(seen[1:] - seen[0]).sum():
+    most = MOST_LEFT if steady is None or hardly_turns else MOST_SWAY
+    if left.sum() > most * np.square(seen[1:] - seen[0]).sum():
         return None
     back, from_centre, to_centre = fit
     if stands:  # On the axis of the turn.
