@@ -15,8 +15,9 @@ from athcodec.encoding.search.choices import learned_bases
 from athcodec.encoding.search.search import Search
 from athcodec.encoding.search.trials import Trials
 from athcodec.encoding.segments.settings import Settings
+from athcodec.motion.branches.result import with_branches
 from bench import odd
-from bench.scenes import fields
+from bench.scenes import fields, singles
 
 
 def sheet(**options) -> MotionClip:
@@ -134,6 +135,17 @@ def test_rotations_that_trials_show_to_be_larger_are_not_taken_where_work_ends(m
 
     monkeypatch.setattr(Search, "first_layer", last)
     assert len(athcodec.encode(clip, rel_error=1e-4)) <= 1.01 * usual
+
+
+@pytest.mark.parametrize("share", [0.5, 0.35])
+def test_leaves_hung_in_many_orders_are_hardly_larger_where_work_is_short(share, monkeypatch):
+    """Each trial of a deep hierarchy takes much work: time bases, which save most, may not wait for other choices, and
+    of two refinements the one that is smaller by trials is coded."""
+    clip = singles.willow(seed=1, leaves=60).without_faces().bare()
+    clip = with_branches(clip, athcodec.find_branches(clip))
+    usual = len(athcodec.encode(clip, rel_error=1e-4))
+    allow(share, monkeypatch)
+    assert len(athcodec.encode(clip, rel_error=1e-4)) <= 1.02 * usual
 
 
 @pytest.mark.parametrize("share", [0.001, 0.1])

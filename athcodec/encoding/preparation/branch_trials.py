@@ -156,7 +156,7 @@ class Trial:
         self._clip.rest_given = clip.rest_given
         self._frames_ratio = clip.frame_count / (stop - start)
         self._option, self._options, self._work = option, options, work
-        self._most_work = TRIAL_SHARE * (work.allowed - work.done)
+        self._most_work = TRIAL_SHARE * work.left
         self._hopeless, self._polygons = Hopeless(), stored_polygons(clip, options)
         self.least_work = LEAST_TRIALS * (TRIAL + ANALYSIS * clip.vertex_count * (stop - start))
 
@@ -190,7 +190,7 @@ class Trial:
         decisions = FileDecisions(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(decisions)
-        left = self._work.allowed - self._work.done
+        left = self._work.left
         share = min(1.0, self._most_work / left) if 0 < left < math.inf else 1.0
         with self._work.trying("branches", share):
             bound = self._option.in_scene_units(source, decisions.file_size)

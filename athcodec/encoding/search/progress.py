@@ -83,6 +83,11 @@ class Work:
         with self._lock:
             self.done += int(work)
 
+    @property
+    def left(self) -> float:
+        """Work that is still allowed; below 0 if more was done."""
+        return self.allowed - self.done
+
     def fits(self, work: float) -> bool:
         """Return whether so much more work is allowed; else the choice that is tried counts as left out."""
         if self.done + work <= self.allowed:

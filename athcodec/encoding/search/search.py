@@ -308,7 +308,7 @@ class Search:
 
     def _share_beside(self, trials: int) -> float:
         """Return the share of the work that is left that leaves room for so many more trials, but at least half."""
-        left = self.trials.work.allowed - self.trials.work.done
+        left = self.trials.work.left
         return max(0.5, 1 - trials * self.trials.work_of_trial / left) if left > 0 else 1.0
 
     def _after(self, choices: Sequence[Choose], settings: Settings) -> Settings:
@@ -328,9 +328,9 @@ class Search:
         return self._after([*(choices if self.effort != "fast" else []), best_node_steps], first)
 
     def refinements(self) -> Iterator[Settings]:
-        """Yield settings that may suit the layers after the first, each of which has one stream: first with rotations,
-        then without, leaving out what trials show to be much larger. Without rotations or with a single layer, the best
-        settings are yielded.
+        """Yield settings that may suit the layers after the first, each of which has one stream: with rotations and
+        without, the smaller one by trials first, leaving out what these show to be much larger. Without rotations or
+        with a single layer, the best settings are yielded.
         """
         settings, trials = self.best, self.trials
         if not trials.is_layered or not any(settings.rotation_step_factors):
@@ -347,7 +347,7 @@ class Search:
             candidates = [learned_pieces.best_pieces(candidate, trials) for candidate in candidates]
             most = REFINEMENTS_MAX_GAIN * min(map(trials.cost, candidates))
             candidates = [candidate for candidate in candidates if trials.cost(candidate) <= most]
-        yield from candidates
+        yield from sorted(candidates, key=trials.cost)
 
     def _with_freedom(self, known: OnPieces) -> Search:
         """Return this search, whose rigid parts move away from what they hang on if that is known to be smaller; if it

@@ -22,6 +22,7 @@ from athcodec.motion.sampling import spread
 HOPELESS_RATIO = 1.5  # Rotations that make a file so many times larger are not tried at the roots alone either.
 HOPELESS_STILL = 1.1  # Branches whose bending turns nothing, the same; time bases have not made up for more than 1.02.
 FAR_SMALLER = 0.8  # Share of the bytes in waves at which time bases stay at once.
+TRIALS_BEFORE_BASES = 20  # Trials up to which those of forms and rotations may leave none for time bases.
 
 FINEST = ROTATION_FACTORS[1]
 LEAST_TURN = 0.35  # Radians by which what turns as a whole turns at least.
@@ -87,9 +88,12 @@ def candidates(settings: Settings, factors: tuple[int, ...] = ROTATION_FACTORS) 
 def still_if_smaller(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with branches whose bending turns what they carry, or does not: a sum of a few shapes has as
     few tracks only in frames that do not turn. Where time bases make a file far smaller than waves do, they stay, so
-    that the choices that follow are made in them, and take less work."""
+    that the choices that follow are made in them, and take less work. Where little work is left, they stay if they are
+    smaller at all: they would be tried after other choices, and would not be then."""
     in_waves, best = _first_moves(settings, trials)
-    return best if trials.cost(best) <= FAR_SMALLER * trials.cost(in_waves) else replace(in_waves, still=best.still)
+    has_time = trials.work.left >= TRIALS_BEFORE_BASES * trials.work_of_trial
+    smaller = FAR_SMALLER if has_time else 1.0
+    return best if trials.cost(best) <= smaller * trials.cost(in_waves) else replace(in_waves, still=best.still)
 
 
 def _kinds(settings: Settings, trials: Trials) -> list[tuple[Settings, list[Settings]]]:
