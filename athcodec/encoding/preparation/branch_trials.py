@@ -114,9 +114,10 @@ def _best_of(tried: list[tuple[float, Found]]) -> tuple[float, Found]:
     """Return the best of the candidates that were tried, with about the bytes of its file: among those of about the
     same size one of the lowest order, but of roots alone last; among the smallest of these the one of the fewest
     branches. A branch that carries all others adds no order, and is better than the same order without: it turns once.
+    If roots alone are smallest, others have to be closer.
     """
-    fewest = min(size for size, _ in tried)
-    alike = [one for one in tried if one[0] <= ALIKE * fewest]
+    fewest, smallest = min(tried, key=lambda one: one[0])
+    alike = [one for one in tried if one[0] <= (SAME if order_of(smallest) == 0 else ALIKE) * fewest]
     least, best = min(alike, key=_rank_and_size)
     rank = _rank(best)
     same = [one for one in alike if _rank(one[1]) == rank and one[0] <= SAME * least]

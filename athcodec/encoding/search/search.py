@@ -37,7 +37,8 @@ NEAREST = 3  # Steps are walked for so many other choices.
 NEAR_RATIO = 1.1  # Bytes of these, over the least.
 STEP_TRIALS = 12  # Trials of steps for which choices leave work.
 FIRST_LAYER_TRIALS = 6  # Trials of the first layer for which choices leave work.
-SEARCHED_SHARE = 0.8  # Share of the bytes of motion at its first settings that a search usually comes down to.
+WAVES_SHARE = 0.8  # Share of the bytes of motion in waves, at first settings, that a search usually comes down to.
+BASES_SHARE = 0.85  # The same for time bases, about which less is left to find.
 HOPELESS_TURN = 1.15  # Bytes in waves with roots that turn, over those without, above which bases do not help.
 WORTHY_TURN = 0.95  # The same up to which trials of branches look at roots that turn.
 OWN_BASES_SHARE = 0.8  # Share of the bytes at which time bases of each stage are taken, which layers cannot have.
@@ -221,17 +222,23 @@ class Search:
         return search._cost_of_frames(search.at_best_step, frames_ratio)
 
     def expected(self, frames_ratio: float, hopeless: Hopeless) -> float:
-        """Return about the bytes of a file of so many times the frames, by its bytes in waves and in time bases. What
-        is compared so takes the same few trials, whatever work is left: with either alone sizes are ranked well, but
-        not one in waves against one in time bases. `hopeless`: what these trials leave out."""
+        """Return about the bytes of a file of so many times the frames, by what is expected of its bytes in waves and
+        in time bases, whichever is less. What is compared so takes the same few trials, whatever work is left.
+        `hopeless`: what these trials leave out."""
         search = self.of_sample or self
-        typical = rotations.typical_moves(search.trials.start, search.trials, hopeless)
-        size = sum(search._cost_of_frames(move, SEARCHED_SHARE * frames_ratio) for move in typical) / len(typical)
+        moves = rotations.typical_moves(search.trials.start, search.trials, hopeless)
+        shares = [BASES_SHARE if any(move.learned_bases) else WAVES_SHARE for move in moves]
+        sizes = [search._cost_of_frames(move, share * frames_ratio) for move, share in zip(moves, shares)]
+        size = min(sizes)
         if search is self:
             return size
         trials = self.trials  # A sample's poses tell less of the whole plant's than its motion does.
         trials.work.add(POSE * trials.source.clip.vertex_count)
-        return size - search.trials.prelude_bytes(typical[0]) + prelude_size(trials.source, trials.ath, trials.start)
+        return (
+            size
+            - search.trials.prelude_bytes(moves[sizes.index(size)])
+            + prelude_size(trials.source, trials.ath, trials.start)
+        )
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
