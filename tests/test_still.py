@@ -18,7 +18,7 @@ from athcodec.motion.branches.still import still_parts
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import build_hierarchy
 from bench.data import Canopy
-from bench.scenes import fields
+from bench.scenes import fields, singles
 from bench.scenes.assembly import bare
 
 SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
@@ -200,6 +200,14 @@ def test_what_stands_still_does_not_make_the_rest_pose_of_what_moves_finer():
     alone = size_of(MotionClip(both[:, :count], time, rest=rest[:count]), bound)
     alone += size_of(MotionClip(both[:, count:], time), bound)
     assert size_of(MotionClip(both, time, rest=rest), bound) <= 1.05 * alone
+
+
+def test_what_stands_still_does_not_leave_modes_of_what_moves_beside_its_rest_pose():
+    """Modes that take back how the rest pose of what moves is rounded would not fit that of both."""
+    scene = singles.tree_on_terrain(side=100).without_faces()
+    bound = 1.02 * bound_of(scene.clip.positions)
+    alone = sum(size_of(scene.part(plant), bound) for plant in np.unique(scene.plant))
+    assert size_of(scene.bare(), bound) <= 1.08 * alone
 
 
 def test_common_motion_is_taken_off_as_if_plants_stood():

@@ -152,7 +152,8 @@ class Search:
         start = first_settings(source, ath, bound, samples, ratios)
         everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
-        search = cls(Trials(source, ath, start, samples, everything, jobs, work), effort, ratios, beside)
+        trials = Trials(source, ath, start, samples, everything, jobs, work, is_whole=beside is None)
+        search = cls(trials, effort, ratios, beside)
         search = search._with_freedom(OnPieces() if hopeless is None else hopeless.on_pieces)
         if any(start.rotation_step_factors):
             search = search._best_turn() if hopeless is None else search._best_turn_of_trial(hopeless.on_branches)
@@ -516,7 +517,9 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        of_sample = Trials(sample.source, sample.ath, some, samples, extrapolation, trials.jobs, trials.work)
+        of_sample = Trials(
+            sample.source, sample.ath, some, samples, extrapolation, trials.jobs, trials.work, trials.is_whole
+        )
         return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:
