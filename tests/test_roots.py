@@ -7,6 +7,7 @@ import pytest
 
 import athcodec
 from athcodec import MotionClip
+from athcodec.encoding.decisions import FileDecisions
 from athcodec.encoding.preparation.bounds import BoundOption
 from athcodec.encoding.preparation.branch_trials import Trial, best_branches
 from athcodec.encoding.search.progress import Work
@@ -133,6 +134,21 @@ def test_leaves_that_hinge_in_a_storm_hang_on_twigs_and_not_on_each_other(nodes,
         len(athcodec.encode(clip, rel_error=1e-4, ladder="none", attributes="none")) for clip in (bare(tree), tree)
     )
     assert found <= MOST * true
+
+
+def test_branches_are_tried_with_what_keeps_narrow_faces_in_shape(monkeypatch):
+    """Sizes that are compared without it are those of another file."""
+    keeps: list[np.ndarray] = []
+    decide = FileDecisions.tried
+
+    def noted(decisions: FileDecisions, *args):
+        keeps.append(decisions.source.keeps_shape)
+        return decide(decisions, *args)
+
+    monkeypatch.setattr(FileDecisions, "tried", noted)
+    blades = bare(fields.ribbons(seed=3, plants=6, points=8).clip)
+    best_branches(blades, BoundOption(rel_error=1e-4), Work(), is_compared=True)
+    assert keeps and all(some.all() for some in keeps)
 
 
 def test_no_branches_are_tried_that_would_take_the_work_of_the_search(monkeypatch):

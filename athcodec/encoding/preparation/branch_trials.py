@@ -191,9 +191,7 @@ class Trial:
         decisions = FileDecisions(source, options, predicts_as_usual=True)
         if self._option.target_size is not None:
             self._option = self._bound_of_target(decisions)
-        left = self._work.left
-        share = min(1.0, self._most_work / left) if 0 < left < math.inf else 1.0
-        with self._work.trying("branches", share):
+        with self._work.trying("branches", most=self._most_work):
             bound = self._option.in_scene_units(source, decisions.file_size)
             self._hopeless.divide(branches.vertex_branch, branches.branch_parent)
             return decisions.tried(bound, self._work, self._frames_ratio, self._hopeless)

@@ -97,12 +97,13 @@ class Work:
         return False
 
     @contextmanager
-    def trying(self, choice: str, share: float = 1.0) -> Iterator[None]:
+    def trying(self, choice: str, share: float = 1.0, most: float = math.inf) -> Iterator[None]:
         """Return a context in which the choice that is tried is reported by its name, and may take at most `share` of
-        the work left.
+        the work left, and no more than `most`.
         """
         before = self._choice, self.allowed
-        self._choice, self.allowed = choice, min(self.allowed, self.done + share * max(0.0, self.allowed - self.done))
+        allowed = self.done + min(share * max(0.0, self.left), most)
+        self._choice, self.allowed = choice, min(self.allowed, allowed)
         try:
             self.report()
             yield

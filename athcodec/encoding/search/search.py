@@ -230,16 +230,12 @@ class Search:
         moves = rotations.typical_moves(search.trials.start, search.trials, hopeless)
         shares = [BASES_SHARE if any(move.learned_bases) else WAVES_SHARE for move in moves]
         sizes = [search._cost_of_frames(move, share * frames_ratio) for move, share in zip(moves, shares)]
-        size = min(sizes)
+        size, move = min(zip(sizes, moves), key=lambda expected: expected[0])
         if search is self:
             return size
         trials = self.trials  # A sample's poses tell less of the whole plant's than its motion does.
         trials.work.add(POSE * trials.source.clip.vertex_count)
-        return (
-            size
-            - search.trials.prelude_bytes(moves[sizes.index(size)])
-            + prelude_size(trials.source, trials.ath, trials.start)
-        )
+        return size - search.trials.prelude_bytes(move) + prelude_size(trials.source, trials.ath, trials.start)
 
     def _cost_of_frames(self, settings: Settings, frames_ratio: float) -> float:
         return self.trials.cost(settings) + (frames_ratio - 1) * self.trials.stage_costs(settings).sum()
