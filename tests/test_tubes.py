@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from files import coded
 from moving_meshes import leafed_tree
-from plants import clip_of, ring_quads, tube
+from plants import bound_for, clip_of, ring_quads, tube
 
 from athcodec.encoding.search.choices.rings import ring_sizes
 from athcodec.encoding.streams import streams
 from athcodec.motion.clip import MotionClip
+from bench.scenes.assembly import Assembly
+from bench.scenes.stems import bent, swayed, tubes
+from bench.trees.ride import sideways
 
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004
@@ -124,6 +127,31 @@ def test_leaves_that_turn_by_more_than_a_right_angle_between_frames_do_not_tumbl
 def rotation(rng: np.random.Generator) -> np.ndarray:
     matrix = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     return matrix * np.sign(np.linalg.det(matrix))
+
+
+def test_modes_learned_for_pieces_are_not_those_of_a_form_with_other_pieces(scratch):
+    """25 rings of five vertices are two pieces as a sheet and three as a tube. Where the tube was tried with modes that
+    were learned for the sheet, encoding ended with an IndexError."""
+    clip = breathing_bark(seed=3)
+    with coded(clip, scratch / "bark.ath", rel_error=1e-4, ladder="none") as decoder:
+        error = np.linalg.norm(decoder.positions().astype(np.float64) - clip.positions, axis=2).max()
+    assert error <= bound_for(clip, 1e-4)
+
+
+def breathing_bark(seed: int) -> MotionClip:
+    """Leaves of three vertices on a stem of 25 rings, each vertex of which moves by a shape of its own, too."""
+    rng, time = np.random.default_rng(seed), np.arange(40) / 30
+    up, rings, leaves = np.array([[0.0, 1.0, 0.0]]), 25, 40
+    stem = bent(np.zeros((1, 3)), up, np.ones(1), rings, swayed(rng, time, np.zeros((1, 3)), 0.3))
+    bark = tubes(stem, np.linspace(0.04, 0.01, rings), 5)[0]
+    bark += rng.normal(0, 2e-3, (bark.shape[2], 3)) * np.sin(12 * time + 1)[:, None, None, None]
+    foot, base = stem.feet(np.zeros(leaves, int), rng.integers(3, rings, leaves))
+    heading = sideways(np.repeat(up, leaves, axis=0), rng.uniform(0, 6, leaves), 1.2)
+    leaf = bent(foot, heading, np.full(leaves, 0.2), 3, swayed(rng, time, foot[0], 0.5, flutter=0.3), base)
+    parts, no_faces = Assembly(), np.zeros((0, 4), int)
+    parts.add(bark, no_faces)
+    parts.add(leaf.centres, no_faces, parent=np.zeros(leaves, int))
+    return parts.scene().clip
 
 
 def test_no_part_is_moved_where_a_seam_has_decided_on_a_correction():

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from athcodec._native import SHEET
+from athcodec._native import PIECE_VERTICES, SHEET
 from athcodec.encoding.options.features import Feature
 from athcodec.encoding.search.choices.rings import ring_sizes
 from athcodec.encoding.search.segment_samples import SegmentSample
@@ -46,7 +46,22 @@ def candidates(settings: Settings, trials: Trials) -> list[Settings]:
             plain.insert(0, looks.astype(np.int32))
     with_tubes = [np.where(tubes > 0, tubes, forms) for forms in plain if tubes.any()]
     all_forms = with_tubes if settings.details[tubes > 0].any() else with_tubes + plain
-    return [replace(settings, forms=forms) for forms in all_forms]
+    return [_formed(settings, forms, trials.source.hierarchy.stem_count) for forms in all_forms]
+
+
+def _formed(settings: Settings, forms: np.ndarray, stem_count: np.ndarray) -> Settings:
+    """Return the settings with these forms of branches, and without learned modes if a branch of one of these forms is
+    of another number of pieces, since modes are learned for pieces by their numbers."""
+    other = replace(settings, forms=forms)
+    if np.array_equal(_piece_counts(forms, stem_count), _piece_counts(settings.forms, stem_count)):
+        return other
+    return replace(other, learned_pieces=None, learned_saving=None)
+
+
+def _piece_counts(forms: np.ndarray, stem_count: np.ndarray) -> np.ndarray:
+    """Return the number of pieces of each branch, (B,) (FORMAT.md, `piece_count`)."""
+    ring = np.where(forms > SHEET, forms, 1)
+    return -(-(-(-stem_count // ring)) // (PIECE_VERTICES // ring))
 
 
 def best_forms(settings: Settings, trials: Trials) -> Settings:
