@@ -101,9 +101,9 @@ def test_split_compares_sizes_bits_and_limits_in_both_orders():
 def test_branches_are_found_for_what_a_source_gives_besides():
     clip = scene_of("turntable").clip
     edges = np.stack([np.arange(5), np.arange(1, 6)], axis=1)
-    assert list(branches._given(clip)) == ["points"]
-    assert list(branches._given(clip.replace(edges=edges))) == ["edges", "points"]
-    given = branches._given(scene_of("wheat").clip)
+    assert list(branches._without_branches(clip)) == ["points"]
+    assert list(branches._without_branches(clip.replace(edges=edges))) == ["edges", "points"]
+    given = branches._without_branches(scene_of("wheat").clip)
     assert list(given) == ["faces"]
     assert all(isinstance(one, MotionClip) and not one.has_branches for one in given.values())
 
