@@ -25,7 +25,9 @@ from athcodec.motion.branches.result import Found, hierarchy_on
 from athcodec.motion.clip import Skin, source_stem_index
 from athcodec.motion.hierarchy import branch_orders
 from bench.odd.grass import ORDERS, grass
+from bench.scenes.stems import swayed
 from bench.trees.mesh import dress
+from bench.trees.ride import rotations
 from bench.trees.wind import Wind
 
 FRAMES = 24
@@ -291,6 +293,28 @@ def test_points_that_are_no_runs_are_taken_for_none(points):
     assert athcodec.find_branches(clip).method == "motion"
     with pytest.raises(ClipError, match="neighbours keep their distance"):
         athcodec.find_branches(clip, "runs")
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_leaves_are_found_among_points_scattered_over_them_in_no_order(seed):
+    positions, leaf = scattered_leaves(seed)
+    found = athcodec.find_branches(positions).vertex_branch
+    in_both = np.zeros((found.max() + 1, leaf.max() + 1))
+    np.add.at(in_both, (found, leaf), 1)
+    assert in_both.max(axis=1).sum() > 0.9 * len(leaf)  # Few points are in the branch of another leaf,
+    assert in_both.max(axis=0).sum() > 0.9 * len(leaf)  # and few leaves are divided.
+
+
+def scattered_leaves(seed: int, leaves: int = 40, points: int = 25, frames: int = 30) -> tuple[np.ndarray, np.ndarray]:
+    """A crown that sways, of leaves that turn by themselves, as points on them: positions (T, N, 3), and the leaf of
+    each point, (N,)."""
+    rng, time = np.random.default_rng(seed), np.arange(frames) / 30
+    centre = rng.normal(size=(leaves, 3)) * [0.5, 0.3, 0.5] + [0, 2, 0]
+    leaf = rng.permutation(np.repeat(np.arange(leaves), points))
+    place = rng.uniform(-1, 1, (len(leaf), 3)) * [0.05, 0.005, 0.12]
+    turned = np.einsum("tnij,nj->tni", rotations(swayed(rng, time, centre, 0.3))[:, leaf], place)
+    crown = 0.1 * np.sin(2 * time)[:, None, None] * centre[leaf, 1:2] * [1, 0, 0]
+    return (turned + centre[leaf] + crown).astype(np.float32), leaf
 
 
 def test_far_pieces_are_plants_of_their_own(dressed):

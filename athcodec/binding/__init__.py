@@ -34,7 +34,7 @@ from athcodec.files.atomic import FileId
 from athcodec.files.plain import FilePath
 from athcodec.files.shown import counted
 from athcodec.metrics import ErrorMeter
-from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import MotionClip, stands_still, stem_index_of
 from athcodec.motion.frames import Frames
 from athcodec.motion.joining import BLEND, HEADING, OWN, STRENGTH

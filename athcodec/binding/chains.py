@@ -17,7 +17,7 @@ import numpy as np
 
 from athcodec.decoding.clip_view import ClipView
 from athcodec.motion.algebra import nearest_rotations
-from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.hierarchy import Hierarchy
 from athcodec.motion.polygons import sides
 from athcodec.motion.quaternions import quaternions, rotation_matrices

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from athcodec.binding.search import Marks
-from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.scene import axis_turn
 from athcodec.motion.units import AXES, METRES
 

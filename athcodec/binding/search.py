@@ -8,8 +8,8 @@ import numpy as np
 
 from athcodec.binding.chains import Chains
 from athcodec.binding.surface import MeshPoints
-from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.seen import moments_of_each, sums_of_each
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.untyped import ScipyObject
 
 NEAREST = 8  # Marks looked at around each point; they tell the branches that it may be on.

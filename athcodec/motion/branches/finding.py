@@ -20,9 +20,10 @@ from athcodec.motion.branches.attachment import arranged
 from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
-from athcodec.motion.branches.point_runs import base_points, run_links, scipy_module
+from athcodec.motion.branches.point_runs import base_points, run_links
 from athcodec.motion.branches.result import Found, order_of
-from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, near_neighbours, numbered, parts_of
+from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, numbered, parts_of
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
 from athcodec.motion.hierarchy import branches_from_edges
 from athcodec.options import METHODS, whole
@@ -44,6 +45,7 @@ PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the sou
 COPIES = 8  # Parts from which on it is no accident that most are of one size.
 ALIKE_PARTS = 0.8  # Share of the parts that are then of one size.
 PLANTS = 0.5  # Part of the branches that are roots by their price above which they are plants side by side.
+BODY_PATCHES = (40, 16)  # Average vertices of a patch of points that nothing joins.
 FREE_PATCHES = (64, 200)  # Vertices of patches without parents.
 
 
@@ -105,6 +107,9 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     yield single
     if first is not None:
         yield first
+    if not len(seen.mesh):
+        yield from _of_bodies(seen)
+        return
     grown = seen.by_contact()  # Patches of one mesh hang on each other.
     yield _by_motion(grown, None)
     is_large = clip.vertex_count >= LARGE_MESH
@@ -172,6 +177,16 @@ def _in_order(seen: Seen) -> Iterator[Found]:
     write them."""
     for label in _labels_in_order(seen):
         yield dataclasses.replace(arranged(seen, label, None, "motion"), stem_index=None)
+
+
+def _of_bodies(seen: Seen) -> Iterator[Found]:
+    """Yield labels for points that nothing joins, in whatever order: their bodies, such as blades and leaves, and
+    patches of these, since what grows on a stem is of one body with it."""
+    label = components(seen.bodies, seen.clip.vertex_count)
+    if 0 < label.max() < PARTS_IN_ORDER * len(label):
+        yield arranged(seen, label, None, "motion")
+    for size in BODY_PATCHES:
+        yield _by_motion(seen, None, size)
 
 
 def _labels_in_order(seen: Seen) -> list[np.ndarray]:
@@ -420,8 +435,7 @@ def _free_patches(seen: Seen, patch_vertices: int) -> Found:
 
 def _patches(seen: Seen, patch_vertices: int) -> np.ndarray:
     """Return labels of patches grown over the mesh, (N,), or over near neighbours if there is none."""
-    links = seen.links if len(seen.links) else near_neighbours(seen.clip.rest, 8)
-    return rigid_patches(seen.frames, links, patch_vertices)
+    return rigid_patches(seen.frames, seen.neighbours, patch_vertices)
 
 
 _FINDERS: dict[str, Callable[[Seen, int | None], Found | None]] = {

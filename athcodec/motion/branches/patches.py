@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.seen import cheapest_of_each, components, numbered
+from athcodec.motion.branches.steady import scipy_module
 
 PATCH_ROUNDS = 8  # Largest number of rounds in which vertices change to other patches, and small patches join others.
 MOST_PATCHES = 2000  # Largest number of patches, which bounds the time that they take.
-CRUMB = 12  # Vertices below which a patch joins a neighbour.
+CRUMBS = 0.25, 12  # Part of the average below which a patch joins a neighbour, and most vertices of such a patch.
 
 
 def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) -> np.ndarray:
@@ -32,7 +32,8 @@ def rigid_patches(frames: np.ndarray, links: np.ndarray, patch_vertices: int) ->
         label[vertex[best]] = other[best]
         label = numbered(label)
     inner = links[label[links[:, 0]] == label[links[:, 1]]]
-    return _without_crumbs(components(inner, len(label)), links)
+    crumb = min(CRUMBS[0] * patch_vertices, CRUMBS[1])
+    return _without_crumbs(components(inner, len(label)), links, crumb)
 
 
 def _spread(rest: np.ndarray, links: np.ndarray, count: int) -> np.ndarray:
@@ -79,13 +80,13 @@ def _misfit(frames: np.ndarray, maps: np.ndarray, vertex: np.ndarray, label: np.
     return total
 
 
-def _without_crumbs(label: np.ndarray, links: np.ndarray) -> np.ndarray:
-    """Return the patch of each vertex, (N,), after patches of few vertices were merged into larger neighbours. `label`:
-    the patches before; `links`: (L, 2) pairs of neighbours.
+def _without_crumbs(label: np.ndarray, links: np.ndarray, crumb: float) -> np.ndarray:
+    """Return the patch of each vertex, (N,), after patches of fewer than `crumb` vertices were merged into larger
+    neighbours. `label`: the patches before; `links`: (L, 2) pairs of neighbours.
     """
     for _ in range(PATCH_ROUNDS):
         size = np.bincount(label)
-        leaves = (size[label[links[:, 0]]] < CRUMB) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])
+        leaves = (size[label[links[:, 0]]] < crumb) & (size[label[links[:, 0]]] < size[label[links[:, 1]]])
         if not leaves.any():
             break
         into = np.arange(len(size))

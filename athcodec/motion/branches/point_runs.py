@@ -7,20 +7,13 @@ is looked at: the order of the points does not matter.
 
 from __future__ import annotations
 
-import importlib
-
 import numpy as np
 
-from athcodec.errors import MissingExtra
-from athcodec.untyped import ScipyObject
+from athcodec.motion.branches.steady import STEADY, Distances, connected_parts, near_pairs, scipy_module
 
-NEAR = (16, 96)  # Nearest points of each one, at least and at most, among which neighbours are sought.
-PAIRS = 1 << 19  # Pairs in all, if that is more than the least.
 ROUNDS = 6  # Rounds of linking loose ends, among ever fewer points and so ever further away.
-PRECISION = 1e-7  # Part of the diagonal, and of the distance from the origin, below which a point stands still.
 USUAL = 0.25  # Quantile of the changes in length of all points' steadiest links that is a usual one.
 ALIKE = 30.0  # Times a usual change, up to which a link is steady.
-STEADY = 0.05  # Largest change of a steady link's length over its ends' motion against each other.
 PLIANT = 3.0  # Times a usual change, below which the shorter of two links is the better.
 UNSTEADY = 0.2  # A loose point is linked only if the link's length changes by less than this part.
 UNLIKE = 4.0  # Its other links must change more than this many times as much.
@@ -29,7 +22,6 @@ CROWD = 1.5  # Part of the length of a point's links within which other steady p
 CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
 SCATTERED = 0.05  # Links for each point, among its nearest ones, below which points form no runs.
 JOINED = 0.5  # Smallest share of the points that must be linked; with fewer, the points form no runs.
-PAIRS_AT_ONCE = 1 << 13  # Pairs of points whose distances are computed at once, which bounds memory.
 
 
 def run_links(frames: np.ndarray) -> np.ndarray | None:
@@ -40,14 +32,14 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
     count, steady = frames.shape[1], _Steady(frames)
     links, loose = np.zeros((0, 2), np.int64), np.arange(count)
     for turn in range(ROUNDS):
-        steady.add(_near_pairs(frames[-turn % len(frames), loose], loose))
+        steady.add(near_pairs(frames[-turn % len(frames), loose], loose))
         links, before = steady.tree(), len(links)
         if turn == 0 and (steady.beside(links) > CROWDED * count or len(links) < SCATTERED * count):
             return None
         if len(links) == before:
             break
         loose = np.flatnonzero(_degrees(links, count) < 2)
-    links = np.concatenate([links, steady.distinct(_near_pairs(frames[0, loose], loose), links)])
+    links = np.concatenate([links, steady.distinct(near_pairs(frames[0, loose], loose), links)])
     links = _with_still_points(frames, links, steady.precision)
     return links if np.count_nonzero(_degrees(links, count)) >= JOINED * count else None
 
@@ -59,7 +51,7 @@ def base_points(frames: np.ndarray, links: np.ndarray, root: int | None) -> np.n
     """
     count = frames.shape[1]
     way = np.sqrt(((frames - frames[0]) ** 2).sum(axis=(0, 2)))
-    part, is_inner = _parts(links, count), _degrees(links, count) > 1
+    part, is_inner = connected_parts(links, count), _degrees(links, count) > 1
     least = np.full(part.max() + 1, np.inf)
     np.minimum.at(least, part[~is_inner], way[~is_inner])
     moves_more = way > 2 * least[part]
@@ -73,11 +65,8 @@ class _Steady:
 
     def __init__(self, frames: np.ndarray):
         """Begin without pairs, for points with the positions `frames`, (F, N, 3)."""
-        self._start, self._count = frames[0], frames.shape[1]
-        self._tracks = (frames - frames[0].mean(axis=0)).transpose(1, 0, 2).astype(np.float32)
-        low, high = frames.min(axis=(0, 1)), frames.max(axis=(0, 1))
-        away = float(np.maximum(np.abs(low), np.abs(high)).max())
-        self.precision = PRECISION * max(float(np.linalg.norm(high - low)), away) + 1e-300
+        self._start, self._count, self._distances = frames[0], frames.shape[1], Distances(frames)
+        self.precision = self._distances.precision
         self._best = np.ones(self._count)  # Change of the steadiest pair of each point.
         self._pairs, self._change, self._length = np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0)
 
@@ -85,7 +74,7 @@ class _Steady:
         """Keep those of the given pairs of points, (P, 2), that keep their distance over the frames, beside the pairs
         kept before.
         """
-        change, length = self._measured(pairs)
+        change, length = self._distances.measured(pairs)
         for end in pairs.T:
             np.minimum.at(self._best, end, change)
         self._usual = float(np.quantile(self._best, USUAL))
@@ -96,28 +85,13 @@ class _Steady:
         self._change = np.concatenate([self._change, change[is_steady]])[once]
         self._length = np.concatenate([self._length, length[is_steady]])[once]
 
-    def _measured(self, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return two things for each pair of points, (P,): how much their distance changes over the frames, as a share
-        of the motion of one point relative to the other; and their mean distance.
-        """
-        change, length = np.empty(len(pairs)), np.empty(len(pairs))
-        for start in range(0, len(pairs), PAIRS_AT_ONCE):
-            some = slice(start, start + PAIRS_AT_ONCE)
-            way = self._tracks[pairs[some, 0]] - self._tracks[pairs[some, 1]]
-            apart = np.sqrt(np.einsum("ptk,ptk->pt", way, way))
-            way -= way.mean(axis=1, keepdims=True)
-            moved = np.sqrt(np.einsum("ptk,ptk->p", way, way) / way.shape[1])
-            change[some] = (apart.std(axis=1) + self.precision) / (moved + self.precision)
-            length[some] = apart.mean(axis=1)
-        return change, length
-
     def distinct(self, pairs: np.ndarray, links: np.ndarray) -> np.ndarray:
         """Return those of the given pairs, (L, 2), of which a point has no links yet, and whose distance is much
         steadier than that of any other pair with one of the two points. `links`: (L, 2) links that exist already.
         """
-        degree, part = _degrees(links, self._count), _parts(links, self._count)
+        degree, part = _degrees(links, self._count), connected_parts(links, self._count)
         pairs = pairs[part[pairs[:, 0]] != part[pairs[:, 1]]]
-        change, _ = self._measured(pairs)
+        change, _ = self._distances.measured(pairs)
         least = np.full((2, self._count), np.inf)
         for end in pairs.T:
             np.minimum.at(least[0], end, change)
@@ -172,39 +146,6 @@ def _with_still_points(frames: np.ndarray, links: np.ndarray, precision: float) 
     return links
 
 
-def _near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
-    """Return pairs of points that are near each other, (P, 2), each once, the smaller name first. `points`: (K, 3)
-    positions; `names`: (K,) the numbers by which the pairs name them.
-    """
-    if len(names) < 2:
-        return np.zeros((0, 2), np.int64)
-    count = min(len(names), 1 + int(np.clip(PAIRS // len(names), *NEAR)))
-    near = names[scipy_module("spatial").cKDTree(points).query(points, k=count)[1].reshape(-1)]
-    pairs = np.sort(np.stack([np.repeat(names, count), near], axis=1), axis=1)
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    size = int(names.max()) + 1
-    keys = np.sort(pairs[:, 0] * size + pairs[:, 1])
-    keys = keys[np.append(True, keys[1:] != keys[:-1])]
-    return np.stack([keys // size, keys % size], axis=1)
-
-
 def _degrees(links: np.ndarray, count: int) -> np.ndarray:
     """Return how many links each point has, (N,), of `count` points."""
     return np.bincount(links.reshape(-1), minlength=count)
-
-
-def _parts(links: np.ndarray, count: int) -> np.ndarray:
-    """Return a label (N,) for each point: the connected part that links make."""
-    graph = scipy_module("sparse").coo_matrix((np.ones(len(links), np.int8), links.T), (count, count))
-    labels: np.ndarray = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
-    return labels
-
-
-def scipy_module(name: str) -> ScipyObject:
-    """Return a module of scipy. Raises MissingExtra without it."""
-    try:
-        return importlib.import_module(f"scipy.{name}")
-    except ImportError:
-        raise MissingExtra(
-            'branches, and places of a mesh on a plant: needs scipy: pip install "athcodec[hierarchy]"'
-        ) from None

@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from athcodec.motion.branches.bodies import body_links
 from athcodec.motion.branches.common_motion import without_common_motion
-from athcodec.motion.branches.point_runs import scipy_module
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import sides
@@ -78,6 +79,16 @@ class Seen:
     def links(self) -> np.ndarray:
         """The links of `mesh`, and those between vertices that stay at one place."""
         return np.concatenate([self.mesh, self._pairs])
+
+    @cached_property
+    def bodies(self) -> np.ndarray:
+        """Pairs of points that are near each other on one body, (L, 2), for points that nothing joins."""
+        return body_links(self.frames[1:])  # The rest pose may be of other lengths.
+
+    @cached_property
+    def neighbours(self) -> np.ndarray:
+        """The links, or, of points that nothing joins, pairs near each other on one body, (L, 2)."""
+        return self.links if len(self.links) else self.bodies
 
     @cached_property
     def _pairs(self) -> np.ndarray:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from athcodec.motion.branches.point_runs import scipy_module
 from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import components, links_of, near_neighbours
+from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
 from athcodec.motion.frames import Frames
 from athcodec.motion.polygons import Polygons

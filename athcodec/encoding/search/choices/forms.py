@@ -61,7 +61,9 @@ def _formed(settings: Settings, forms: np.ndarray, stem_count: np.ndarray) -> Se
 def _piece_counts(forms: np.ndarray, stem_count: np.ndarray) -> np.ndarray:
     """Return the number of pieces of each branch, (B,) (FORMAT.md, `piece_count`)."""
     ring = np.where(forms > SHEET, forms, 1)
-    return -(-(-(-stem_count // ring)) // (PIECE_VERTICES // ring))
+    rings, of_piece = (stem_count + ring - 1) // ring, PIECE_VERTICES // ring
+    counts: np.ndarray = (rings + of_piece - 1) // of_piece
+    return counts
 
 
 def best_forms(settings: Settings, trials: Trials) -> Settings:
