@@ -19,7 +19,9 @@ from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import build_hierarchy
 from bench.data import Canopy
 from bench.scenes import fields, singles
-from bench.scenes.assembly import bare
+from bench.scenes.assembly import Assembly, bare
+from bench.scenes.stems import bent, headings, ribbons, tubes
+from bench.trees.ride import sideways
 
 SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
 
@@ -202,12 +204,48 @@ def test_what_stands_still_does_not_make_the_rest_pose_of_what_moves_finer():
     assert size_of(MotionClip(both, time, rest=rest), bound) <= 1.05 * alone
 
 
-def test_what_stands_still_does_not_leave_modes_of_what_moves_beside_its_rest_pose():
-    """Modes that take back how the rest pose of what moves is rounded would not fit that of both."""
+def test_modes_of_what_moves_fit_the_rest_pose_that_is_coded_with_what_stands_still():
+    """Modes that take back how the rest pose is rounded were either learned about the pose of what moves alone, which
+    fits only by luck, or not at all beside what stands still."""
     scene = singles.tree_on_terrain(side=100).without_faces()
     bound = 1.02 * bound_of(scene.clip.positions)
     alone = sum(size_of(scene.part(plant), bound) for plant in np.unique(scene.plant))
-    assert size_of(scene.bare(), bound) <= 1.08 * alone
+    assert size_of(scene.bare(), bound) <= 1.05 * alone
+
+
+@pytest.mark.slow
+def test_leaves_of_stems_that_stand_still_cost_as_much_as_those_that_hang_on_them():
+    """What stands still hung on nothing, and took learned modes away from what moves: up to a sixth more."""
+    clip = struck_leaves(seed=2)
+    bound = bound_of(clip.positions)
+    assert size_of(bare(clip), bound) <= 1.05 * size_of(clip, bound)
+
+
+def struck_leaves(seed: int, stems: int = 3, leaves: int = 40, frames: int = 50) -> MotionClip:
+    """Leaves on stems that stand still; each is struck once, and swings until it rests."""
+    rng, time = np.random.default_rng(seed), np.arange(frames) / 30
+    lean = np.broadcast_to(rng.normal(0, 0.3, (stems, 3)), (frames, stems, 3))
+    still = bent(np.zeros((stems, 3)), headings(rng, stems, 0.5), rng.uniform(1, 2, stems), 20, lean)
+    parts = Assembly()
+    parts.add(*tubes(still, np.linspace(0.03, 0.005, 20), 6))
+    on = rng.integers(0, stems, leaves)
+    foot, _ = still.feet(on, rng.integers(5, 19, leaves))
+    since = np.clip(time[:, None] - rng.uniform(0, 1.2, leaves), 0, None)
+    swing = rng.uniform(0.2, 0.8, leaves) * np.exp(-4 * since) * np.sin(30 * since)
+    heading = sideways(still.heading[on], rng.uniform(0, 6, leaves), 1.2)
+    leaf = bent(foot, heading, rng.uniform(0.1, 0.2, leaves), 4, swing[..., None] * np.cross(heading, [0, 1, 0.01]))
+    parts.add(*ribbons(leaf, rng.uniform(0, 6, leaves), np.array([0.004, 0.03, 0.03, 0.002])), parent=on)
+    return parts.scene().clip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fraction", [5e-4, 1e-3])
+def test_what_stands_still_is_counted_where_files_of_a_few_kilobytes_are_compared(fraction):
+    """The mean pose of what moves was chosen in a search that did not see it: the file was twice as large."""
+    scene = singles.tree_on_terrain(side=100)
+    bound = 1e4 * fraction * bound_of(scene.clip.positions)
+    alone = sum(size_of(scene.part(plant), bound, rest_error=None) for plant in np.unique(scene.plant))
+    assert size_of(scene.bare(), bound, rest_error=None) <= 1.05 * alone
 
 
 def test_common_motion_is_taken_off_as_if_plants_stood():

@@ -314,7 +314,8 @@ class FileDecisions:
                 return self._predicted(prediction.choice)
             best = self._best_of(search, choices, prelude)
             if self._is_short(best) and work.fits(work.done):
-                best = min(best, self._without_stages(bound, work), key=self._estimated_bytes)
+                others = best, self._without_stages(bound, work)
+                best = min(others, key=lambda one: self._estimated_bytes(one) + self._poses_beside(one, work))
             if prediction is None or prediction.bytes >= share * self._estimated_bytes(best):
                 return best
         except BoundError:
@@ -369,8 +370,15 @@ class FileDecisions:
     def _without_stages(self, bound: float, work: Work) -> Decided:
         """Return the best file with one node for the whole plant, whatever its error."""
         ath = self.seen.ath(Thresholds(bound, self.clip.frame_count, self.seen.largest_distance.max(), 0))
-        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs)
+        search = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs, beside=self.beside)
         return self._best_of(search, *search.decide())
+
+    def _poses_beside(self, decided: Decided, work: Work) -> float:
+        """Return the bytes that the poses of branches that stand still add to a file of those that move."""
+        choice = decided.choice
+        if self.beside is None:
+            return 0.0
+        return self.beside(self.source.about(choice.reference), decided.ath, choice.settings, work)
 
     def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
         """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""

@@ -49,7 +49,7 @@ FAR_TURN = 0.9  # Bytes about a mean pose, over those before, up to which anothe
 POSE_TRIALS = 18  # Trials that another reference pose takes, beside those of steps that it has to leave.
 
 Choose = Callable[[Settings, Trials], Settings]
-PosesBeside = Callable[[Trials, Settings], float]
+PosesBeside = Callable[[Source, Ath, Settings, Work], float]
 
 
 def settled(settings: Settings, trials: Trials) -> Settings:
@@ -116,8 +116,8 @@ class Search:
 
     The order is its only job: how a choice is made stands in choices/, how its bytes are counted in trials.py. `ratios`
     are those of the steps of the file's layers to that of the last, descending to 1. `beside`: returns the bytes that
-    poses of what stands still beside the plant add to the file, about the reference pose of some trials, at some
-    settings; None if nothing does.
+    poses of what stands still beside the plant add to the file of a source about some reference pose, with an ATH and
+    settings, and counts its work; None if nothing does.
     """
 
     trials: Trials
@@ -152,7 +152,7 @@ class Search:
         start = first_settings(source, ath, bound, samples, ratios)
         everything = ExtrapolationFactors.everything(start.stages)
         work.add(START * source.clip.vertex_count)
-        trials = Trials(source, ath, start, samples, everything, jobs, work, is_whole=beside is None)
+        trials = Trials(source, ath, start, samples, everything, jobs, work)
         search = cls(trials, effort, ratios, beside)
         search = search._with_freedom(OnPieces() if hopeless is None else hopeless.on_pieces)
         if any(start.rotation_step_factors):
@@ -461,8 +461,9 @@ class Search:
 
     def _cost_of(self, settings: Settings) -> float:
         """Return the bytes of this search's file, by which it is compared with one about another reference pose."""
-        beside = 0.0 if self.beside is None else self.beside(self.trials, settings)
-        return cost_with_maps(settings, self.trials) + beside
+        trials = self.trials
+        beside = 0.0 if self.beside is None else self.beside(trials.source, trials.ath, settings, trials.work)
+        return cost_with_maps(settings, trials) + beside
 
     def about_mean_pose(self) -> Search:
         """Return a search whose motion is coded about its mean pose or, where faces are to keep their shape, about the
@@ -513,9 +514,7 @@ class Search:
             branch_records(sample.source.hierarchy, sample.ath, some),
         )
         samples = [segment.of_plant(sample) for segment in trials.samples]
-        of_sample = Trials(
-            sample.source, sample.ath, some, samples, extrapolation, trials.jobs, trials.work, trials.is_whole
-        )
+        of_sample = Trials(sample.source, sample.ath, some, samples, extrapolation, trials.jobs, trials.work)
         return Search(of_sample, self.effort, self.ratios)
 
     def _candidates_of_sample(self, sample: Search) -> tuple[Settings, list[Settings]]:

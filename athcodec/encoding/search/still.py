@@ -12,15 +12,24 @@ import numpy as np
 
 from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.learned_modes import components, learn
 from athcodec.encoding.model.motion import LearnedModes, Plan
 from athcodec.encoding.options.shape import detail_of, finer_than
-from athcodec.encoding.search.progress import POSE
+from athcodec.encoding.search.progress import POSE, Work
 from athcodec.encoding.search.sample import PlantSample
+from athcodec.encoding.search.segment_samples import LEARNING_SEGMENTS
 from athcodec.encoding.search.start import still_choice
-from athcodec.encoding.search.trials import Trials
-from athcodec.encoding.segments.segment import Source, branch_records, poses_size, prelude_size
+from athcodec.encoding.segments.segment import (
+    CodedPrelude,
+    Source,
+    analyse_finely,
+    branch_records,
+    poses_size,
+    prelude_size,
+)
 from athcodec.encoding.segments.settings import OF_BRANCHES, Choice, Settings
 from athcodec.motion.branches.still import LEAST_STILL
+from athcodec.motion.sampling import spread
 from athcodec.motion.thresholds import Thresholds
 from athcodec.untyped import Keywords
 
@@ -68,20 +77,23 @@ class SplitSource:
         """The source, whose branches that stand still are not looked at when motion is coded."""
         return self.source.marking(self.still)
 
-    def poses_beside(self, trials: Trials, settings: Settings) -> float:
-        """Return the bytes of the poses of all branches less those of the branches that move alone, from trials on
-        these and their settings. They depend on the reference pose that the trials are about, because the source's rest
-        pose is coded beside another one in the steps that both parts have."""
-        source = self.about(trials.source.reference)
-        joined = [self._settings(settings, self._still_settings, may_be_coarser=flag) for flag in (True, False)]
-        trials.work.add(len(joined) * POSE * source.clip.vertex_count)
-        whole = min(prelude_size(source, self.ath, each) for each in joined)
-        return whole - prelude_size(trials.source, trials.ath, settings)
+    def poses_beside(self, moving: Source, ath: Ath, settings: Settings, work: Work) -> float:
+        """Return the bytes of the poses of all branches less those of the branches that move alone, for a file about
+        the reference pose of `moving`, with the thresholds of `ath`, at the settings of what moves. They depend on the
+        reference pose, because the source's rest pose is coded beside another one in the steps that both parts have."""
+        split = self._with_thresholds(ath.thresholds)
+        source = split.about(moving.reference)
+        joined = [split._settings(settings, split._still_settings, may_be_coarser=flag) for flag in (True, False)]
+        work.add(len(joined) * POSE * source.clip.vertex_count)
+        return min(prelude_size(source, split.ath, each) for each in joined) - prelude_size(moving, ath, settings)
 
     def choice(self, chosen: Choice, thresholds: Thresholds) -> Choice:
         """Return a choice for the branches that move, made for an ATH of some thresholds, for all branches."""
+        return self._with_thresholds(thresholds)._choice(chosen)
+
+    def _with_thresholds(self, thresholds: Thresholds) -> SplitSource:
         is_of_these = thresholds == self.ath.thresholds
-        return (self if is_of_these else replace(self, ath=self.source.seen.ath(thresholds)))._choice(chosen)
+        return self if is_of_these else replace(self, ath=self.source.seen.ath(thresholds))
 
     def _choice(self, chosen: Choice) -> Choice:
         """Extend a choice that was made for the branches that move to all branches, and return it."""
@@ -102,7 +114,7 @@ class SplitSource:
             chosen,
             settings=settings,
             first_layer=first,
-            learned_modes=self._modes(chosen.learned_modes, settings),
+            learned_modes=self._modes(chosen.learned_modes, source, settings),
             reference=self._reference(chosen.reference),
         )
 
@@ -172,10 +184,17 @@ class SplitSource:
         plan = Plan(branch_records(hierarchy, self.ath, settings), hierarchy.vertex_count, layer=settings.layer)
         return ~self.still[plan.pieces["branch"]]
 
-    def _modes(self, modes: LearnedModes | None, settings: Settings) -> LearnedModes | None:
-        """Return the learned modes of the moving pieces, numbered among all pieces."""
+    def _modes(self, modes: LearnedModes | None, source: Source, settings: Settings) -> LearnedModes | None:
+        """Return the learned modes of the moving pieces, numbered among all pieces. Those that take the rounding of the
+        rest pose back are learned anew, because both parts' poses are coded as one. `source`: all branches, about the
+        reference pose."""
         if modes is None:
             return None
+        if settings.learned_coded:
+            plan, source = CodedPrelude(source, self.ath, settings).plan, source.marking(self.still)
+            segments = (source.positions(segment) for segment in spread(len(source.segments), LEARNING_SEGMENTS))
+            analysed = (analyse_finely(plan, settings, positions, bent=True) for positions in segments)
+            return learn(plan, components(plan, analysed), settings.step, settings.learned_pieces)
         moves = self._moving_pieces(settings)
         counts = np.zeros(len(moves), modes.counts.dtype)
         counts[moves] = modes.counts

@@ -60,7 +60,6 @@ class Trials:
     extrapolation: ExtrapolationFactors  # From the part of a plant that is tried to the whole.
     jobs: int | None = None
     work: Work = field(default_factory=Work)  # Work that the whole search may take.
-    is_whole: bool = True  # Whether the file's rest pose is rounded as that of trials; not beside what stands still.
     map_errors: dict[int, float] = field(init=False, default_factory=dict)  # Errors of maps by stage.
     _work_done: int = field(init=False, default=0)  # Work of all trials.
     _known: dict[Key, tuple[float, np.ndarray]] = field(init=False, default_factory=dict)

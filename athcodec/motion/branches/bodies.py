@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.steady import STEADY, Distances, connected_parts, near_pairs, scipy_module
+from athcodec.motion.branches.steady import PLIANT, STEADY, USUAL, Distances, connected_parts, near_pairs, scipy_module
 
 SHARED = 0.5  # Part of a point's steady neighbours that are neighbours of another one, too, if both are of one body.
 LEAST_SHARED = 2  # Such neighbours, at least.
 CRUMB = 4  # Points below which a body joins the one from which its distance changes least.
 CRUMB_ROUNDS = 6  # Rounds of joining crumbs.
-USUAL = 0.25  # Quantile of the changes in distance of all points' steadiest pairs that is a usual one.
-PLIANT = 3.0  # Times a usual change, below which the nearer of two bodies is the better for a crumb.
 ROWS_AT_ONCE = 1 << 14  # Pairs whose neighbours are compared at once, which bounds memory.
 
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.steady import STEADY, Distances, connected_parts, near_pairs, scipy_module
+from athcodec.motion.branches.steady import PLIANT, STEADY, USUAL, Distances, connected_parts, near_pairs, scipy_module
 
 ROUNDS = 6  # Rounds of linking loose ends, among ever fewer points and so ever further away.
-USUAL = 0.25  # Quantile of the changes in length of all points' steadiest links that is a usual one.
 ALIKE = 30.0  # Times a usual change, up to which a link is steady.
-PLIANT = 3.0  # Times a usual change, below which the shorter of two links is the better.
 UNSTEADY = 0.2  # A loose point is linked only if the link's length changes by less than this part.
 UNLIKE = 4.0  # Its other links must change more than this many times as much.
 OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.

@@ -13,6 +13,8 @@ NEAR = (16, 96)  # Nearest points of each one, at least and at most, among which
 PAIRS = 1 << 19  # Pairs in all, if that is more than the least.
 PRECISION = 1e-7  # Part of the diagonal, and of the distance from the origin, below which a point stands still.
 STEADY = 0.05  # Largest change of a steady pair's distance over the points' motion against each other.
+USUAL = 0.25  # Quantile of the changes in distance of all points' steadiest pairs that is a usual one.
+PLIANT = 3.0  # Times a usual change, below which the shorter of two pairs is the better.
 PAIRS_AT_ONCE = 1 << 13  # Pairs of points whose distances are computed at once, which bounds memory.
 
 

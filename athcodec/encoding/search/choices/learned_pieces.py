@@ -74,7 +74,7 @@ def best_pieces_in_any_basis(settings: Settings, trials: Trials) -> Settings:
 def learned_anew(settings: Settings, trials: Trials) -> Settings:
     """Return the settings with modes learned about the rest pose as it is coded, whose rounding they then describe, or
     before that, whichever is smaller."""
-    if settings.learned_pieces is None or trials.is_layered or trials.source.reference_is_exact or not trials.is_whole:
+    if settings.learned_pieces is None or trials.is_layered or trials.source.reference_is_exact:
         return settings
     step = settings.rest_step if settings.learned_coded else trials.start.rest_step
     other = replace(settings, learned_coded=not settings.learned_coded, rest_step=step)
