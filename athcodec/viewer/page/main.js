@@ -25,7 +25,7 @@ let last = 0;
 
 function setStage() {
   const stage = app.stage = new Stage($("canvas"), () => { state.dirty = true; }, app.reframe);
-  stage.keepClear(document.querySelectorAll("header, nav, #panel, footer, #scale"));
+  stage.keepClear(document.querySelectorAll("header, nav, #panel, footer, #scale"), document.querySelector("footer"));
   const unmoved = motionUniforms();
   unmoved.athData.value = dataTexture(new Float32Array(4096));
   stage.warm([new Mesh(new BufferGeometry(), limbMaterial(unmoved)), new Mesh(new BufferGeometry(), injectMotion(meshMaterial(), unmoved)),

@@ -117,7 +117,7 @@ export class Stage {
     const { x, y } = this.canvas.parentElement.getBoundingClientRect(), value = ([l, t, r, b]) => Math.min(TALL * (b - t), (WIDE * (r - l)) / this.shape) + 0.01 * (r - l);
     let rooms = [[0, 0, width, height]];
     for (const card of this.cards.filter((each) => each.checkVisibility({ visibilityProperty: true }))) {
-      const rect = card.getBoundingClientRect(), [left, top, right, bottom] = [rect.left - x, rect.top - y, rect.right - x, rect.bottom - y];
+      const rect = card.getBoundingClientRect(), [left, right] = card === this.follower ? [0, width] : [rect.left - x, rect.right - x], [top, bottom] = [rect.top - y, rect.bottom - y];
       rooms = rooms.flatMap(([l, t, r, b]) => (left >= r || right <= l || top >= b || bottom <= t ? [[l, t, r, b]]
         : [[l, t, left, b], [right, t, r, b], [l, t, r, top], [l, bottom, r, b]]));
     }
@@ -125,9 +125,9 @@ export class Stage {
     return Math.min(best[2] - best[0], best[3] - best[1]) < LEAST_ROOM ? [0, 0, width, height] : best;
   }
 
-  /** Elements that lie over the picture: what is looked at keeps clear of them. */
-  keepClear(cards) {
-    this.cards = [...cards];
+  /** Elements that lie over the picture: what is looked at keeps clear of them. `follower`: the one that stands below what is looked at, and would flee from a plant beside it. */
+  keepClear(cards, follower) {
+    Object.assign(this, { cards: [...cards], follower });
     for (const card of cards) this.#sized.observe(card);
   }
 
