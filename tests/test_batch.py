@@ -152,12 +152,14 @@ def reasons(items, out) -> dict[str, str]:
 
 
 def test_what_is_not_read_of_a_clip_is_in_its_line_and_said(tmp_path, cluster, capsys):
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\ncurv 0 1 1 2 3\nf 1 2 3\n")
-    words = ["batch", str(tmp_path / "a.obj"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
+    for frame in range(2):
+        text = f"v 0 0 0\nv 1 0 {frame}\nv 0 1 0\ncurv 0 1 1 2 3\nf 1 2 3\n"
+        (tmp_path / f"a_{frame}.obj").write_text(text)
+    words = ["batch", str(tmp_path / "a_0.obj"), "--out", str(tmp_path / "out"), "--scheduler", cluster]
     assert cli.main(words) == 0
     [line] = lines(tmp_path / "out")
     assert line["not_read"] == "curve or surface curv"
-    assert "a.obj: curve or surface curv" in capsys.readouterr().err
+    assert "a_0.obj: curve or surface curv" in capsys.readouterr().err
 
 
 def test_a_second_run_does_only_what_is_not_as_it_should_be(clips, cluster, out):
