@@ -85,6 +85,7 @@ FIXED: Mapping[str, Sequence[str]] = {
     "preparation": ("MOST_LOST",),
     "polygons": ("PLACES_IN_ROWS", "CORNERS_OF_REST", "FACES_OF_REST", "MESH_PARTS"),
     "attachment": ("QUERY",),
+    "bodies": ("ROWS_AT_ONCE",),
     "steady": ("PAIRS_AT_ONCE",),
     "price": ("AT_ONCE",),
 }

@@ -9,7 +9,7 @@ import numpy as np
 
 from athcodec.motion.branches.bodies import body_links
 from athcodec.motion.branches.common_motion import without_common_motion
-from athcodec.motion.branches.steady import scipy_module
+from athcodec.motion.branches.steady import connected_parts, scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
 from athcodec.motion.polygons import sides
@@ -243,10 +243,7 @@ def _pairs_at_one_place(clip: MotionClip) -> np.ndarray:
 
 def components(links: np.ndarray, vertex_count: int) -> np.ndarray:
     """Return labels of the parts that links join, (N,), numbered by their first vertices."""
-    sparse = scipy_module("sparse")
-    graph = sparse.coo_matrix((np.ones(len(links), np.int8), links.T), (vertex_count, vertex_count))
-    label = scipy_module("sparse.csgraph").connected_components(graph, directed=False)[1]
-    return numbered(label)
+    return numbered(connected_parts(links, vertex_count))
 
 
 def numbered(label: np.ndarray) -> np.ndarray:
