@@ -8,7 +8,7 @@ import numpy as np
 
 from athcodec.binding.chains import Chains
 from athcodec.binding.surface import MeshPoints
-from athcodec.motion.branches.seen import moments_of_each, sums_of_each
+from athcodec.motion.branches.groups import moments_of_each, sums_of_each
 from athcodec.motion.branches.steady import scipy_module
 from athcodec.untyped import ScipyObject
 

@@ -9,7 +9,7 @@ is. It looks at the rest pose only, never at the motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -188,7 +188,12 @@ def build_hierarchy(
 
 
 def branches_from_edges(
-    edges: np.ndarray, vertex_count: int, rest: np.ndarray, root: int | Sequence[int] | None = None, up_axis: str = "y"
+    edges: np.ndarray,
+    vertex_count: int,
+    rest: np.ndarray,
+    root: int | Sequence[int] | None = None,
+    up_axis: str = "y",
+    begins: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (vertex_branch (N,), branch_parent (B,), stem_index (N,)), int32, of the branches that centre lines form:
     the branch of each vertex, the parent of each branch, -1 for a root, and the vertex's place along its branch.
@@ -196,16 +201,20 @@ def branches_from_edges(
     edges (E, 2) joins vertices 0 .. vertex_count - 1 in either direction; an edge given twice counts once.
     Each connected part is rooted at the vertex of `root` that lies in it, else at its lowest vertex along
     up_axis ("y", "z", "-z" ...) in rest (N, 3). At a fork the stem goes straight on, as far as rest shows it, else
-    into the subtree with most vertices (the lowest vertex number, if equal), and the others start branches. Branches
-    are numbered in depth-first preorder, siblings from base to tip.
+    into the subtree with most vertices (the lowest vertex number, if equal), and the others start branches. `begins` is
+    given the vertex below each vertex, the first vertex of its stem and its place there, (N,) each, and returns which
+    vertices begin a branch all the same. Branches are numbered in depth-first preorder, siblings from base to tip.
 
     Raises ClipError if the edges close a cycle, of which it names one edge, or if `root` is not usable.
     """
     edges = np.asarray(check_indices("edges", edges, vertex_count, width=2), np.int64)
     tour = _EulerTour(edges, vertex_count)
     points = np.asarray(rest, np.float64)
-    parent, subtree_size = tour.rooted_at(_choose_roots(tour.part, points, root, up_axis))
-    head, stem_index = _follow_straight(parent, subtree_size, points)
+    parent, subtree_size = tour.rooted_at(roots_of_parts(tour.part, points, root, up_axis))
+    goes_on = _goes_straight(parent, subtree_size, points)
+    head, stem_index = _stems(parent, goes_on)
+    if begins is not None:
+        head, stem_index = _stems(parent, goes_on & ~begins(parent, head, stem_index))
 
     heads = np.flatnonzero(head == np.arange(vertex_count))
     vertex_branch = np.searchsorted(heads, head)
@@ -224,6 +233,12 @@ def is_forest(edges: np.ndarray, vertex_count: int) -> bool:
     except ClipError:
         return False
     return True
+
+
+def parts_of_edges(edges: np.ndarray, vertex_count: int) -> np.ndarray:
+    """Return a number for each vertex, (vertex_count,), that all vertices of its connected part share. Raises ClipError
+    if edges (E, 2) close a cycle."""
+    return _EulerTour(np.asarray(edges, np.int64), vertex_count).part
 
 
 def derived_edges(hierarchy: Hierarchy) -> np.ndarray:
@@ -322,7 +337,7 @@ class _EulerTour:
         return remaining, jump
 
 
-def _choose_roots(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
+def roots_of_parts(part: np.ndarray, rest: np.ndarray, root: int | Sequence[int] | None, up_axis: str) -> np.ndarray:
     """Return the root vertex of each connected part: the vertex of `root` that lies in it, or else its lowest one along
     `up_axis` in the rest pose (N, 3). `part` (N,) is the part of each vertex. Raises ClipError if `root` is not
     usable."""
@@ -346,14 +361,19 @@ def _parse_axis(up_axis: str) -> tuple[int, float]:
     return "xyz".index(name), -1.0 if str(up_axis).startswith("-") else 1.0
 
 
-def _follow_straight(parent: np.ndarray, subtree_size: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first vertex of every vertex's stem, and the vertex's place on that stem."""
+def _goes_straight(parent: np.ndarray, subtree_size: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """Return whether the stem of the vertex below goes on with each vertex, (N,) bool."""
     children = np.flatnonzero(parent >= 0)
     straightness = np.round(STRAIGHT * _cosines(parent, children, rest))
     by_fork = children[np.lexsort((children, -subtree_size[children], -straightness, parent[children]))]
-    goes_on = by_fork[np.unique(parent[by_fork], return_index=True)[1]]
-    head = np.arange(len(parent))
-    head[goes_on] = parent[goes_on]
+    goes_on = np.zeros(len(parent), bool)
+    goes_on[by_fork[np.unique(parent[by_fork], return_index=True)[1]]] = True
+    return goes_on
+
+
+def _stems(parent: np.ndarray, goes_on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first vertex of every vertex's stem, and the vertex's place on that stem."""
+    head = np.where(goes_on, parent, np.arange(len(parent)))
     place = (head != np.arange(len(parent))).astype(np.int64)
     for _ in range(len(parent).bit_length()):
         place, head = place + place[head], head[head]

@@ -72,7 +72,8 @@ def read_clip(path: FilePath, options: ReadOptions) -> MotionClip:
     """Open the clip in the HDF5 file `path`; close it, or use it in a `with` statement.
 
     The file's rest pose is used if options.rest is "auto". Branches that follow from edges begin at the vertex
-    options.root or, by default, at the lowest vertex along the file's attribute up_axis ("y" if it has none).
+    options.root or, by default, at the lowest vertex along the file's attribute up_axis ("y" if it has none), unless
+    that sways and another one stands still.
 
     Raises ClipError if the file is not HDF5 or holds no usable clip, OSError if it cannot be opened.
     """

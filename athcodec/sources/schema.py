@@ -18,8 +18,11 @@ import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.plain import FilePath
+from athcodec.motion.branches.centre_lines import line_branches
+from athcodec.motion.branches.grown_pose import with_grown_pose
+from athcodec.motion.branches.seen import Seen
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip, frame_rate, stated_fps
-from athcodec.motion.hierarchy import branch_orders, branches_from_edges
+from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import read_clip_metadata
 from athcodec.motion.positions import (
     FRAMES,
@@ -496,7 +499,6 @@ def _branches(
     if edges is None:
         return {}
     of_file = replace(options, rest="auto").rest_fields(known["rest"])
-    rest = MotionClip(positions, np.arange(len(positions)), **of_file).rest  # Checked, as the clip's will be.
-    made = branches_from_edges(edges, len(rest), rest, options.root, metadata.get("up_axis", "y"))
-    vertex_branch, branch_parent, stem_index = made
+    clip = MotionClip(positions, np.arange(len(positions)), metadata=metadata, **of_file)
+    vertex_branch, branch_parent, stem_index = line_branches(Seen(with_grown_pose(clip)), edges, options.root)
     return {"vertex_branch": vertex_branch, "branch_parent": branch_parent, "stem_index": stem_index}

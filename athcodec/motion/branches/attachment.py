@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
+from athcodec.motion.branches.groups import cheapest_of_each, sizes_of_each
 from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
-from athcodec.motion.branches.seen import Seen, cheapest_of_each, components, sizes_of_each
+from athcodec.motion.branches.seen import Seen, components
 from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import source_stem_index, stem_index_of
 from athcodec.untyped import ScipyObject

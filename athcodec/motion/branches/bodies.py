@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from athcodec.motion.branches.groups import cheapest_of_each
 from athcodec.motion.branches.steady import PLIANT, STEADY, USUAL, Distances, connected_parts, near_pairs, scipy_module
 
 SHARED = 0.5  # Part of a point's steady neighbours that are neighbours of another one, too, if both are of one body.
@@ -61,7 +62,5 @@ def _with_crumbs(links: np.ndarray, pairs: np.ndarray, cost: np.ndarray, count: 
         if not len(crumb):
             break
         pair = np.concatenate([of_first, of_second])
-        order = np.lexsort((cost[pair], crumb))
-        cheapest = order[np.unique(crumb[order], return_index=True)[1]]
-        links = np.concatenate([links, pairs[pair[cheapest]]])
+        links = np.concatenate([links, pairs[pair[cheapest_of_each(crumb, cost[pair])]]])
     return links

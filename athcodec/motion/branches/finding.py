@@ -17,6 +17,7 @@ import numpy as np
 
 from athcodec.errors import ClipError
 from athcodec.motion.branches.attachment import arranged
+from athcodec.motion.branches.centre_lines import line_branches
 from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
@@ -97,15 +98,17 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
         if other is not None:
             yield other
         return
-    if first is not None and not (first.method == "runs" and _leaves_many_alone(first)):
+    if first is not None and not (first.method == "runs" and _are_doubtful(seen, first)):
         yield from _distinct(itertools.chain([first], _others(seen, first)))
         return
+    for links in seen.growing:
+        yield _of_growing(seen, links, None)
     for branches in _in_order(seen):
         yield branches
         if _are_plants(branches):
             return
     yield single
-    if first is not None:
+    if first is not None and not seen.growing:
         yield first
     if not len(seen.mesh):
         yield from _of_bodies(seen)
@@ -226,9 +229,10 @@ def _are_plants(branches: Found) -> bool:
     return _are_even(branches.vertex_branch) and bool(roots > PLANTS * len(branches.branch_parent))
 
 
-def _leaves_many_alone(branches: Found) -> bool:
-    """Return whether many branches are a single vertex."""
-    return bool(np.count_nonzero(np.bincount(branches.vertex_branch) == 1) > LONE_POINTS * len(branches.vertex_branch))
+def _are_doubtful(seen: Seen, runs: Found) -> bool:
+    """Return whether others may suit better than these runs: plants grow, or many runs are a single vertex."""
+    alone = np.count_nonzero(np.bincount(runs.vertex_branch) == 1)
+    return bool(seen.growing or alone > LONE_POINTS * len(runs.vertex_branch))
 
 
 def pieces(clip: MotionClip) -> Found:
@@ -369,11 +373,9 @@ def _by_edges(seen: Seen, root: int | None) -> Found | None:
     if clip.edges is None or not len(clip.edges) or clip.polygons is not None:
         return None
     try:
-        up_axis = clip.metadata.get("up_axis", "y")
-        branches = branches_from_edges(clip.edges, clip.vertex_count, clip.rest, root, up_axis)
+        return Found(*line_branches(seen, clip.edges, root), "edges")
     except ClipError:
         return None
-    return Found(*branches, "edges")
 
 
 def _by_objects(seen: Seen, root: int | None) -> Found | None:
@@ -409,10 +411,12 @@ def _by_components(seen: Seen, root: int | None) -> Found | None:
 
 def _by_runs(seen: Seen, root: int | None) -> Found | None:
     """Return branches such as blades, needles and strands, for points that nothing joins, by linking points that keep
-    their distance; None if the points form no such runs.
+    their distance, or, if plants grow, those that never are far apart; None if the points form no such runs.
     """
     if len(seen.mesh):
         return None
+    if seen.growing:
+        return _of_growing(seen, seen.growing[0], root)
     frames = seen.frames[1:]  # The rest pose may have links of other lengths.
     links = run_links(seen.frames_of_roots[1:])
     if links is None:
@@ -420,6 +424,11 @@ def _by_runs(seen: Seen, root: int | None) -> Found | None:
     bases = base_points(frames, links, root)
     branches = branches_from_edges(links, seen.clip.vertex_count, seen.clip.rest, bases.tolist())
     return Found(*branches, "runs", links=links)
+
+
+def _of_growing(seen: Seen, links: np.ndarray, root: int | None) -> Found:
+    """Return the centre lines of points of plants that grow, which `links` join, (L, 2)."""
+    return Found(*line_branches(seen, links, root), "runs", links=links)
 
 
 def _by_motion(seen: Seen, root: int | None, patch_vertices: int = PATCH_VERTICES) -> Found:

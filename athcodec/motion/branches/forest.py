@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.seen import cheapest_of_each
+from athcodec.motion.branches.groups import cheapest_of_each
 from athcodec.motion.hierarchy import branch_orders
 
 

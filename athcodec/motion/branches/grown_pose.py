@@ -41,8 +41,8 @@ def grown_pose(clip: MotionClip) -> np.ndarray | None:
     if not len(links):
         links = np.stack([np.arange(clip.vertex_count - 1), np.arange(1, clip.vertex_count)], axis=1)
     links = links[:: max(1, len(links) // LINKS)]
-    frames = spread(clip.frame_count, FRAMES)
-    poses = (pose.T.copy() for pose in itertools.chain([clip.rest], _poses(clip, frames)))
+    frames = shown_frames(clip)
+    poses = (pose.T.copy() for pose in itertools.chain([clip.rest], poses_of(clip, frames)))
     sizes = np.sqrt([sum(np.square(x[links[:, 0]] - x[links[:, 1]]) for x in pose) for pose in poses])
     largest = sizes[1:].max(axis=0)
     small = (sizes < SMALL_LINK * largest).mean(axis=1)
@@ -62,15 +62,15 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     """
     if clip.frame_count == 1:
         return pose
-    frames, source, first = spread(clip.frame_count, FRAMES), hierarchy.vertex_source, hierarchy.first_vertex
-    sizes = np.array([_branch_sizes(frame[source], first) for frame in _poses(clip, frames)])
+    frames, source, first = shown_frames(clip), hierarchy.vertex_source, hierarchy.first_vertex
+    sizes = np.array([_branch_sizes(frame[source], first) for frame in poses_of(clip, frames)])
     rest = pose[source].astype(np.float64)
     small = np.flatnonzero(_branch_sizes(rest, first) < SMALL * sizes.max(axis=0))
     if not len(small):
         return pose
     largest = np.array(frames)[sizes.argmax(axis=0)]
     shown = np.unique(largest[small]).tolist()
-    shapes = {number: frame[source] for number, frame in zip(shown, _poses(clip, shown))}
+    shapes = {number: frame[source] for number, frame in zip(shown, poses_of(clip, shown))}
     for branch in small.tolist():  # Parents come first.
         shape, attach = shapes[int(largest[branch])], hierarchy.attach[branch]
         vertices = slice(first[branch], first[branch] + hierarchy.stem_count[branch])
@@ -80,7 +80,12 @@ def with_grown_branches(pose: np.ndarray, clip: MotionClip, hierarchy: Hierarchy
     return grown
 
 
-def _poses(clip: MotionClip, frames: list[int]) -> Iterator[np.ndarray]:
+def shown_frames(clip: MotionClip) -> list[int]:
+    """Return the frames that show how a plant grows, spread over the clip."""
+    return spread(clip.frame_count, FRAMES)
+
+
+def poses_of(clip: MotionClip, frames: list[int]) -> Iterator[np.ndarray]:
     """Yield the positions (N, 3) float64 of the clip in each of these frames, which ascend. Frames in one chunk of the
     source are read together, so that it is unpacked once, but never more of them than fit a block."""
     length = min(clip.chunk_frames, clip.block_length())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.seen import cheapest_of_each, components, numbered
+from athcodec.motion.branches.groups import cheapest_of_each
+from athcodec.motion.branches.seen import components, numbered
 from athcodec.motion.branches.steady import scipy_module
 
 PATCH_ROUNDS = 8  # Largest number of rounds in which vertices change to other patches, and small patches join others.

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from athcodec.motion.algebra import rotations_of
-from athcodec.motion.branches.seen import cheapest_of_each, moments_of_each, sizes_of_each, sums_of_each
+from athcodec.motion.branches.groups import cheapest_of_each, moments_of_each, sizes_of_each, sums_of_each
 from athcodec.motion.branches.steady import scipy_module
 from athcodec.untyped import ScipyObject
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from athcodec.motion.branches.bodies import body_links
 from athcodec.motion.branches.common_motion import without_common_motion
+from athcodec.motion.branches.groups import moments_of_each, sums_of_each
+from athcodec.motion.branches.growing_points import growing_links
 from athcodec.motion.branches.steady import connected_parts, scipy_module
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
@@ -84,6 +86,11 @@ class Seen:
     def bodies(self) -> np.ndarray:
         """Pairs of points that are near each other on one body, (L, 2), for points that nothing joins."""
         return body_links(self.frames[1:])  # The rest pose may be of other lengths.
+
+    @cached_property
+    def growing(self) -> list[np.ndarray]:
+        """Ways to link points of plants that grow, (L, 2) each, where nothing joins them; none if nothing grows."""
+        return [] if len(self.mesh) else growing_links(self.frames[1:])
 
     @cached_property
     def neighbours(self) -> np.ndarray:
@@ -167,26 +174,6 @@ def affine_share(frames: np.ndarray, label: np.ndarray) -> float:
     return float(size[moves].sum() / size.sum())
 
 
-def sums_of_each(values: np.ndarray, label: np.ndarray, count: int = 0) -> np.ndarray:
-    """Return the sums of the rows, (N, k), of each label; count: of the labels, if some have no rows."""
-    return np.stack([np.bincount(label, column, count) for column in values.T], axis=1)
-
-
-def moments_of_each(values: np.ndarray, others: np.ndarray, label: np.ndarray, count: int = 0) -> np.ndarray:
-    """Return the sums over each label of the outer products of rows, (N, 3) each, (L, 3, 3)."""
-    products = (values[:, :, None] * others[:, None]).reshape(-1, 9)
-    return sums_of_each(products, label, count).reshape(-1, 3, 3)
-
-
-def sizes_of_each(rest: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Return the diagonals of the branches' bounding boxes."""
-    order = np.argsort(label, kind="stable")
-    first = np.searchsorted(label[order], np.arange(label.max() + 1))
-    low, high = (function.reduceat(rest[order], first) for function in (np.minimum, np.maximum))
-    diagonals: np.ndarray = np.linalg.norm(high - low, axis=1)
-    return diagonals
-
-
 def copies_of(clip: MotionClip) -> np.ndarray:
     """Return the number of the copy that each vertex is of, (N,), from 1 on; 0 for none (MotionClip, part_copies)."""
     parts = _parts(clip)
@@ -260,19 +247,3 @@ def near_neighbours(points: np.ndarray, count: int) -> np.ndarray:
         scipy_module("spatial").cKDTree(points).query(points, k=min(count + 1, len(points)))[1].reshape(len(points), -1)
     )
     return np.stack([np.repeat(np.arange(len(points)), near.shape[1] - 1), near[:, 1:].reshape(-1)], axis=1)
-
-
-def cheapest_of_each(key: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return the cheapest entry of each group of the same key, the first of several; groups in the order of their
-    keys."""
-    order = np.argsort(key, kind="stable")  # Sorting by costs, too, takes several times as long.
-    key, cost = key[order], cost[order]
-    first = np.flatnonzero(_begins(key))
-    least = np.repeat(np.minimum.reduceat(cost, first), np.diff(np.append(first, len(key))))
-    cheapest = np.flatnonzero(cost == least)
-    return order[cheapest[_begins(key[cheapest])]]
-
-
-def _begins(key: np.ndarray) -> np.ndarray:
-    """Return whether each of some sorted keys differs from the one before it, (K,) bool."""
-    return np.append(True, key[1:] != key[:-1])[: len(key)]

@@ -44,6 +44,15 @@ class Distances:
             length[some] = apart.mean(axis=1)
         return change, length
 
+    def largest(self, pairs: np.ndarray) -> np.ndarray:
+        """Return the largest distance of each pair of points in any frame, (P,)."""
+        largest = np.empty(len(pairs))
+        for start in range(0, len(pairs), PAIRS_AT_ONCE):
+            some = slice(start, start + PAIRS_AT_ONCE)
+            way = self._tracks[pairs[some, 0]] - self._tracks[pairs[some, 1]]
+            largest[some] = np.sqrt(np.einsum("ptk,ptk->pt", way, way).max(axis=1))
+        return largest
+
 
 def near_pairs(points: np.ndarray, names: np.ndarray) -> np.ndarray:
     """Return pairs of points that are near each other, (P, 2), each once, the smaller name first. `points`: (K, 3)
