@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plants import ring_quads, turns
 
 import athcodec
 from athcodec import MotionClip
@@ -13,6 +14,7 @@ from athcodec.encoding.preparation.branch_trials import Trial, best_branches
 from athcodec.encoding.search.progress import Work
 from athcodec.motion.branches import finding
 from athcodec.motion.branches.forest import cheapest_forest, without_needless_orders
+from athcodec.motion.branches.result import order_of
 from athcodec.motion.hierarchy import branch_orders
 from bench.data import Canopy
 from bench.scenes import fields
@@ -161,3 +163,73 @@ def test_no_branches_are_tried_that_would_take_the_work_of_the_search(monkeypatc
     monkeypatch.setattr(Trial, "size", costly)
     best_branches(fields.stems(seed=5, plants=2).without_faces().bare(), BoundOption(rel_error=1e-4), work)
     assert 0.8 * work.allowed <= work.done <= work.allowed
+
+
+def compound_leaves(leaves: int = 12, leaflets: int = 3, welded: bool = True) -> MotionClip:
+    """Objects of a scene, each of them a few copies of one crumpled leaflet that swing as one, joined where they meet
+    or a little apart."""
+    rng, rows, columns = np.random.default_rng(1), 12, 5
+    along, across = np.meshgrid(np.linspace(0, 1, rows), np.linspace(-0.3, 0.3, columns), indexing="ij")
+    sheet = np.stack([along.ravel(), rng.normal(0, 0.05, along.size), across.ravel()], axis=1)
+    sheet[:, 0] += 0 if welded else 0.1
+    corner = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1, None] + [0, 1, columns + 1, columns]
+    angle = rng.uniform(0, 6, (leaves, 1)) + 2.1 * np.arange(leaflets)
+    each = turns(angle[..., None] * [0, 1, 0])
+    shapes = np.einsum("lkij,nj->lkni", each, sheet) * rng.uniform(0.5, 1, (leaves, 1, 1, 1))
+    swing = 0.3 * np.sin(np.linspace(0, 12, FRAMES)[:, None] + angle[:, 0]) + 0.05 * rng.normal(size=(FRAMES, leaves))
+    posed = np.einsum("flij,lkni->flknj", turns(swing[..., None] * [1, 0, 0]), shapes)
+    positions = posed + rng.uniform(-3, 3, (leaves, 1, 1, 3)) * [1, 0.2, 1]
+    faces = corner.reshape(-1, 4) + sheet.shape[0] * np.arange(leaves * leaflets)[:, None, None]
+    return MotionClip(
+        positions.reshape(FRAMES, -1, 3).astype(np.float32),
+        np.arange(FRAMES) / 24,
+        faces=faces.reshape(-1, 4),
+        attributes={"part_vertex_counts": np.full(leaves, leaflets * sheet.shape[0], np.int32)},
+        metadata={"part_names": [f"/plant/leaf{leaf}" for leaf in range(leaves)]},
+    )
+
+
+@pytest.mark.parametrize("welded", [True, False], ids=["leaflets meet", "leaflets apart"])
+def test_leaflets_of_an_object_may_be_branches_of_their_own(welded):
+    tried = list(finding.candidates(compound_leaves(welded=welded)))
+    assert (tried[0].method, len(tried[0].branch_parent)) == ("objects", 12)
+    assert any(len(one.branch_parent) == 36 and one.stem_index is None and order_of(one) == 0 for one in tried)
+
+
+def skinned_wood(seed: int, boughs: int = 24, around: int = 8, rings: int = 12) -> MotionClip:
+    """Boughs that are one piece of a mesh, each on the tip of another, that bend along their lengths as on bones."""
+    rng = np.random.default_rng(seed)
+    angle = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    ring = 0.03 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    height = np.linspace(0, 1, rings)
+    time = np.arange(FRAMES) / 24
+    base, frame, positions, faces = [np.zeros((FRAMES, 3))], [np.tile(np.eye(3), (FRAMES, 1, 1))], [], []
+    quads = np.array(ring_quads(rings, around)).reshape(-1, 4)
+    for bough in range(boughs):
+        below = int(rng.integers(len(base)))
+        lean = turns(np.array([rng.uniform(-0.7, 0.7), rng.uniform(-0.7, 0.7), 0.0]))
+        sway = rng.uniform(0.05, 0.3, 2) * np.sin(time[:, None] * rng.uniform(3, 6) + rng.uniform(0, 6, 2))
+        bend = np.concatenate([sway, 0 * sway[:, :1]], axis=1)
+        local = ring[None] + height[:, None, None] * [0, 0, 1]
+        turned = np.einsum("fhij,hrj->fhri", turns(bend[:, None] * height[:, None]), local)
+        carrier = frame[below] @ lean
+        positions.append(base[below][:, None] + np.einsum("fij,fhrj->fhri", carrier, turned).reshape(FRAMES, -1, 3))
+        tip = np.einsum("fij,fj->fi", carrier, turned[:, -1].mean(axis=1))
+        base.append(base[below] + tip)
+        frame.append(carrier @ turns(bend))
+        faces.append(quads + bough * rings * around)
+        first, carries = bough * rings * around, (below * rings - 1) * around if below else 0
+        faces.append(np.array([[carries, carries + 1, first + 1, first]]))
+    return MotionClip(np.concatenate(positions, axis=1).astype(np.float32), time, faces=np.concatenate(faces))
+
+
+def test_boughs_that_are_one_piece_of_a_mesh_are_found_in_it():
+    wood = skinned_wood(seed=2)
+    positions = wood.block(0, FRAMES)
+    leaf = positions[:, -4:] + np.float32([0, 0, 0.2])
+    faces = np.concatenate([wood.faces, wood.vertex_count + np.array([[0, 1, 2, 3]])])
+    tried = list(finding.candidates(MotionClip(np.concatenate([positions, leaf], axis=1), wood.time, faces=faces)))
+    assert (tried[0].method, len(tried[0].branch_parent)) == ("components", 2)
+    assert {1} < {len(one.branch_parent) for one in tried if one.method == "motion"}, (
+        "wood is one branch, or its boughs"
+    )

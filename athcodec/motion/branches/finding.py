@@ -39,6 +39,8 @@ SMALL_PATCH = 40  # Average vertices of a patch that is tried besides.
 LARGE_PATCH = 600  # Average vertices of a patch that is tried in its place from LARGE_MESH vertices on.
 LARGE_MESH = 10_000  # Vertices of a mesh that is large.
 MANY_ROOTS = 0.25  # Part of the branches that are roots from which on all are tried as such.
+WOOD_VERTICES = 1000  # Vertices of a piece of a mesh that may be a trunk with its boughs.
+WOOD = 0.25  # Part of the vertices that are in such pieces from which on patches are tried besides pieces.
 STEADY_NEXT = 0.2  # Change of the distance of two vertices, over their motion, above which they are of two parts.
 FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are of two parts.
 STILL = 1e-6  # Of the diagonal: change of a distance that is none.
@@ -81,7 +83,7 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     `by_points`: whether runs of points that nothing joins may be sought.
     """
     clip = seen.clip
-    single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
+    single = _single(clip)
     still = stands_still(clip)
     by_points = by_points and not still
     first = _first_found(seen, METHODS[:-1] if by_points else METHODS[:-2], None)
@@ -90,13 +92,8 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
         if first is not None:
             yield first
         return
-    if first is not None and first.method == "objects":  # What hangs on a part that grows may move more simply alone.
-        yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1))
-        yield first
-        yield _by_contact(seen, first)
-        other = _first_found(seen, METHODS[METHODS.index("objects") + 1 : -1], None)
-        if other is not None:
-            yield other
+    if first is not None and first.method == "objects":
+        yield from _distinct(_of_objects(seen, first))
         return
     if first is not None and not (first.method == "runs" and _are_doubtful(seen, first)):
         yield from _distinct(itertools.chain([first], _others(seen, first)))
@@ -145,14 +142,27 @@ def _others(seen: Seen, first: Found) -> Iterator[Found]:
         yield from _other_components(seen, first)
 
 
+def _of_objects(seen: Seen, first: Found) -> Iterator[Found]:
+    """Yield the objects of a scene, which `first` takes as branches, with and without parents, since what hangs on a
+    part that grows may move more simply alone; and what an object may consist of, such as leaflets."""
+    other = _first_found(seen, METHODS[METHODS.index("objects") + 1 : -1], None)
+    yield _as_roots(first)
+    if other is not None:
+        yield _as_roots(other)
+    yield first
+    yield _by_contact(seen, first)
+    if other is not None:
+        yield from itertools.chain([other], _others(seen, other))
+
+
 def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     """Yield other branches than `first`, for a mesh whose connected pieces `first` takes as branches: pieces without
-    parents, with vertices in the order of the source, hung where they touch, of the parts of the source, or apart where
-    they were joined.
+    parents, with vertices in the order of the source, hung where they touch, in patches or as a whole, of the parts of
+    the source, or apart where they were joined.
     """
     roots = np.count_nonzero(first.branch_parent < 0)
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
-        yield dataclasses.replace(first, branch_parent=np.full_like(first.branch_parent, -1), stem_index=None)
+        yield _as_roots(first)
     contact = _by_contact(seen, first) if roots <= PLANTS * len(first.branch_parent) else first
     is_lower = order_of(contact) < order_of(
         first
@@ -162,11 +172,30 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     yield dataclasses.replace(first, stem_index=None)
     if roots > 1 and not is_lower:
         yield contact
+    if _are_of_wood(first):
+        yield _by_motion(seen.by_contact(), None, SMALL_PATCH)
+        yield _single(seen.clip)
     if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
         yield arranged(seen, seen.parts, None, "components")
     unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
     if len(unwelded.branch_parent) != len(first.branch_parent):
         yield unwelded
+
+
+def _single(clip: MotionClip) -> Found:
+    """Return one branch of all vertices: a blend of few poses of a whole mesh."""
+    return Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
+
+
+def _as_roots(branches: Found) -> Found:
+    """Return the same branches without parents, with vertices in the order of the source."""
+    return dataclasses.replace(branches, branch_parent=np.full_like(branches.branch_parent, -1), stem_index=None)
+
+
+def _are_of_wood(components: Found) -> bool:
+    """Return whether large pieces of a mesh may be trunks with their boughs, which do not move by one map."""
+    size = np.bincount(components.vertex_branch)
+    return bool(size[size >= WOOD_VERTICES].sum() >= WOOD * size.sum())
 
 
 def _by_contact(seen: Seen, first: Found) -> Found:
