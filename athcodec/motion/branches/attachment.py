@@ -17,9 +17,11 @@ from athcodec.motion.branches.forest import cheapest_forest, without_needless_or
 from athcodec.motion.branches.groups import cheapest_of_each, sizes_of_each
 from athcodec.motion.branches.price import Prices
 from athcodec.motion.branches.result import Found, checked_branches
+from athcodec.motion.branches.rows import row_places
 from athcodec.motion.branches.seen import Seen, components
 from athcodec.motion.branches.steady import scipy_module
 from athcodec.motion.clip import source_stem_index, stem_index_of
+from athcodec.motion.polygons import sides
 from athcodec.untyped import ScipyObject
 
 NEIGHBOURS = 60  # Nearest vertices of each one among which other branches are sought.
@@ -59,7 +61,15 @@ def arranged(
             joints = _joints_by_contact(frames, label, contacts, root, seen.is_carried)
     else:
         joints = _joints_of(rest, frames, label, parent)
-    return checked_branches(label, joints.parent, _along(rest, label, joints, seen.links), method)
+    return checked_branches(label, joints.parent, _along(seen, label, joints), method)
+
+
+def single_by_rows(seen: Seen) -> Found | None:
+    """Return one branch of all vertices, row by row from where it moves least, if it is a grid whose rows the source
+    does not keep; else None."""
+    label = np.zeros(seen.clip.vertex_count, np.int64)
+    place = _row_places(seen, label, _stillest(seen.frames, label))
+    return None if place[0] < 0 else checked_branches(label, np.array([-1]), place, "motion")
 
 
 @dataclass(frozen=True)
@@ -240,15 +250,26 @@ def _others_nearby(tree: ScipyObject, rest: np.ndarray, label: np.ndarray, near:
         yield np.stack([some[row[best]], other[best]], axis=1)
 
 
-def _along(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarray) -> np.ndarray:
-    """Return the places of the vertices on their branches, (N,), from the base out: the source's order, or its reverse,
-    if it is one, else by the distance from the base over the links within the branch."""
-    place = stem_index_of(label, _ways(rest, label, joints, links))
-    source = source_stem_index(label)
+def _along(seen: Seen, label: np.ndarray, joints: _Joints) -> np.ndarray:
+    """Return the places of the vertices on their branches, (N,), from the base out: row by row where a branch is a grid
+    whose rows the source does not keep; else the source's order, or its reverse, if it is one, else by the distance
+    from the base over the links within the branch."""
+    rest, source = seen.clip.rest, source_stem_index(label)
+    place = stem_index_of(label, _ways(rest, label, joints, seen.links))
     agreement = _rank_correlation(label, place, source)
     size = np.bincount(label)
     turned = np.where(agreement[label] < 0, size[label] - 1 - source, source)
-    return np.where((np.abs(agreement) >= IN_ORDER)[label] | (size <= SMALL)[label], turned, place)
+    along = np.where((np.abs(agreement) >= IN_ORDER)[label] | (size <= SMALL)[label], turned, place)
+    by_rows = _row_places(seen, label, joints.base)
+    return np.where(by_rows < 0, along, by_rows)
+
+
+def _row_places(seen: Seen, label: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """Return the places of the vertices on branches whose rows their faces tell, as row_places does, (N,)."""
+    polygons = seen.clip.polygons
+    if polygons is None:
+        return np.full(len(label), -1)
+    return row_places(seen.clip.rest, label, sides(*polygons), base, source_stem_index(label))
 
 
 def _ways(rest: np.ndarray, label: np.ndarray, joints: _Joints, links: np.ndarray) -> np.ndarray:

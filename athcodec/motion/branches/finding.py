@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from athcodec.errors import ClipError
-from athcodec.motion.branches.attachment import arranged
+from athcodec.motion.branches.attachment import arranged, single_by_rows
 from athcodec.motion.branches.centre_lines import line_branches
 from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
@@ -105,6 +105,9 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
         if _are_plants(branches):
             return
     yield single
+    by_rows = single_by_rows(seen)
+    if by_rows is not None:
+        yield by_rows
     if first is not None and not seen.growing:
         yield first
     if not len(seen.mesh):
