@@ -39,7 +39,7 @@ from athcodec.encoding.search.sample import is_small
 from athcodec.encoding.search.search import PosesBeside, Search
 from athcodec.encoding.search.segment_samples import typical_segments
 from athcodec.encoding.search.start import still_choice
-from athcodec.encoding.search.still import STILL_SHARE, SplitSource
+from athcodec.encoding.search.still import SplitSource
 from athcodec.encoding.segments.layers import (
     MOST_LAYERS,
     MOST_LEVELS,
@@ -59,6 +59,7 @@ CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
 LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Files that are coded at most to name a bound that can be kept: some clips can keep none.
+SHOWN_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from what others show in its place.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
 LEAST_LEVELS = 3  # Levels of a file below which finer layers are tried.
@@ -260,7 +261,7 @@ class FileDecisions:
 
     def _holding(self, bound: float) -> FileDecisions:
         """Return the decisions about a clip without frames that others show within a small part of the bound."""
-        tolerance = 0.0 if self.options.lossless else STILL_SHARE * self.source.smallest_bound(bound)
+        tolerance = 0.0 if self.options.lossless else SHOWN_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
     def _decide(self, bound: float, work: Work) -> Decided:

@@ -17,7 +17,7 @@ from athcodec.encoding.preparation.bounds import BoundOption
 from athcodec.encoding.search.hopeless import Hopeless
 from athcodec.encoding.search.progress import ANALYSIS, FINDING, SURVEY, TRIAL, Work
 from athcodec.encoding.search.segment_samples import TRIAL_FRAMES
-from athcodec.encoding.search.still import STILL_SHARE
+from athcodec.encoding.search.still import STILL_SHARES, more_still
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
 from athcodec.files.threads import SERIAL
@@ -45,7 +45,7 @@ def best_branches(
     options = EncodingOptions() if options is None else options
     least = option.least(clip)
     is_named = clip.skin is not None or named_labels(clip) is not None
-    still = None if is_named or options.host_rest else still_parts(clip, STILL_SHARE * least)
+    still = None if is_named or options.host_rest else _still(clip, least)
     if still is None:
         return _best_candidate(clip, option, work, options, is_compared)
     if least > 0:  # The bound of the parts is that of the whole.
@@ -54,6 +54,15 @@ def best_branches(
     branches, size = _best_candidate(moving, option, work, options, is_compared)
     others, still_size = _best_candidate(standing, option, Work(), options, is_compared)
     return joined(clip, still, branches, others), size + (still_size if is_compared else 0.0)
+
+
+def _still(clip: MotionClip, least: float) -> np.ndarray | None:
+    """Return which vertices are of parts that stand still, (N,) bool, within a part of the least bound; None: none."""
+    many = still_parts(clip, STILL_SHARES[1] * least)
+    if many is None:
+        return None
+    few = still_parts(clip, STILL_SHARES[0] * least)
+    return many if few is None else more_still(few, many)
 
 
 def _best_candidate(

@@ -33,17 +33,26 @@ from athcodec.motion.sampling import spread
 from athcodec.motion.thresholds import Thresholds
 from athcodec.untyped import Keywords
 
-STILL_SHARE = 1 / 64  # Largest distance, in bounds, from its place of a vertex that counts as standing still.
+STILL_SHARES = 1 / 64, 1 / 4  # Largest distances, in bounds, from their places of vertices that stand still, at most.
+MUCH_MORE = 1.25  # Vertices that stand still within the second of them, over the first, from which on it is taken.
 
 
 def still_branches(source: Source, bound: float) -> np.ndarray | None:
     """Return which branches belong to trees that stand still, (B,) bool; None: too few do, or all."""
-    hierarchy = source.hierarchy
-    stays = source.seen.largest_ways <= STILL_SHARE * source.smallest_bound(bound)
+    hierarchy, smallest = source.hierarchy, source.smallest_bound(bound)
     roots = np.flatnonzero(hierarchy.branch_parent < 0)
-    still = np.repeat(stays, np.diff(np.append(roots, hierarchy.branch_count)))
+    branches = np.diff(np.append(roots, hierarchy.branch_count))
+    few, many = (np.repeat(source.seen.largest_ways <= share * smallest, branches) for share in STILL_SHARES)
+    still = more_still(few, many, hierarchy.stem_count)
     vertices = int(hierarchy.stem_count[still].sum())
     return still if LEAST_STILL <= vertices < hierarchy.vertex_count else None
+
+
+def more_still(few: np.ndarray, many: np.ndarray, vertices: np.ndarray | int = 1) -> np.ndarray:
+    """Return `many` if it is much more than `few`, as where a capture shakes, else `few`: a part that moves a little is
+    better coded so than at the cost of all that stands. `few`, `many`: what stands still within each of STILL_SHARES,
+    (K,) bool; `vertices`: how many each has."""
+    return many if (many * vertices).sum() >= MUCH_MORE * (few * vertices).sum() else few
 
 
 @dataclass(frozen=True)
@@ -126,7 +135,9 @@ class SplitSource:
     def _still_settings(self) -> Settings:
         source = self.still_source
         ath = source.seen.ath(self.ath.thresholds)
-        return still_choice(source, ath, (1 - STILL_SHARE) * self.bound, 1).settings
+        ways = self.source.seen.largest_ways[self.still[self.source.hierarchy.branch_parent < 0]]
+        is_wide = (ways > STILL_SHARES[0] * self.source.smallest_bound(self.bound)).any()
+        return still_choice(source, ath, (1 - STILL_SHARES[int(is_wide)]) * self.bound, 1).settings
 
     def _settings(self, moving: Settings, still: Settings, may_be_coarser: bool) -> Settings:
         """Join the settings of the branches that move and of those that stand still to settings of all branches.
