@@ -230,6 +230,4 @@ def test_boughs_that_are_one_piece_of_a_mesh_are_found_in_it():
     faces = np.concatenate([wood.faces, wood.vertex_count + np.array([[0, 1, 2, 3]])])
     tried = list(finding.candidates(MotionClip(np.concatenate([positions, leaf], axis=1), wood.time, faces=faces)))
     assert (tried[0].method, len(tried[0].branch_parent)) == ("components", 2)
-    assert {1} < {len(one.branch_parent) for one in tried if one.method == "motion"}, (
-        "wood is one branch, or its boughs"
-    )
+    assert any(one.method == "motion" and len(one.branch_parent) > 24 for one in tried)

@@ -32,6 +32,7 @@ FILLED = 0.8  # Share of a target size that a file fills at the bound at which b
 TRIAL_SHARE = 0.2  # Largest share of the work left before the first trial that each takes: sizes are of equal searches.
 ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
 SAME = 1.02  # The same up to which fewer branches of the same order are better.
+PATCHES = 1.4  # Bytes in whole files, over those in trials, of patches of a mesh that has pieces.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
@@ -91,6 +92,8 @@ def _best_candidate(
         before = work.done
         branches = dataclasses.replace(branches, stem_index=None) if in_order else branches
         size, is_predicted = trial.size(branches)
+        if best.method == "components" and branches.method == "motion":
+            size *= PATCHES
         next_trial = max(trial.least_work, work.done - before)  # Settings cost about as much on other branches.
         predicted += is_predicted
         ordered = [other for other, one in tried if _differ_in_order(one, branches)]

@@ -83,7 +83,7 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     `by_points`: whether runs of points that nothing joins may be sought.
     """
     clip = seen.clip
-    single = _single(clip)
+    single = Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
     still = stands_still(clip)
     by_points = by_points and not still
     first = _first_found(seen, METHODS[:-1] if by_points else METHODS[:-2], None)
@@ -160,8 +160,8 @@ def _of_objects(seen: Seen, first: Found) -> Iterator[Found]:
 
 def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
     """Yield other branches than `first`, for a mesh whose connected pieces `first` takes as branches: pieces without
-    parents, with vertices in the order of the source, hung where they touch, in patches or as a whole, of the parts of
-    the source, or apart where they were joined.
+    parents, with vertices in the order of the source, hung where they touch, in patches, of the parts of the source, or
+    apart where they were joined.
     """
     roots = np.count_nonzero(first.branch_parent < 0)
     if MANY_ROOTS * len(first.branch_parent) <= roots < len(first.branch_parent):
@@ -177,17 +177,11 @@ def _other_components(seen: Seen, first: Found) -> Iterator[Found]:
         yield contact
     if _are_of_wood(first):
         yield _by_motion(seen.by_contact(), None, SMALL_PATCH)
-        yield _single(seen.clip)
     if seen.parts is not None:  # Parts that touch at a point are joined in the first ones.
         yield arranged(seen, seen.parts, None, "components")
     unwelded = pieces(seen.clip)  # Leaves that touch are welded, which is wrong if they move by themselves.
     if len(unwelded.branch_parent) != len(first.branch_parent):
         yield unwelded
-
-
-def _single(clip: MotionClip) -> Found:
-    """Return one branch of all vertices: a blend of few poses of a whole mesh."""
-    return Found(np.zeros(clip.vertex_count, np.int32), np.array([-1], np.int32), None, "motion")
 
 
 def _as_roots(branches: Found) -> Found:
