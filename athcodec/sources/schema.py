@@ -18,9 +18,6 @@ import numpy as np
 
 from athcodec.errors import ClipError, GuessWarning
 from athcodec.files.plain import FilePath
-from athcodec.motion.branches.centre_lines import line_branches
-from athcodec.motion.branches.grown_pose import with_grown_pose
-from athcodec.motion.branches.seen import Seen
 from athcodec.motion.clip import RESERVED_NAMES, MotionClip, frame_rate, stated_fps
 from athcodec.motion.hierarchy import branch_orders
 from athcodec.motion.joining import read_clip_metadata
@@ -498,6 +495,11 @@ def _branches(
         return branches
     if edges is None:
         return {}
+    # These imports load the C library, which takes longer than to read a small file.
+    from athcodec.motion.branches.centre_lines import line_branches
+    from athcodec.motion.branches.grown_pose import with_grown_pose
+    from athcodec.motion.branches.seen import Seen
+
     of_file = replace(options, rest="auto").rest_fields(known["rest"])
     clip = MotionClip(positions, np.arange(len(positions)), metadata=metadata, **of_file)
     vertex_branch, branch_parent, stem_index = line_branches(Seen(with_grown_pose(clip)), edges, options.root)
