@@ -105,13 +105,15 @@ def _hops(pairs: np.ndarray, starts: np.ndarray, count: int) -> np.ndarray:
 
 def _are_even(label: np.ndarray, level: np.ndarray, across: np.ndarray) -> np.ndarray:
     """Return whether each branch has as many vertices on every level as on the first one, but for the last, (B,)."""
-    count, levels = int(label.max()) + 1, int(level.max()) + 2
-    sizes = np.bincount(label * levels + level + 1, minlength=count * levels).reshape(count, levels)
-    width = np.bincount(label, across >= 0, count)
-    last = (sizes > 0) @ np.ones(levels, np.int64)
-    number = np.arange(levels)
-    inner = (number >= 1) & (number < last[:, None])
-    return (sizes[:, 0] == 0) & (width > 1) & (last > 2) & ((sizes == width[:, None]) | ~inner).all(axis=1)
+    order = np.lexsort((level, label))
+    begins = np.append(True, (np.diff(label[order]) != 0) | (np.diff(level[order]) != 0))
+    owner, number = label[order[begins]], level[order[begins]]
+    size = np.diff(np.append(np.flatnonzero(begins), len(order)))
+    width, rows = np.bincount(label, across >= 0), np.bincount(owner)
+    is_last = np.append(owner[1:] != owner[:-1], True)
+    odd = np.bincount(owner, (number < 0) | ~is_last & (size != width[owner]))
+    even: np.ndarray = (odd == 0) & (width > 1) & (rows > 1)
+    return even
 
 
 def _columns(
