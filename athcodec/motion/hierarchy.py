@@ -4,7 +4,7 @@ Built from branch labels, or derived from an edge graph by going straight on at 
 count as botanists count them (trunk 0, its branches 1 ...) and no stem has a kink, which would move as no beam does.
 Edge graphs are rooted by an Euler tour and pointer doubling (Tarjan and Vishkin, "An efficient parallel biconnectivity
 algorithm", SIAM J. Comput. 14(4), 1985), which takes a logarithmic number of array operations however deep the tree
-is. It looks at the rest pose only, never at the motion.
+is. It looks at the rest pose only; who knows the motion says which vertices begin branches.
 """
 
 from __future__ import annotations

@@ -98,7 +98,9 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     if first is not None and not (first.method == "runs" and _are_doubtful(seen, first)):
         yield from _distinct(itertools.chain([first], _others(seen, first)))
         return
-    for links in seen.growing:
+    if first is not None and seen.growing:
+        yield first
+    for links in seen.growing[1:]:
         yield _of_growing(seen, links, None)
     for branches in _in_order(seen):
         yield branches

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.steady import PRECISION, Distances, near_pairs, scipy_module
+from athcodec.motion.branches.steady import PRECISION, Distances, cheapest_tree, near_pairs
 
 TOGETHER = 0.9  # Distinct places in some frame, over the most in any, below which a plant of points may grow.
 NEXT = 0.7  # Factor of a link's cost where the source has its points one after the other.
@@ -26,15 +26,9 @@ def growing_links(frames: np.ndarray) -> list[np.ndarray]:
     grown = frames[places.argmax(), None]
     pairs = np.unique(np.concatenate([following, near_pairs(grown[0], np.arange(count))]), axis=0)
     in_order = np.where(pairs[:, 1] - pairs[:, 0] == 1, NEXT, 1.0)
-    return [_tree(Distances(some).largest(pairs) * in_order, pairs, count) for some in (frames, grown)]
-
-
-def _tree(cost: np.ndarray, pairs: np.ndarray, count: int) -> np.ndarray:
-    """Return those of some pairs, (L, 2), that join the points, of which there are `count`, at the least total cost."""
-    cost = cost + cost.max() * 1e-12 + np.finfo(float).tiny  # A cost of 0 would be no link.
-    graph = scipy_module("sparse").coo_matrix((cost, pairs.T), (count, count)).tocsr()
-    tree = scipy_module("sparse.csgraph").minimum_spanning_tree(graph).tocoo()
-    return np.stack([tree.row, tree.col], axis=1).astype(np.int64)
+    costs = (Distances(some).largest(pairs) * in_order for some in (frames, grown))
+    least = np.finfo(float).tiny  # A cost of 0 would be no link.
+    return [cheapest_tree(pairs, cost + cost.max() * 1e-12 + least, count) for cost in costs]
 
 
 def _distinct_places(pose: np.ndarray) -> int:

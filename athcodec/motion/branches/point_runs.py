@@ -9,7 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from athcodec.motion.branches.steady import PLIANT, STEADY, USUAL, Distances, connected_parts, near_pairs, scipy_module
+from athcodec.motion.branches.steady import (
+    PLIANT,
+    STEADY,
+    USUAL,
+    Distances,
+    cheapest_tree,
+    connected_parts,
+    near_pairs,
+    scipy_module,
+)
 
 ROUNDS = 6  # Rounds of linking loose ends, among ever fewer points and so ever further away.
 ALIKE = 30.0  # Times a usual change, up to which a link is steady.
@@ -101,11 +110,8 @@ class _Steady:
 
     def tree(self) -> np.ndarray:
         """Return those of the pairs, (L, 2), that join the same points at the least total cost."""
-        sparse, graphs = scipy_module("sparse"), scipy_module("sparse.csgraph")
         cost = np.maximum(self._length, self.precision) * np.hypot(self._change, PLIANT * self._usual)
-        graph = sparse.coo_matrix((cost, self._pairs.T), (self._count, self._count)).tocsr()
-        tree = graphs.minimum_spanning_tree(graph).tocoo()
-        return np.stack([tree.row, tree.col], axis=1).astype(np.int64)
+        return cheapest_tree(self._pairs, cost, self._count)
 
     def beside(self, links: np.ndarray) -> int:
         """Return how many of the pairs are no links, but about as short as the links at both points."""

@@ -77,6 +77,14 @@ def connected_parts(links: np.ndarray, count: int) -> np.ndarray:
     return labels
 
 
+def cheapest_tree(pairs: np.ndarray, cost: np.ndarray, count: int) -> np.ndarray:
+    """Return those of some pairs of points, (L, 2), that join the same points as all of them at the least total cost.
+    `pairs`: (P, 2); `cost`: (P,), above 0; `count`: of all points."""
+    graph = scipy_module("sparse").coo_matrix((cost, pairs.T), (count, count)).tocsr()
+    tree = scipy_module("sparse.csgraph").minimum_spanning_tree(graph).tocoo()
+    return np.stack([tree.row, tree.col], axis=1).astype(np.int64)
+
+
 def scipy_module(name: str) -> ScipyObject:
     """Return a module of scipy. Raises MissingExtra without it."""
     try:
