@@ -39,6 +39,7 @@ from athcodec._native import (
 )
 from athcodec.decoding import container as ct
 from athcodec.decoding.container import from_short_float
+from athcodec.encoding.model.kinds import plant_kinds
 from athcodec.files.threads import SERIAL, ThreadPool, ranges
 
 CoreOutput: TypeAlias = tuple[int | None, bool, int | None]
@@ -278,6 +279,11 @@ class Plan:
         at = np.where(pieces["attach"] >= 0, pieces["attach"], pieces["first"])
         away = self.rest - np.repeat(self.rest[at], pieces["count"], axis=0)
         return np.sqrt(2 / 3 * np.add.reduceat((away**2).sum(axis=1), pieces["first"]))
+
+    @cached_property
+    def kinds(self) -> np.ndarray:
+        """Per piece the number of the kind of plant that it belongs to, (P,)."""
+        return plant_kinds(self.branches["parent"], self.branches["count"])[self.pieces["branch"]]
 
     @property
     def main_stage(self) -> int:

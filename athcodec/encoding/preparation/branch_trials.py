@@ -21,9 +21,10 @@ from athcodec.encoding.search.still import STILL_SHARES, more_still
 from athcodec.encoding.segments.segment import Source
 from athcodec.errors import BoundError
 from athcodec.files.threads import SERIAL
+from athcodec.motion.branches.divided import clip_among, joined, plants_apart
 from athcodec.motion.branches.finding import candidates, named_labels
 from athcodec.motion.branches.result import Found, hierarchy_on, order_of, with_branches
-from athcodec.motion.branches.still import clip_among, joined, still_parts
+from athcodec.motion.branches.still import still_parts
 from athcodec.motion.clip import MotionClip, stands_still
 from athcodec.motion.polygons import POLYGON_ARRAYS
 from athcodec.options import DEFAULT_SEGMENT
@@ -33,6 +34,7 @@ TRIAL_SHARE = 0.2  # Largest share of the work left before the first trial that 
 ALIKE = 1.05  # Bytes, over the fewest, up to which branches of lower order are better: trials err by that.
 SAME = 1.02  # The same up to which fewer branches of the same order are better.
 PATCHES = 1.4  # Bytes in whole files, over those in trials, of patches of a mesh that has pieces.
+PLANTS_SHARE = 0.35  # Largest share of the work for branches of all plants, where they are sought for each, too.
 LEAST_TRIALS = 8  # Trials of settings that tell which branches are better.
 
 
@@ -47,14 +49,42 @@ def best_branches(
     least = option.least(clip)
     is_named = clip.skin is not None or named_labels(clip) is not None
     still = None if is_named or options.host_rest else _still(clip, least)
-    if still is None:
+    if is_named:
         return _best_candidate(clip, option, work, options, is_compared)
+    if still is None:
+        return _best_of_plants(clip, option, work, options, is_compared)
     if least > 0:  # The bound of the parts is that of the whole.
         option = BoundOption(max_error=least)
     moving, standing = (clip_among(clip, np.flatnonzero(some), some is still) for some in (~still, still))
-    branches, size = _best_candidate(moving, option, work, options, is_compared)
+    branches, size = _best_of_plants(moving, option, work, options, is_compared)
     others, still_size = _best_candidate(standing, option, Work(), options, is_compared)
-    return joined(clip, still, branches, others), size + (still_size if is_compared else 0.0)
+    return joined(clip, still.astype(int), [branches, others]), size + (still_size if is_compared else 0.0)
+
+
+def _best_of_plants(
+    clip: MotionClip, option: BoundOption, work: Work, options: EncodingOptions, is_compared: bool
+) -> tuple[Found, float]:
+    """Return the best branches, and about the bytes of their file, as `_best_candidate` does, or those that were found
+    for each plant by itself where points that nothing joins are of plants that stand apart, and these are smaller:
+    what suits one plant may suit no other.
+    """
+    bound, finding = option.least(clip), FINDING * clip.vertex_count
+    may_differ = bound > 0 and not stands_still(clip) and work.fits(2 * finding)
+    plant = plants_apart(clip) if may_differ else None
+    if plant is None:
+        return _best_candidate(clip, option, work, options, is_compared)
+    with work.trying("branches", PLANTS_SHARE):
+        best, least = _best_candidate(clip, option, work, options, is_compared=True)
+    trial = Trial(clip, option, options, work)
+    allowed, found, option = work.left - trial.least_work, [], BoundOption(max_error=bound)
+    for number in range(plant.max() + 1):
+        vertices = np.flatnonzero(plant == number)
+        own = Work(allowed * (len(vertices) / len(plant) + 1 / (plant.max() + 1)) / 2)
+        found.append(_best_candidate(clip_among(clip, vertices), option, own, options, is_compared=False)[0])
+        work.add(own.done)
+    apart = joined(clip, plant, found)
+    size = trial.size(apart)[0]
+    return (apart, size) if size < least else (best, least)
 
 
 def _still(clip: MotionClip, least: float) -> np.ndarray | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model import quantise as qz
+from athcodec.encoding.model.kinds import plant_kinds
 from athcodec.encoding.model.motion import Plan
 from athcodec.encoding.segments.segment import Source, branch_records
 from athcodec.encoding.segments.settings import OF_BRANCHES, Settings
@@ -147,7 +148,7 @@ def sample_plant(source: Source, ath: Ath, effort: str, with_faces: bool = False
     wanted = sample_vertices(source.clip.vertex_count, len(source.segments), frames, effort)
     if wanted is None:
         return None
-    branches = _even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
+    branches = even_branches(source.hierarchy, wanted, int(ath.node_branch[ath.node_depth.argmax()]))
     sample = PlantSample(source, ath, branches, with_faces)
     return sample if len(sample.vertices) < source.clip.vertex_count // 2 else None
 
@@ -166,15 +167,17 @@ def sample_vertices(vertices: int, segments: int, frames: int, effort: str) -> i
     return min(max(int(vertices * segments * SEGMENT_SHARE), least, SMALL // frames), MOST_SAMPLE)
 
 
-def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
+def even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarray:
     """Return the numbers of branches that are spread evenly over the plant and have about `wanted` vertices in all. The
-    branch `deepest` and the ancestors of each chosen branch are among them.
+    branch `deepest`, the ancestors of each chosen branch, and a plant of each kind are among them.
     """
     vertices = np.append(hierarchy.first_vertex, hierarchy.vertex_count).tolist()
     after = (np.arange(hierarchy.branch_count) + hierarchy.subtree_branches).tolist()
     kept = np.zeros(hierarchy.branch_count, bool)
     kept[deepest] = True
     branch, due, share = 0, 0.0, wanted / hierarchy.vertex_count
+    kinds = plant_kinds(hierarchy.branch_parent, hierarchy.stem_count)
+    whole: dict[int, tuple[int, int]] = {}  # A plant of each kind: its first branch, and the one after its last.
     while branch < len(after):
         size = vertices[after[branch]] - vertices[branch]
         if size > wanted // SUBTREES and after[branch] > branch + 1:
@@ -184,7 +187,11 @@ def _even_branches(hierarchy: Hierarchy, wanted: int, deepest: int) -> np.ndarra
         if 2 * due >= size:
             kept[branch : after[branch]] = True
             due -= size
+        if hierarchy.branch_parent[branch] < 0:
+            whole.setdefault(int(kinds[branch]), (branch, after[branch]))
         branch = after[branch]
+    for kind in set(whole) - set(kinds[kept].tolist()):
+        kept[slice(*whole[kind])] = True
     for branch, parent in reversed(list(enumerate(hierarchy.branch_parent.tolist()))):
         if kept[branch] and parent >= 0:
             kept[parent] = True

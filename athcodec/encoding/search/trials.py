@@ -326,7 +326,8 @@ class Trials:
             stages = [*(stage for stage in range(self.stages) if plan.has_stems(stage) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
-            self.work.add(progress.EIGENVECTOR * longest**3 * len(stages) * len(self.samples))
+            matrices = len(stages) * len(self.samples) * (3 if plan.kinds.any() else 1)
+            self.work.add(progress.EIGENVECTOR * longest**3 * matrices)
             release_memory()
             learned = [
                 time_components(

@@ -31,7 +31,7 @@ from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.options.shape import RestPrecision, finer_than
 from athcodec.encoding.segments.segmentation import split_segments
 from athcodec.encoding.segments.settings import BEAM, Settings
-from athcodec.encoding.segments.time_bases import Entries, InWaves, TimeComponents
+from athcodec.encoding.segments.time_bases import Entries, InWaves, TimeComponents, TrackMoments
 from athcodec.encoding.streams import streams, writing
 from athcodec.encoding.streams.polygons import Mesh
 from athcodec.errors import BoundError
@@ -593,34 +593,43 @@ def stage_streams(settings: Settings, stages: int, bases: dict[int, StreamBasis]
     return stage_streams
 
 
-def _stage_moments(segment: SegmentMotion, stage: int | None) -> tuple[np.ndarray, int]:
-    """Return two things about a segment that was analysed with fine steps: the second moments over time, (T, T) in
-    units of steps, of the tracks in the stream of `stage`, or of all tracks if it is None; and the number of these
-    tracks. Tracks that quantise to nothing do not count.
+def _stage_moments(segment: SegmentMotion, stage: int | None) -> list[TrackMoments]:
+    """Return what the tracks in the stream of `stage`, or all tracks if it is None, have in common over time, in a
+    segment that was analysed with fine steps: those of the kind of plants that has most vertices, and of all others.
     """
-    if stage is None:
-        return _moments(segment, [segment.coefficients, segment.tracks])
-    pieces, rows, slots = segment.plan.pieces, segment.plan.ranks, []
-    few = pieces["low_modes"]
-    for low, high, at in ((0 * few, few, pieces["low_stage"]), (few, rows, pieces["stage"])):
-        for piece in np.flatnonzero((at == stage) & (rows > 0)):
+    is_other = segment.plan.kinds > 0
+    if not is_other.any():
+        return [_moments(segment, _rows_of(segment, stage, None))]
+    both = [_moments(segment, _rows_of(segment, stage, chosen)) for chosen in (~is_other, is_other)]
+    return [moments for moments in both if moments.count] or both[:1]
+
+
+def _rows_of(segment: SegmentMotion, stage: int | None, chosen: np.ndarray | None) -> Iterable[np.ndarray]:
+    """Return the rows of integers that the stream of `stage`, or of all stages if it is None, has for the `chosen`
+    pieces, (P,) bool, or for all if they are None."""
+    if stage is None and chosen is None:
+        return [segment.coefficients, segment.tracks]
+    pieces, ranks, slots = segment.plan.pieces, segment.plan.ranks, []
+    among = np.ones(len(pieces), bool) if chosen is None else chosen
+    few, base = pieces["low_modes"], segment.plan.base_stage
+    for low, high, at in ((0 * few, few, pieces["low_stage"]), (few, ranks, pieces["stage"])):
+        for piece in np.flatnonzero(among & (ranks > 0) & ((at == stage) | (stage is None))):
             slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
-    chosen = np.concatenate(slots) if slots else np.zeros(0, int)
-    parts = (segment.coefficients[chosen[at : at + ROWS_AT_ONCE]] for at in range(0, len(chosen), ROWS_AT_ONCE))
-    return _moments(segment, chain(parts, [segment.tracks[segment.plan.base_stage == stage]]))
+    places = np.concatenate(slots) if slots else np.zeros(0, int)
+    some = (segment.coefficients[places[at : at + ROWS_AT_ONCE]] for at in range(0, len(places), ROWS_AT_ONCE))
+    return chain(some, [segment.tracks[among & ((base == stage) | (stage is None))]])
 
 
-def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> tuple[np.ndarray, int]:
-    """Return two things about the rows of integers in `parts`: the sum of their second moments over time, (T, T) in
-    squared steps; and the number of rows that count, because they do not quantise to nothing.
-    """
+def _moments(segment: SegmentMotion, parts: Iterable[np.ndarray]) -> TrackMoments:
+    """Return what the rows of integers in `parts` have in common over time. Rows that quantise to nothing do not
+    count."""
     lower, count, least = np.zeros((segment.frames, segment.frames)), 0, (FINER * qz.DEAD_ZONE) ** 2
     for part in parts:
         rows = part.reshape(-1, segment.frames)
         into = address(rows, np.int32, rows.size), least, address(lower, np.float64, lower.size)
         count += lib.ath_add_moments(len(rows), segment.frames, *into)
     moments, waves = (np.tril(lower) + np.tril(lower, -1).T) / FINER**2, segment.waves_of(segment.streams[0])
-    return multiply(waves.T, multiply(moments, waves)), count
+    return TrackMoments(multiply(waves.T, multiply(moments, waves)), count)
 
 
 def analyse_finely(plan: Plan, settings: Settings, positions: np.ndarray, bent: bool = False) -> SegmentMotion:
@@ -645,7 +654,7 @@ def time_components(
     if last:
         plan.forget_bases()
     may_be_in_waves = Feature.WAVE_BASES not in settings.without
-    return {stage: TimeComponents(*_stage_moments(segment, stage), segment.waves, may_be_in_waves) for stage in stages}
+    return {stage: TimeComponents(_stage_moments(segment, stage), segment.waves, may_be_in_waves) for stage in stages}
 
 
 def stage_bases(

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from athcodec.motion.branches.result import Found, checked_branches
 from athcodec.motion.branches.seen import components, links_of, near_neighbours
 from athcodec.motion.branches.steady import scipy_module
-from athcodec.motion.clip import MotionClip, source_stem_index, stands_still
-from athcodec.motion.frames import Frames
-from athcodec.motion.polygons import Polygons
+from athcodec.motion.clip import MotionClip, stands_still
 
 NEIGHBOURS = 8  # Nearest points of each vertex without links, among which it stands.
 LEAST_STILL = 64  # Vertices below which what stands still stays with what moves.
@@ -109,74 +104,3 @@ def _inside(still: np.ndarray, links: np.ndarray) -> np.ndarray:
     for here, there in (links.T, links.T[::-1]):
         inside[here[core[there]]] = True
     return inside & still
-
-
-def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -> MotionClip:
-    """Return a clip of some of a clip's vertices, with the edges, faces and attributes of theirs by which branches are
-    found. `vertices`: their numbers, ascending; `is_still`: whether the rest pose is to be the only frame.
-    """
-    rest = clip.source_rest[vertices]
-    if is_still:
-        positions, time = rest[None].astype(clip.dtype), clip.time[:1]
-    else:
-        frames = Frames(lambda a, b: clip.block(a, b)[:, vertices], clip.frame_count, len(vertices), clip.dtype)
-        frames.chunks = getattr(clip.positions, "chunks", None)
-        positions, time = frames, clip.time
-    some = MotionClip(
-        positions,
-        time,
-        rest=rest,
-        edges=_among(clip.edges, vertices),
-        faces=_among(clip.faces, vertices),
-        attributes=_attributes(clip, vertices),
-        metadata=clip.metadata,
-        clip_ranges=() if is_still else clip.clip_ranges,
-    )
-    some.rest_given = clip.rest_given
-    return some
-
-
-def _among(rows: np.ndarray | None, vertices: np.ndarray) -> np.ndarray | None:
-    """Return the edges or faces all of whose vertices are among these, ascending, by their numbers there."""
-    kept = None if rows is None else Polygons.of_rows(rows).among(vertices)
-    return kept.rows if kept is not None and kept.face_count else None
-
-
-def _attributes(clip: MotionClip, vertices: np.ndarray) -> dict[str, np.ndarray]:
-    """Return those attributes by which branches are found, such as polygons and parts, for some of the clip's vertices.
-    `vertices`: their numbers, ascending.
-    """
-    polygons = Polygons.of_attributes(clip.attributes)
-    kept = None if polygons is None else polygons.among(vertices)
-    arrays = kept.attributes if kept is not None and kept.face_count else {}
-    parts = clip.attributes.get("part_vertex_counts")
-    if parts is not None and parts.ndim == 1 and parts.dtype.kind in "iu" and parts.sum() == clip.vertex_count:
-        of_vertex = np.repeat(np.arange(len(parts)), parts)[vertices]
-        arrays["part_vertex_counts"] = left = np.bincount(of_vertex, minlength=len(parts)).astype(parts.dtype)
-        copies = clip.attributes.get("part_copies")
-        if copies is not None and copies.shape == parts.shape:
-            arrays["part_copies"] = np.where(left == parts, copies, 1).astype(copies.dtype)
-    return arrays
-
-
-def joined(clip: MotionClip, still: np.ndarray, moving: Found, standing: Found) -> Found:
-    """Put the branches of two parts of a clip together as branches of the whole clip. `still`: which vertices stand
-    still, (N,) bool; `moving`, `standing`: the branches of the other vertices, and of these.
-    """
-    first = len(moving.branch_parent)
-    label, place = np.empty((2, clip.vertex_count), np.int64)
-    label[~still], label[still] = moving.vertex_branch, standing.vertex_branch + first
-    for some, branches in ((~still, moving), (still, standing)):
-        index = branches.stem_index
-        place[some] = source_stem_index(branches.vertex_branch) if index is None else index
-    above = standing.branch_parent.astype(np.int64)
-    parent = np.concatenate([moving.branch_parent, np.where(above < 0, -1, above + first)])
-    joint = checked_branches(label, parent, place, moving.method)
-    if moving.stem_index is None and standing.stem_index is None:
-        joint = replace(joint, stem_index=None)
-    links = [
-        np.flatnonzero(some)[branches.links]
-        for some, branches in ((~still, moving), (still, standing))
-        if branches.links is not None
-    ]
-    return replace(joint, array_name=moving.array_name, links=np.concatenate(links) if links else None)
