@@ -65,8 +65,8 @@ def test_what_stands_apart_is_told_apart_and_what_is_small_stands_together():
     shapes = [random.uniform(0, 1, (400, 3)) * [1, 1, 0.1], random.uniform(0, 1, (300, 3)) * [1, 1, 0.1] + [1.5, 0, 0]]
     small = [random.uniform(0, 0.02, (5, 3)) + [0.3 * i, 0, 2] for i in range(14)]
     plant = plants_apart(MotionClip(np.concatenate(shapes + small)[None].astype(np.float32), np.zeros(1)))
-    assert np.array_equal(plant, np.repeat([plant[0], plant[400], 2], [400, 300, 70]))
-    assert {plant[0], plant[400]} == {0, 1}
+    assert np.array_equal(plant, np.repeat([plant[0], plant[400], plant[700]], [400, 300, 70]))
+    assert {plant[0], plant[400], plant[700]} == {0, 1, 2}
     assert plants_apart(MotionClip(shapes[0][None].astype(np.float32), np.zeros(1))) is None
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bench.scenes import fields, singles
+from bench.scenes import fields, mixed, singles
 from bench.scenes.assembly import Scene
 
 
@@ -52,6 +52,16 @@ SCENES: dict[str, Recipe] = {
     "kelp": Recipe("kelp with blades in a swell", fields.kelp, {"seed": 40, "plants": 40}),
     "trellis": Recipe("a vine on a still trellis", singles.trellis, {"seed": 41}),
     "ivy": Recipe("ivy on a tree that sways", singles.ivy, {"seed": 42}),
+    "meadow": Recipe("a tree in a storm beside wheat and stems", mixed.meadow, {"seed": 43, "blades": 60, "stems": 12}),
+    "meadow_points": Recipe(
+        "the same without faces", mixed.meadow, {"seed": 43, "blades": 60, "stems": 12}, has_faces=False
+    ),
+    "willow_and_kelp": Recipe(
+        "leaves of a willow beside kelp", mixed.crown_and_kelp, {"seed": 44, "leaves": 200, "plants": 10}
+    ),
+    "willow_and_kelp_points": Recipe(
+        "the same without faces", mixed.crown_and_kelp, {"seed": 44, "leaves": 200, "plants": 10}, has_faces=False
+    ),
 }
 
 __all__ = ["SCENES", "Recipe", "Scene"]

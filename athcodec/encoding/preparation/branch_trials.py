@@ -74,8 +74,8 @@ def _best_of_plants(
     if plant is None:
         return _best_candidate(clip, option, work, options, is_compared)
     with work.trying("branches", PLANTS_SHARE):
-        best, least = _best_candidate(clip, option, work, options, is_compared=True)
-    trial = Trial(clip, option, options, work)
+        trial = Trial(clip, option, options, work)
+        best, least = _best_candidate(clip, option, work, options, is_compared=True, trial=trial)
     allowed, found, option = work.left - trial.least_work, [], BoundOption(max_error=bound)
     for number in range(plant.max() + 1):
         vertices = np.flatnonzero(plant == number)
@@ -97,7 +97,12 @@ def _still(clip: MotionClip, least: float) -> np.ndarray | None:
 
 
 def _best_candidate(
-    clip: MotionClip, option: BoundOption, work: Work, options: EncodingOptions, is_compared: bool
+    clip: MotionClip,
+    option: BoundOption,
+    work: Work,
+    options: EncodingOptions,
+    is_compared: bool,
+    trial: Trial | None = None,
 ) -> tuple[Found, float]:
     """Try ways to divide a clip into branches on a few frames, as many as the work allows. Return the branches that
     make the smallest file, and about its bytes, which are infinite if there was nothing to compare and `is_compared` is
@@ -109,7 +114,7 @@ def _best_candidate(
     ones are unless that order was worse.
     """
     by_points = work.fits(FINDING * clip.vertex_count)
-    proposals, trial = candidates(clip, by_points), Trial(clip, option, options, work)
+    proposals, trial = candidates(clip, by_points), trial or Trial(clip, option, options, work)
     best, least, predicted = next(proposals), math.inf, 0
     tried: list[tuple[float, Found]] = []
     finding = FINDING * clip.vertex_count if by_points and best.method == "motion" and not stands_still(clip) else 0.0

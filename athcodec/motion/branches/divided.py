@@ -22,7 +22,7 @@ LEAST_POINTS = 64  # Points below which it does, too.
 
 def plants_apart(clip: MotionClip) -> np.ndarray | None:
     """Return the number of the plant that each vertex is of, (N,), for points that nothing joins, of plants that stand
-    apart from each other; what is small stands together under the last number. None: there is one plant.
+    apart from each other; what is small and away from them counts as one. None: there is one plant.
     """
     points = np.asarray(clip.rest, np.float64)
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -34,12 +34,39 @@ def plants_apart(clip: MotionClip) -> np.ndarray | None:
     cells, cell = np.unique(np.floor((points - points.min(axis=0)) / gap), axis=0, return_inverse=True)
     near = tree(cells).query_pairs(1.8, output_type="ndarray")  # They touch at a corner.
     label = components(near, len(cells))[cell.reshape(-1)]
-    count = np.bincount(label)
-    is_plant = count >= max(LEAST_PLANT * len(points), LEAST_POINTS)
-    number = np.where(is_plant, np.cumsum(is_plant) - 1, np.count_nonzero(is_plant))[label]
-    if 0 < np.count_nonzero(~is_plant[label]) < LEAST_POINTS:
-        number[number == is_plant.sum()] = 0
-    return number if number.max() > 0 else None
+    is_large = np.bincount(label) >= max(LEAST_PLANT * len(points), LEAST_POINTS)
+    large = np.flatnonzero(is_large)
+    if not len(large):
+        return None
+    plant = np.arange(len(large))
+    while True:  # Boughs of a crown stand apart, but the boxes around them reach into each other.
+        boxes = _boxes(points[is_large[label]], plant[np.searchsorted(large, label[is_large[label]])])
+        met = components(np.argwhere(_meet(boxes, boxes)), len(boxes[0]))
+        if met.max() + 1 == len(met):
+            break
+        plant = met[plant]
+    near = _meet(_boxes(points, label), boxes)
+    other = np.where(near.any(axis=1), near.argmax(axis=1), len(boxes[0]))
+    other[large] = plant
+    number = other[label]
+    if 0 < np.count_nonzero(number == len(boxes[0])) < LEAST_POINTS:
+        number[number == len(boxes[0])] = 0
+    return number if number.any() else None
+
+
+def _boxes(points: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest coordinates of each group of points, (G, 3) each. `group`: (N,)."""
+    low = np.full((group.max(initial=-1) + 1, 3), np.inf)
+    high = -low
+    np.minimum.at(low, group, points)
+    np.maximum.at(high, group, points)
+    return low, high
+
+
+def _meet(boxes: tuple[np.ndarray, np.ndarray], others: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return which of some boxes, (A,), meet which of others, (B,), (A, B) bool."""
+    meet: np.ndarray = (boxes[0][:, None] <= others[1]) & (others[0] <= boxes[1][:, None])
+    return np.all(meet, axis=2)
 
 
 def clip_among(clip: MotionClip, vertices: np.ndarray, is_still: bool = False) -> MotionClip:

@@ -42,10 +42,12 @@ MANY_ROOTS = 0.25  # Part of the branches that are roots from which on all are t
 WOOD_VERTICES = 1000  # Vertices of a piece of a mesh that may be a trunk with its boughs.
 WOOD = 0.25  # Part of the vertices that are in such pieces from which on patches are tried besides pieces.
 STEADY_NEXT = 0.2  # Change of the distance of two vertices, over their motion, above which they are of two parts.
+LOOSE_NEXT = 0.05  # The same above which they may be.
 FAR_NEXT = 3.0  # Times the usual distance of two vertices, above which they are of two parts.
 STILL = 1e-6  # Of the diagonal: change of a distance that is none.
 PARTS_IN_ORDER = 0.125  # Parts for each vertex above which the order of the source says nothing.
 COPIES = 8  # Parts from which on it is no accident that most are of one size.
+LEAST_COPY = 3  # Vertices of such a part, at least.
 ALIKE_PARTS = 0.8  # Share of the parts that are then of one size.
 PLANTS = 0.5  # Part of the branches that are roots by their price above which they are plants side by side.
 BODY_PATCHES = (40, 16)  # Average vertices of a patch of points that nothing joins.
@@ -221,10 +223,11 @@ def _of_bodies(seen: Seen) -> Iterator[Found]:
 
 
 def _labels_in_order(seen: Seen) -> list[np.ndarray]:
-    """Return up to two ways to divide points that nothing joins into parts that follow each other in the order of the
+    """Return a few ways to divide points that nothing joins into parts that follow each other in the order of the
     source, as labels (N,) each; a part begins at a point that does not keep its distance from the one before it. The
     second way also begins a part at a point that is far from the one before it, since things that stand in the ground
-    keep their distances. If this way gives parts of one size, as copies are, it alone is returned.
+    keep their distances, and the third where a distance changes a little, as that of a leaf from the next. If a way
+    gives parts of one size, as copies are, it alone is returned.
     """
     frames, count = seen.frames[1:], seen.clip.vertex_count
     if len(seen.mesh) or count < 2:
@@ -233,16 +236,20 @@ def _labels_in_order(seen: Seen) -> list[np.ndarray]:
     apart = np.linalg.norm(way, axis=2)
     moved = np.sqrt(((way - way.mean(axis=0)) ** 2).sum(axis=2).mean(axis=0))
     still = STILL * float(np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0)))
-    is_unsteady = apart.std(axis=0) > STEADY_NEXT * moved + still
     is_far = apart.mean(axis=0) > FAR_NEXT * np.quantile(apart.mean(axis=0), 1 - PARTS_IN_ORDER)
+    is_unsteady = apart.std(axis=0) > STEADY_NEXT * moved + still
+    is_loose = apart.std(axis=0) > LOOSE_NEXT * moved + still
     labels: list[np.ndarray] = []
     before = 0
-    for begins in (is_unsteady, is_unsteady | is_far):
-        parts = int(np.count_nonzero(begins)) + 1
+    for begins in (is_unsteady, is_unsteady | is_far, is_loose | is_far):
+        label = np.append(0, np.cumsum(begins))
+        parts = int(label[-1]) + 1
+        if before < parts and _are_even(label) and parts * LEAST_COPY <= count:
+            return [label]
         if before < parts <= PARTS_IN_ORDER * count and parts > 1:
-            labels.append(np.append(0, np.cumsum(begins)))
+            labels.append(label)
         before = parts
-    return labels[-1:] if labels and _are_even(labels[-1]) else labels
+    return labels
 
 
 def _are_even(label: np.ndarray) -> bool:
