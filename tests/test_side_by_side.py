@@ -11,9 +11,11 @@ from athcodec.encoding.model.kinds import plant_kinds
 from athcodec.encoding.search.sample import even_branches
 from athcodec.encoding.segments.time_bases import TimeComponents, TrackMoments
 from athcodec.motion.branches.divided import joined, plants_apart
+from athcodec.motion.branches.finding import candidates
 from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import build_hierarchy
+from bench.scenes import singles
 
 FRAMES = 60
 
@@ -58,6 +60,14 @@ def test_points_of_plants_that_move_unlike_each_other_cost_little_more_than_apar
     one, other = crown(1), stems(2) + [0.8, 0, 0]
     apart = size_of(one, 1e-4, ladder="none") + size_of(other, 1e-4, ladder="none")
     assert size_of(np.concatenate([one, other], axis=1), 1e-4, ladder="none") < 1.3 * apart
+
+
+def test_points_of_leaves_that_sway_much_alike_are_told_apart():
+    tree = singles.storm(39).without_faces()
+    of_leaf = np.bincount(tree.clip.vertex_branch)[tree.clip.vertex_branch] == 6
+    branches = next(candidates(tree.bare()))
+    alone = np.bincount(branches.vertex_branch)[branches.vertex_branch] == 6
+    assert np.count_nonzero(of_leaf & alone) > 0.9 * np.count_nonzero(of_leaf)
 
 
 def test_what_stands_apart_is_told_apart_and_what_is_small_stands_together():
