@@ -46,11 +46,10 @@ def best_branches(
     apart from the others, without trials on frames. `options`: those of the file, or None for a file of one layer.
     """
     options = EncodingOptions() if options is None else options
-    least = option.least(clip)
-    is_named = clip.skin is not None or named_labels(clip) is not None
-    still = None if is_named or options.host_rest else _still(clip, least)
-    if is_named:
+    if clip.skin is not None or named_labels(clip) is not None:
         return _best_candidate(clip, option, work, options, is_compared)
+    least = option.least(clip)
+    still = None if options.host_rest else _still(clip, least)
     if still is None:
         return _best_of_plants(clip, option, work, options, is_compared)
     if least > 0:  # The bound of the parts is that of the whole.

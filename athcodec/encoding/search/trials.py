@@ -326,7 +326,8 @@ class Trials:
             stages = [*(stage for stage in range(self.stages) if plan.has_stems(stage) and not only_common), None]
             longest = max(sample.positions.shape[2] for sample in self.samples)
             self.work.add(self.work_of(progress.BASIS + progress.COMPONENT * longest))
-            matrices = len(stages) * len(self.samples) * (3 if plan.kinds.any() else 1)
+            each = 3 if plan.kinds.any() else 1  # Of all tracks, and of two kinds of plants.
+            matrices = each * len(stages) * len(self.samples)
             self.work.add(progress.EIGENVECTOR * longest**3 * matrices)
             release_memory()
             learned = [

@@ -609,13 +609,16 @@ def _rows_of(segment: SegmentMotion, stage: int | None, chosen: np.ndarray | Non
     pieces, (P,) bool, or for all if they are None."""
     if stage is None and chosen is None:
         return [segment.coefficients, segment.tracks]
-    pieces, ranks, slots = segment.plan.pieces, segment.plan.ranks, []
+    pieces, ranks = segment.plan.pieces, segment.plan.ranks
     among = np.ones(len(pieces), bool) if chosen is None else chosen
     few, base = pieces["low_modes"], segment.plan.base_stage
+    is_chosen = among & (ranks > 0)
+    rows = []
     for low, high, at in ((0 * few, few, pieces["low_stage"]), (few, ranks, pieces["stage"])):
-        for piece in np.flatnonzero(among & (ranks > 0) & ((at == stage) | (stage is None))):
-            slots.append(segment.plan.first_rows[piece] + np.arange(low[piece], high[piece]))
-    places = np.concatenate(slots) if slots else np.zeros(0, int)
+        count = np.where(is_chosen & ((at == stage) | (stage is None)), np.maximum(high - low, 0), 0)
+        before = np.cumsum(count) - count
+        rows.append(np.repeat(segment.plan.first_rows + low - before, count) + np.arange(count.sum()))
+    places = np.concatenate(rows)
     some = (segment.coefficients[places[at : at + ROWS_AT_ONCE]] for at in range(0, len(places), ROWS_AT_ONCE))
     return chain(some, [segment.tracks[among & ((base == stage) | (stage is None))]])
 
