@@ -23,6 +23,11 @@ def bytes_of(clip: MotionClip) -> int:
     return len(athcodec.encode(clip, rel_error=1e-4, ladder="none", attributes="none"))
 
 
+def branches_of(clip: MotionClip) -> dict:
+    found = athcodec.find_branches(clip)
+    return {name: getattr(found, name) for name in ("vertex_branch", "branch_parent", "stem_index")}
+
+
 def upside_down(clip: MotionClip) -> MotionClip:
     """The plant as a root system: all of it lies below where it began."""
     return clip.replace(positions=clip.block(0, clip.frame_count) * np.float32([1, -1, 1]), rest=None)
@@ -69,3 +74,20 @@ def test_a_plant_that_stands_still_is_rooted_at_its_lowest_vertex():
     still[:, :, 1] = [3, 2, 1, 0]
     clip = MotionClip(still, np.arange(5) / 30, edges=[[0, 1], [1, 2], [2, 3]])
     assert athcodec.find_branches(clip).stem_index.tolist() == [3, 2, 1, 0]
+
+
+def test_a_plant_that_sways_on_a_turntable_is_rooted_at_its_lowest_vertex():
+    """What moves least beside the turn is somewhere in the crown."""
+    times = np.arange(60) / 30
+    height = np.linspace(0, 8, 40)
+    place = np.zeros((60, 40, 3))
+    place[:, :, 0] = np.sin(4 * times)[:, None] * 0.05 * height**2 + 0.3
+    place[:, :, 1] = height
+    place[:, 20:, 2] = 0.5 * (height[20:] - height[19])
+    turn = np.pi * times
+    turned = place.copy()
+    turned[..., 0] = np.cos(turn)[:, None] * place[..., 0] + np.sin(turn)[:, None] * place[..., 2]
+    turned[..., 2] = np.cos(turn)[:, None] * place[..., 2] - np.sin(turn)[:, None] * place[..., 0]
+    edges = np.stack([np.arange(39), np.arange(1, 40)], axis=1)
+    clip = MotionClip(turned.astype(np.float32), times, edges=edges)
+    assert hierarchy_of(clip.replace(**branches_of(clip))).vertex_source[0] == 0

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from athcodec.motion.branches.common_motion import LEAST_STEADY, RIGID
 from athcodec.motion.branches.groups import cheapest_of_each
 from athcodec.motion.branches.grown_pose import SMALL_LINK, poses_of, shown_frames
 from athcodec.motion.branches.seen import Seen
@@ -31,7 +32,7 @@ def line_branches(
     """
     clip, frames = seen.clip, seen.frames[1:]  # The rest pose may have links of other lengths.
     links = np.asarray(check_indices("edges", links, clip.vertex_count, width=2), np.int64)
-    roots = _still_roots(frames, links, clip, root)
+    roots = _roots(seen, frames, links, root)
     size = np.linalg.norm(frames[:, links[:, 0]] - frames[:, links[:, 1]], axis=2)
     grows = (size.min(axis=0) < SMALL_LINK * size.max(axis=0)).any()
 
@@ -41,17 +42,19 @@ def line_branches(
     return branches_from_edges(links, clip.vertex_count, clip.rest, roots.tolist(), begins=begins if grows else None)
 
 
-def _still_roots(
-    frames: np.ndarray, links: np.ndarray, clip: MotionClip, root: int | Sequence[int] | None
-) -> np.ndarray:
+def _roots(seen: Seen, frames: np.ndarray, links: np.ndarray, root: int | Sequence[int] | None) -> np.ndarray:
     """Return the root of each connected part: the vertex of `root` in it, else the lowest one in the rest pose, unless
     it sways and another one stands still. `frames`: (F, N, 3) positions in a few frames; `links`: (L, 2).
     """
+    clip = seen.clip
     part = parts_of_edges(links, clip.vertex_count)
     lowest = roots_of_parts(part, clip.rest, root, clip.metadata.get("up_axis", "y"))
     way = np.sqrt(((frames - frames[0]) ** 2).sum(axis=2).mean(axis=0))
+    diagonal = np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0))
+    if seen.is_carried and np.count_nonzero(way <= RIGID * diagonal) < LEAST_STEADY:
+        return lowest  # What moves least beside a common motion that nothing tells exactly may be in the crown.
     stillest = cheapest_of_each(part, way)
-    sways = way[lowest] > way[stillest] + SWAYS * np.linalg.norm(np.ptp(frames.reshape(-1, 3), axis=0))
+    sways = way[lowest] > way[stillest] + SWAYS * diagonal
     is_named = np.isin(lowest, [] if root is None else root)
     return np.where(sways & ~is_named, stillest, lowest)
 
