@@ -166,6 +166,17 @@ def test_a_growing_front_takes_at_most_six_tenths_of_a_simple_codec(fraction, tm
     assert found.bytes <= 0.6 * simple_bytes(positions, bound)
 
 
+def test_stiff_branches_that_no_face_shows_do_not_rule_out_prediction(tmp_path):
+    """Rods that fall into their places one after the other; as motion that is transformed they take twice as much."""
+    rng = np.random.default_rng(3)
+    begin = rng.uniform(-1, 1, (80, 1, 3)) + 0.05 * rng.normal(size=(80, 6, 3))
+    falls = np.arange(FRAMES)[:, None] >= rng.integers(2, FRAMES - 2, 80)
+    positions = begin - falls[:, :, None, None] * [0.0, 0.0, 3.0]
+    clip = clip_of(positions.reshape(FRAMES, -1, 3), begin.reshape(-1, 3), np.repeat(np.arange(80), 6), np.full(80, -1))
+    found = size(clip, tmp_path, 1e-4, ladder="none")
+    assert found.choices["motion"] == "predicted"
+
+
 def test_smoothness_has_a_price_limit(tmp_path):
     clip, found, shares = growth(), {}, {}
     for smoothness in ("bytes", "default", "motion"):

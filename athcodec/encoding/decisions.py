@@ -303,8 +303,8 @@ class FileDecisions:
             work.allowed -= FILE_BYTE * unsearched
             search.keep_work_of_maps()
         start = search.trials.start
-        is_rigid = (start.rigid > start.layer).any()  # Also in the last layer.
-        prediction = None if is_rigid else self._best_prediction(bound, unsearched, work)
+        keeps_shape = (self.source.keeps_shape & (start.rigid > start.layer)).any()  # Also in the last layer.
+        prediction = None if keeps_shape else self._best_prediction(bound, unsearched, work)
         if prediction is not None and prediction.bytes < unsearched:
             with work.trying("transformed motion"):
                 if prediction.bytes < SEARCH_SAVES * unsearched or not work.fits(search.trials.work_of_trial):
