@@ -15,7 +15,7 @@ from pathlib import Path
 from bench import tables
 
 _NAMES = (
-    "data rd report sample sizes features effort constants levels structure split branches",
+    "data rd report sample sizes features effort constants levels structure pairs split branches",
     "progressive speed memory decode picture viewer gallery wrappings onto engines",
 )
 VERBS = {name: import_module(f"bench.{name}") for name in " ".join(_NAMES).split()}

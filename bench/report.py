@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import athcodec
-from bench import branches, compare, constants, engines, features, gallery, rd, shown
+from bench import branches, compare, constants, engines, features, gallery, pairs, rd, shown
 from bench.store import read
 from bench.tables import table
 
@@ -43,6 +43,8 @@ def sections() -> Iterator[tuple[Path, str, str]]:
     yield BENCHMARKS, "lost", compare.lost_text(read(rd.RESULTS / f"{name}.json") for name in ("foreign", "held-out"))
     if constants.RESULTS.exists():
         yield DECIDES, "constants", constants.left_text(read(constants.RESULTS))
+    if pairs.RESULTS.exists():
+        yield BENCHMARKS, "pairs", pairs.table_text(read(pairs.RESULTS))
     if branches.RESULTS.exists():
         yield FORMATS, "branches", branches.table_text(read(branches.RESULTS))
     yield (

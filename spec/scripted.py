@@ -710,6 +710,7 @@ class Plant:
     joins: tuple[Join, ...] | None = None
     repeats: tuple[int, ...] = ()  # For each frame of one clip; none: no frame is a repeat.
     predicted: bytes | None = None  # Predicted motion, Step and Settings; then AFFINES are there only with a script.
+    trees: bytes | None = None  # The same of the trees of LOOSE roots, beside modes.
 
     def draft(self) -> Draft:
         """Return the draft of the plant's file, with its hierarchy, rest pose, times and all segments."""
@@ -850,6 +851,9 @@ class Plant:
         if self.predicted is not None:
             stream = self._write(self._predict, (rules.PREDICTED, 1, s), frames)
             entries.append(Entry(rules.PREDICTED, self.predicted + stream, 1, s))
+        if self.trees is not None:
+            stream = self._write(self._predict_trees, (rules.PREDICTED, last + self.layers - 1, s), frames)
+            entries.append(Entry(rules.PREDICTED, self.trees + stream, last + self.layers - 1, s))
         if self.layers > 1:
             entries += self._refinements(s, motion, periodic)
         for level in range(last, last + self.layers):
@@ -862,6 +866,10 @@ class Plant:
     def _predict(self, stream: bytes, frames: int) -> None:
         chunk, rest = self.predicted + stream, self.plan.rest
         rules.decode_predicted(chunk, self.branches, rest, self.origin, frames, self.is_float64)
+
+    def _predict_trees(self, stream: bytes, frames: int) -> None:
+        trees, rest = rules.predicted_trees(self.branches), self.plans[-1].rest
+        rules.decode_trees(self.trees + stream, trees, rest, self.origin, frames, self.is_float64)
 
     def _head(self, level: int, s: int, motion) -> bytes:
         """Return the head of STEMS; the motion gets its steps and waves."""

@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 
 import athcodec
-from athcodec._native import BRANCH, SEGMENT_FRAMES, crc32c
+from athcodec._native import BRANCH, LOOSE, SEGMENT_FRAMES, crc32c
 from athcodec.decoding import container as ct
 from athcodec.decoding.ath_file import AthFile
 from athcodec.encoding.model.motion import Plan, SegmentMotion, StageStream
+from athcodec.encoding.segments.predicted import trees_alone
 from athcodec.encoding.segments.segmentation import balanced_segments
 from athcodec.encoding.segments.time_bases import MOST_SAMPLE
 from athcodec.encoding.streams import streams, writing
@@ -165,6 +166,15 @@ def add_still_segment(store: writing.ChunkStore, plan: Plan, index: int, frames:
             store.add(ct.STEMS, payload if stems is None or stage > 0 else stems, stage, index)
         if plan.has_affines(stage):
             store.add(ct.AFFINES, streams.encode_affines(motion, stage), stage, index)
+    is_root = plan.branches["parent"] < 0
+    root = np.flatnonzero(is_root)[np.cumsum(is_root) - 1]
+    trees = plan.branches["flags"][root] & LOOSE > 0
+    if trees.any():
+        alone = Plan(trees_alone(plan.branches, trees), int(plan.branches["count"][trees].sum()), predicted=True)
+        alone.set_rest(np.zeros((alone.vertex_count, 3)), bases=False)
+        still, limits = np.zeros((alone.vertex_count, 3, frames)), np.ones(alone.vertex_count)
+        stream = streams.encode_predicted(alone, np.zeros(3), still, limits, 1.0, np.dtype(np.float32))[0]
+        store.add(ct.PREDICTED, writing.pack_predicted(1.0, stream), plan.stage_count - 1, index)
 
 
 def exact_rest_chunk(stream: bytes, dtype) -> bytes:

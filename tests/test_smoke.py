@@ -155,6 +155,7 @@ RUNS = {  # Words of each verb after a clip, or alone.
     "wrappings": "--help",
     "onto": "--picture OUT",
     "structure": "hedge_stems --short",
+    "pairs": "CLIP+CLIP --rel-error 1e-2 --results OUT",
     "split": "--help",
     "branches": "CLIP --results OUT",
     "constants": "CLIP --modules learned_modes --frames 4 --rel-error 1e-2 --results OUT",
@@ -173,7 +174,7 @@ def test_every_verb_of_the_benchmark_runs(verb, core_object, small_file, tmp_pat
     monkeypatch.setenv("ATHCODEC_BENCH_DATA", str(tmp_path))
     monkeypatch.setitem(SCENES, "hedge_stems", Recipe("two shrubs", fields.stems, {"seed": 3, "plants": 2}))
     own = {"CLIP": str(small_file), "OUT": str(tmp_path / "out"), "RAW": "simple (differences, zstd)"}
-    words = [own.get(word, word) for word in RUNS[verb].split()]
+    words = ["+".join(own.get(part, part) for part in word.split("+")) for word in RUNS[verb].split()]
     if words == ["--help"]:
         with pytest.raises(SystemExit) as ended:
             main([verb, *words])

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from athcodec.decoding import container as ct
 from athcodec.encoding.assembly.assembly import FileAssembly
@@ -23,6 +24,7 @@ from athcodec.encoding.options.features import Feature
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.search.choices.prediction import FoundPrediction, best_prediction, one_map_each
 from athcodec.encoding.search.hopeless import Hopeless
+from athcodec.encoding.search.predicted_trees import PredictedSplit
 from athcodec.encoding.search.progress import (
     FILE_BYTE,
     MOTION,
@@ -59,12 +61,25 @@ CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
 LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Files that are coded at most to name a bound that can be kept: some clips can keep none.
+TREES_SAVE = 0.5  # Largest share of the bytes of trees in modes that prediction takes where it is used for them alone.
 SHOWN_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from what others show in its place.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
 LEAST_LEVELS = 3  # Levels of a file below which finer layers are tried.
 LEVELS_BYTES = 20_000  # Bytes of motion from which on a file is streamed, and needs levels.
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
+
+
+class Prices(NamedTuple):
+    """The bytes of a file in modes, at the settings that a search starts with, and its usual prediction; None: none."""
+
+    in_modes: float
+    prediction: FoundPrediction | None
+
+    @property
+    def predicted(self) -> float:
+        """The bytes of that prediction, infinite if there is none."""
+        return math.inf if self.prediction is None else self.prediction.bytes
 
 
 @dataclass(frozen=True)
@@ -144,6 +159,11 @@ class FileDecisions:
             self._check(bound)
             if self.source.still:
                 return self.decide(bound).shared_bytes, False
+            found = self._growing_trees(bound, work)
+            if found is not None:
+                others = dataclasses.replace(self, source=found[0].moving_source)
+                size = others._tried(bound, work, frames_ratio, Hopeless())[0]
+                return frames_ratio * found[1].bytes + size, False
             ath = self.seen.ath(self.thresholds(bound))
             ratios, effort, jobs = (
                 self._layer_ratios(ath, bound, self.options.ladder),
@@ -176,13 +196,10 @@ class FileDecisions:
         if split is not None:
             moving = dataclasses.replace(holding, source=split.moving_source, beside=split.poses_beside)
         work = moving._allowed_work(bound)
-        decided = moving._decide(bound, work)
+        decided = moving._decide_by_trees(bound, work) or moving._decide(bound, work)
         if split is not None:
             choice = split.choice(decided.choice, decided.ath.thresholds)
-            options = dataclasses.replace(holding.options, segment_frames=decided.source.segment_frames)
-            if len(decided.layers.each) == 1:
-                options = dataclasses.replace(options, ladder=())
-            decided = dataclasses.replace(holding, options=options)._of_choice(choice, decided.ath.thresholds)
+            decided = holding._coded_as(decided, choice)
         decided = holding._with_levels(decided, work)
         untried = tuple(dict.fromkeys([*self.untried, *work.untried]))
         decided.choice = dataclasses.replace(decided.choice, untried=untried)
@@ -248,21 +265,73 @@ class FileDecisions:
         """Return the decision about a file whose settings are already chosen, for moving and still branches alike: the
         layers and streams that follow from `choice`, with the hierarchy that TAM gives for `thresholds`.
         """
-        bound = choice.settings.bound
+        bound, predicted = choice.settings.bound, choice.settings.predicted_trees
         split = self._split(bound, thresholds)
         source = self.source if split is None else split.marked
+        if predicted is not None:
+            source = source.marking(predicted if split is None else predicted | split.still)
         if not choice.predicted and source.segment_frames != self.options.segment_frames:
             source = source.in_segments(self.options.segment_frames)
         decisions = dataclasses.replace(self, source=source)
         if choice.predicted:
             return decisions._predicted(choice)
         ath = self.seen.ath(thresholds)
+        ath = ath if predicted is None else ath.as_one(predicted)
         return decisions._layered(ath, choice, CodedPrelude(source.about(choice.reference), ath, choice.settings))
 
     def _holding(self, bound: float) -> FileDecisions:
         """Return the decisions about a clip without frames that others show within a small part of the bound."""
         tolerance = 0.0 if self.options.lossless else SHOWN_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
+
+    def _decide_by_trees(self, bound: float, work: Work) -> Decided | None:
+        """Decide about a file of trees that grow beside others. Return None if there are none, or if one way to code
+        all motion is better.
+        """
+        found = self._growing_trees(bound, work)
+        if found is None:
+            return None
+        split, usual = found
+        poses_beside = split.predicting(usual.choice).poses_beside
+        decided = dataclasses.replace(self, source=split.moving_source, beside=poses_beside)._decide(bound, work)
+        source = split.still_source.in_segments(decided.source.segment_frames)
+        growing = dataclasses.replace(self, source=source)
+        prediction = None if decided.choice.predicted else growing._best_prediction(bound, math.inf, work, source)
+        if prediction is None:
+            return None
+        choice = split.predicting(prediction.choice).choice(decided.choice, decided.ath.thresholds)
+        return self._coded_as(decided, choice)
+
+    def _growing_trees(self, bound: float, work: Work) -> tuple[PredictedSplit, FoundPrediction] | None:
+        """Return two things: the source divided into trees that grow and others, and how the motion of the former is
+        predicted. Return None if one way to code all motion is better."""
+        if self.options.tam or self.options.lossless or Feature.PREDICTED in self.options.without:
+            return None
+        split = PredictedSplit.by_growth(self.source, self.seen.ath(self.thresholds(bound)), bound)
+        if split is None:
+            return None
+        growing, others = (
+            dataclasses.replace(self, source=source)._prices(bound, work)
+            for source in (split.still_source, split.moving_source)
+        )
+        prediction = growing.prediction
+        if prediction is None or prediction.bytes > TREES_SAVE * growing.in_modes:
+            return None
+        return (split, prediction) if others.in_modes < others.predicted else None
+
+    def _prices(self, bound: float, work: Work) -> Prices:
+        ath = self.seen.ath(self.thresholds(bound))
+        in_modes = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs).first_cost()
+        usual = dataclasses.replace(self, predicts_as_usual=True)
+        return Prices(in_modes, usual._best_prediction(bound, math.inf, work))
+
+    def _coded_as(self, decided: Decided, choice: Choice) -> Decided:
+        """Return the decision about a file of all branches, in the segments and layers of one of some branches, for a
+        choice that extends that one's."""
+        options = dataclasses.replace(self.options, segment_frames=decided.source.segment_frames)
+        if len(decided.layers.each) == 1:
+            options = dataclasses.replace(options, ladder=())
+        return dataclasses.replace(self, options=options)._of_choice(choice, decided.ath.thresholds)
 
     def _decide(self, bound: float, work: Work) -> Decided:
         """Decide about a file at `bound`, all of whose branches are searched, within the allowed `work`: its settings
@@ -381,13 +450,15 @@ class FileDecisions:
             return 0.0
         return self.beside(self.source.about(choice.reference), decided.ath, choice.settings, work)
 
-    def _best_prediction(self, bound: float, most_bytes: float, work: Work) -> FoundPrediction | None:
-        """Return the best prediction; None: it is too large, or a hierarchy of maps is asked for, which it lacks."""
+    def _best_prediction(
+        self, bound: float, most_bytes: float, work: Work, source: Source | None = None
+    ) -> FoundPrediction | None:
+        """Return the best prediction, in its long segments or in those of a `source`; None: it is too large, or a
+        hierarchy of maps is asked for, which it lacks."""
         if self.options.tam or Feature.PREDICTED in self.options.without:
             return None
-        return best_prediction(
-            self._long_segments, bound, most_bytes, work, self.options.smoothness, self.predicts_as_usual
-        )
+        source = self._long_segments if source is None else source
+        return best_prediction(source, bound, most_bytes, work, self.options.smoothness, self.predicts_as_usual)
 
     @property
     def _long_segments(self) -> Source:

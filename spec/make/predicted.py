@@ -325,3 +325,65 @@ valid(
         is_float64=True,
     ),
 )
+
+
+# ---- some trees beside others in modes ----
+
+BESIDE = stems_of("-1 4, 0 3 2, -1 5 LOOSE, 2 3 3, 3 2 1, -1 3 0 SHEET, -1 2 LOOSE WHOLE, 6 2 1")
+GROWN = [Stem(-1, 5), Stem(0, 3, 3), Stem(1, 2, 1), Stem(-1, 2), Stem(3, 2, 1)]  # Those of BESIDE that are predicted.
+
+
+def beside(seed: int, frames: int = 5, segments: int = 1, layers: int = 1, **fields) -> Plant:
+    """Return trees with predicted motion among others, which hold random rows like any others."""
+    make = moving if layers == 1 else refinements
+    heads = HEADS if layers == 1 else LAYER_HEADS
+    fields = {"frames": frames * segments, "segments": segments, "heads": heads, "layers": layers} | fields
+    plant, last = make(BESIDE, seed, trees=predicted_head(), **fields), 2 + layers
+    steps = swayed(frames, 10 * seed, GROWN)
+    plant.scripts[PREDICTED, last] = [x for frame in steps for x in frame]
+    return plant
+
+
+for title, make in {
+    "predicted-trees: two trees that are predicted among two that are not": lambda: beside(600),
+    "predicted-trees-copied: the same with copies of frames and of the rest pose, in binary64": lambda: replace(
+        beside(601, is_float64=True, origin=(1e6, -3e5, 0.125)),
+        scripts=beside(601, is_float64=True).scripts
+        | {(PREDICTED, 3): [1, 1, 0, 1, *frame_steps(GROWN, 602), 1, 1, 1, 0, 2, 0, 0, 2, *frame_steps(GROWN, 603)]},
+    ),
+    "predicted-trees-layers: in three layers, about the rest pose of the last": lambda: beside(604, layers=3),
+    "predicted-trees-joins: in two joined segments, with corrections of all trees: none of both moves what is "
+    "predicted": lambda: (lambda plant: replace(plant, scripts=plant.scripts | {(CORRECTIONS, 3): 605}))(
+        beside(605, 6, 2, joins=joins(0, 3, 0, 2.5, 0, 4, 0, 1.5))
+    ),
+    "predicted-trees-shortened: without the last level, which alone is predicted": lambda: beside(606).upto(2),
+    "predicted-trees-twins: vertices of both trees and of others that rest at one place": lambda: beside(
+        607, points=[[4.0 * (i % 3), float(i % 2), 1.0] for i in range(24)]
+    ),
+    "predicted-trees-alone: no tree is left that is not predicted": lambda: replace(
+        moving(stems_of("-1 3 LOOSE, 0 2 1"), 608, trees=predicted_head(), heads=HEADS),
+        scripts=moving(stems_of("-1 3 LOOSE, 0 2 1"), 608).scripts
+        | {(PREDICTED, 2): [x for frame in swayed(3, 608, FORKED) for x in frame]},
+    ),
+    "predicted-trees-lossless: the source's own numbers behind it": lambda: with_source(beside(609, 4).draft(), 610),
+}.items():
+    valid(title, make)
+for title, make in {
+    "predicted-trees-missing BAD_CHUNK_TABLE: a segment has no PREDICTED": lambda: (
+        beside(611, 5, 2).draft().without(PREDICTED, 3, 1)
+    ),
+    "predicted-trees-early BAD_CHUNK_TABLE: PREDICTED of the level before, too": lambda: beside(612).add(
+        Entry(PREDICTED, predicted_head(), 2, 0)
+    ),
+    "predicted-trees-of-layer BAD_CHUNK_TABLE: PREDICTED of each layer": lambda: beside(613, layers=2).add(
+        Entry(PREDICTED, predicted_head(), 3, 0)
+    ),
+    "predicted-trees-of-predicted BAD_HEADER: a root is LOOSE and Is_Predicted is set": lambda: predicted(
+        [Stem(-1, 4, flags=WHOLE | LOOSE)], swayed(2, 614, [Stem(-1, 4)])
+    ),
+}.items():
+    invalid(title, make)
+invalid(
+    "predicted-trees-left-over BAD_CHUNK 3: a byte behind the stream",
+    lambda: beside(615).change(PREDICTED, 3, 0, content=predicted_head() + b"\1" * 400),
+)

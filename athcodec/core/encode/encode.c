@@ -524,7 +524,7 @@ int64_t ath_encode_predicted(void *memory, uint8_t *bytes, size_t capacity, cons
     coder_start(&coder, bytes, capacity);
     carve_prediction(p, plan->vertex_count, (uint8_t *)memory);
     p->step = step;
-    start_prediction(p, plan, origin, is_float64, positions);
+    start_prediction(p, plan, 0, origin, is_float64, positions);
     for (int32_t t = 0; t < frames && valid; t++) valid = encode_frame(&coder, p, &wanted);
     return written(&coder, valid);
 }

@@ -179,6 +179,7 @@ int ath_file_needs(const ath_file *file, int32_t kind, int32_t d, int32_t stage)
     if (kind == ATH_SHAPES) return d <= stage && (file->stems_stages >> d & 1);
     int32_t shown = ath_min(stage, ath_lossy_stages(file) - 1);
     if (kind == ATH_CORRECTIONS) return d == shown && d > file->plan.height && !file->header.is_predicted;
+    if (kind == ATH_PREDICTED && file->predicted_trees) return d == shown && d == ath_lossy_stages(file) - 1;
     if (kind == ATH_PREDICTED) return d == shown && d > file->plan.height && file->header.is_predicted;
     if (kind == ATH_REFINED_REST && d <= shown && file->header.layer_count > 1)
         return d > file->plan.height + 1 || (d == 1 && stands_alone(file));

@@ -410,7 +410,7 @@ static int check_levels(const ath_file *file, ath_fault_info *fault)
 {
     int32_t lossy = ath_lossy_stages(file), last = file->info.full_level_count - 1;
     int32_t found = ath_file_stage(file, last) + 1;
-    int placed = file->plan.height == 0 || !file->header.is_predicted;
+    int placed = !file->header.is_predicted || (file->plan.height == 0 && !file->predicted_trees);
     if (placed && found == lossy) return ATH_OK;
     if (placed && found == lossy + 1 && last > 0 && ath_file_stage(file, last - 1) == lossy - 1) return ATH_OK;
     return ath_refuse(fault, ATH_BAD_HEADER, ATH_FIELD_FULL_LEVEL_COUNT, found, lossy, lossy + 1);
@@ -420,6 +420,9 @@ static int read_plan(ath_file *file, ath_fault_info *fault)
 {
     int result;
     build_plan(file);
+    file->predicted_trees = 0;
+    for (int32_t b = 0; b < file->plan.branch_count; b++)
+        if (file->branches[b].parent < 0 && file->branches[b].flags & ATH_LOOSE) file->predicted_trees = 1;
     file->info.node_count = file->plan.node_count;
     file->info.depth_levels = ath_min(file->info.level_count, ath_level_of(&file->header, file->plan.height + 1) + 1);
     if ((result = check_levels(file, fault)) != ATH_OK) return result;

@@ -12,6 +12,7 @@ static uint32_t to_words(size_t bytes) { return (uint32_t)(bytes / sizeof(uint32
 static int is_baked(const ath_file *file, int32_t level)
 {
     int32_t stage = ath_file_stage(file, level);
+    if (file->predicted_trees && stage >= ath_lossy_stages(file) - 1) return 1;
     return stage >= ath_lossy_stages(file) || (file->header.is_predicted && stage > 0);
 }
 

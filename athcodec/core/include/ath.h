@@ -310,8 +310,9 @@ typedef struct ath_branch {
     int32_t parent;  /* branch with a smaller index; -1 for a root */
     int32_t count;   /* vertices of the stem, at least 1 */
     int32_t attach;  /* vertex of the parent's stem that the branch hangs on; -1 for a root */
-    int32_t flags;   /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached; ATH_WHOLE: its subtree moves as one;
-                        ATH_STILL: what it carries does not turn as it bends */
+    int32_t flags;   /* ATH_SHEET: flat or compact; ATH_LOOSE: not attached or, of a root, its tree has predicted
+                        motion; ATH_WHOLE: its subtree moves as one; ATH_STILL: what it carries does not turn as it
+                        bends */
     int32_t lag;     /* vertices after which the rest pose tends to repeat its steps; 0: a beam */
     int32_t first;   /* first vertex */
     int32_t subtree; /* branches in the subtree, this one included */

@@ -34,8 +34,9 @@ void ath_correct_piece(ath_work *work, const ath_piece *piece)
     size_t position = ath_position_of_piece(work);
     for (int32_t i = 0; i < piece->count; i++) {
         const correction_row *row = code_vertex(&coder, reader->model, work->segment->frames, 0);
-        if (row) correct_vertex(reader, row, work->segment, position + (size_t)i);
-        if (row && ath_watcher_of(work)) watch_corrections(work, row, work->exact + i);
+        if (!row || work->is_predicted) continue;
+        correct_vertex(reader, row, work->segment, position + (size_t)i);
+        if (ath_watcher_of(work)) watch_corrections(work, row, work->exact + i);
     }
     reader->coder = coder;
 }

@@ -106,8 +106,12 @@ static int open_corrections(corrections_reader *reader)
 static int open_predicted(ath_work *work)
 {
     const ath_segment *segment = work->segment;
+    const ath_file *file = work->file;
+    size_t number = ath_number_size(segment->is_float64), numbers = 3 * (size_t)file->plan.vertex_count;
+    if (file->predicted_trees) memset(segment->positions, 0, (size_t)segment->frames * numbers * number);
     return ath_blame(work, work->predicted,
-                     ath_prediction_start(work->prediction, &work->file->plan, work->file->info.origin, segment->frames,
+                     ath_prediction_start(work->prediction, ath_layer_plan(file, work->layer, work->stage),
+                                          file->predicted_trees, file->info.origin, segment->frames,
                                           segment->is_float64, bytes_of(work->predicted), segment->positions));
 }
 
@@ -125,7 +129,7 @@ int ath_open_stage(ath_work *work)
         for (int32_t k = 0; work->keeping.at && k <= work->stage; k++)
             if (ath_has_stream(work->file, k))
                 ath_keep_stream(&work->keeping, work->streams + k, work->segment->frames);
-        if (work->predicted) return open_predicted(work);
+        if (work->predicted && (result = open_predicted(work)) != ATH_OK) return result;
         return chunk ? ath_blame(work, chunk, open_corrections(&work->corrections)) : ATH_OK;
     }
     affines_reader *affines = work->affines + d;

@@ -132,7 +132,7 @@ static void pose_piece(const ath_work *work, layer_work *layer, int32_t p)
     ath_pose_tracks(&layer->motion, piece, &layer->rows, &layer->scratch, layer->used);
     layer->placed = 0;
     if (layer == work->layers + work->layer)
-        placed_piece(layer, p, segment->is_float64 ? 0 : &to);
+        placed_piece(layer, p, segment->is_float64 || work->is_predicted ? 0 : &to);
     else if (piece->attach_cache >= 0)
         ath_pose_used(layer->plan, &layer->motion, piece, &layer->rows, layer->used, piece->attached, &layer->scratch,
                       0);
@@ -201,10 +201,10 @@ static int place_piece(ath_work *work, int32_t p)
     if (work->keeping.at)
         ath_keep_piece(&work->keeping, piece, &layer->rows, layer->shape_integers, layer->motion.frames);
     if (ath_watcher_of(work)) watch_piece(work, p);
-    if (work->segment->is_float64)
+    if (work->segment->is_float64 && !work->is_predicted)
         ath_store_doubles(work->segment, work->file->info.origin, position, piece->count, layer->placed);
     ath_keep_end(work->segment, position, vertex, (size_t)piece->count);
-    if (work->join.width > 0)
+    if (work->join.width > 0 && !work->is_predicted)
         ath_join_vertices(&work->join, work->segment, position, vertex, (size_t)piece->count, ath_watcher_of(work));
     if (work->corrections.chunk) ath_correct_piece(work, piece);
     return ATH_OK;
@@ -215,7 +215,7 @@ static int show_piece(ath_work *work, int32_t p)
     const ath_piece *piece = work->file->plan.pieces + p;
     if (work->shown_before)
         ath_copy_vertices(work->file, work->segment, work->shown_before, (size_t)work->exact, (size_t)piece->count);
-    else if (!work->predicted && place_piece(work, p) != ATH_OK)
+    else if (!(work->predicted && work->file->header.is_predicted) && place_piece(work, p) != ATH_OK)
         return ATH_BAD_CHUNK;
     int result = work->exact_level.chunk ? ath_make_exact(work, piece) : ATH_OK;
     work->exact += piece->count;
@@ -256,6 +256,7 @@ int ath_do_piece(ath_work *work)
     int32_t p = work->next++, result = ATH_OK;
     const ath_piece *piece = plan->pieces + p;
     layer_work *first = work->layers + work->first_layer;
+    if (piece->attach < 0) work->is_predicted = work->predicted && piece->flags & ATH_LOOSE;
     if (work->first_stage == 0 && !work->file->header.is_predicted) result = read_first_layer(work, p);
     if (work->kept)
         work->kept = ath_kept_piece(work->kept, piece, &first->rows, first->shape_integers, first->unit_shapes,

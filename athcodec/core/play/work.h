@@ -122,6 +122,7 @@ struct ath_work {
     int32_t next_kind;          /* next kind of CHECKSUMS */
     uint32_t crc, crc_at;
     int32_t next_node, exact, shown;
+    int32_t is_predicted; /* 1: the piece is of a tree that has been predicted */
     ath_fault_info fault;
     int32_t node_step;
 };

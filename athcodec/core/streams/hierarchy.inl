@@ -102,7 +102,7 @@ static int code_branch(ath_coder *coder, hierarchy_model *model, ath_branch *bra
     mean_count[kind] = averaged(mean_count[kind], (int32_t)more);
     branch->flags = code_flags(coder, model, before->flags, branch->flags);
     branch->lag = code_signed(coder, &model->lag, 0, branch->lag - before->lag) + before->lag;
-    if (branch->lag < 0 || branch->lag > 65535 || (branch->parent < 0 && branch->flags & ATH_LOOSE)) return 0;
+    if (branch->lag < 0 || branch->lag > 65535) return 0;
     branch->first = before->first + before->count;
     return 1;
 }

@@ -24,14 +24,14 @@ uint64_t ath_prediction_size(int32_t vertex_count)
     return carve_all(&counted, vertex_count, 0);
 }
 
-int ath_prediction_start(ath_prediction *p, const ath_plan *plan, const double *origin, int32_t frames, int is_float64,
-                         ath_bytes chunk, void *positions)
+int ath_prediction_start(ath_prediction *p, const ath_plan *plan, int loose_alone, const double *origin, int32_t frames,
+                         int is_float64, ath_bytes chunk, void *positions)
 {
     prediction *segment = &p->segment;
     ath_bytes body;
     carve_all(p, plan->vertex_count, (uint8_t *)p);
     if (ath_parse_stepped(chunk, &segment->step, &body) != ATH_OK) return ATH_BAD_CHUNK;
-    start_prediction(segment, plan, origin, is_float64, positions);
+    start_prediction(segment, plan, loose_alone, origin, is_float64, positions);
     coder_start(&p->coder, body.bytes, body.size);
     p->frames = frames;
     p->vertex = 0;
@@ -64,16 +64,16 @@ int ath_prediction_step(ath_prediction *p)
     prediction *segment = &p->segment;
     int copied = 0;
     if (p->vertex == 0 && !start_frame(&p->coder, segment, &copied, 0)) return ATH_BAD_CHUNK;
-    int32_t stop = copied ? segment->vertex_count : ath_min(p->vertex + STEP_VERTICES, segment->vertex_count);
+    int32_t count = segment->coded_count, stop = copied ? count : ath_min(p->vertex + STEP_VERTICES, count);
     ath_coder coder = p->coder;
-    if (p->vertex == 0) p->next = 0;
+    if (p->vertex == 0) p->next = segment->first;
     for (int32_t i = p->vertex; !copied && i < stop; i++) {
         decode_vertex(&coder, segment, p->next);
         p->next = segment->vertices[p->next].next;
     }
     p->coder = coder;
     p->vertex = stop;
-    if (stop < segment->vertex_count) return ATH_MORE;
+    if (stop < count) return ATH_MORE;
     p->vertex = 0;
     if (++segment->frame < p->frames) return ATH_MORE;
     return coder_finish(&p->coder) ? ATH_OK : ATH_BAD_CHUNK;

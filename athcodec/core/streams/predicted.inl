@@ -337,7 +337,7 @@ typedef struct {
     int32_t *last; /* vertices by cell */
     const double *rest, *origin;
     void *positions;
-    int32_t is_float64, vertex_count, frame;
+    int32_t is_float64, vertex_count, coded_count, first, frame; /* first of coded_count vertices that are coded */
     int32_t about[ATH_SEGMENT_FRAMES]; /* the frame that each frame was coded about; -1: the rest pose */
     predicted_frames around;
 } prediction;
@@ -370,11 +370,18 @@ static void measure_stem(prediction *p, int32_t base, int32_t tip)
 
 /* Sets the order of coding: stems in file order, and of each stem first its ends, which are the last vertex and, on a
  * root, the first. A vertex follows the one before it; the first and the last vertex follow the attach vertex. */
-static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count)
+/* Puts the vertices in the order of coding: those of all trees, or of loose ones alone. */
+static void follow_stems(prediction *p, const ath_branch *branches, int32_t branch_count, int loose_alone)
 {
-    int32_t tip_before = -1, first_before = -1, earlier = -1;
+    int32_t tip_before = -1, first_before = -1, earlier = -1, is_coded = 1;
+    p->first = -1;
+    p->coded_count = 0;
     for (int32_t b = 0; b < branch_count; b++) {
         const ath_branch *branch = branches + b;
+        if (branch->parent < 0) is_coded = !loose_alone || branch->flags & ATH_LOOSE;
+        if (!is_coded) continue;
+        if (p->first < 0) p->first = branch->first;
+        p->coded_count += branch->count;
         int32_t first = branch->first, tip = first + branch->count - 1;
         int32_t ends = branch->attach < 0 && tip > first ? 2 : 1, base = ends == 2 ? first : branch->attach;
         for (int32_t i = 0; i < branch->count; i++) {
@@ -400,9 +407,9 @@ static void follow_stems(prediction *p, const ath_branch *branches, int32_t bran
 static void follow_twins(prediction *p)
 {
     double width = p->step * 0.00390625;
-    uint32_t places = twin_places(p->vertex_count);
+    uint32_t places = twin_places(p->coded_count);
     for (uint32_t i = 0; i < places; i++) p->last[i] = -1;
-    for (int32_t v = 0; v >= 0; v = p->vertices[v].next) {
+    for (int32_t v = p->first; v >= 0; v = p->vertices[v].next) {
         predicted_vertex *vertex = p->vertices + v;
         int32_t twin = take_place(p->rest, p->last, places, width, v), joined = vertex->before >= 0;
         for (size_t k = 0; k < 3 && joined; k++)
@@ -412,7 +419,9 @@ static void follow_twins(prediction *p)
     }
 }
 
-static void start_prediction(prediction *p, const ath_plan *plan, const double *origin, int is_float64, void *positions)
+/* loose_alone: whether the trees of loose roots alone are predicted; others stay as they are in `positions`. */
+static void start_prediction(prediction *p, const ath_plan *plan, int loose_alone, const double *origin, int is_float64,
+                             void *positions)
 {
     p->rest = plan->rest;
     p->origin = origin;
@@ -422,7 +431,7 @@ static void start_prediction(prediction *p, const ath_plan *plan, const double *
     predicted_model_init(&p->model);
     p->frame = 0;
     memset(p->vertices, 0, (size_t)p->vertex_count * sizeof *p->vertices);
-    follow_stems(p, plan->branches, plan->branch_count);
+    follow_stems(p, plan->branches, plan->branch_count, loose_alone);
     follow_twins(p);
 }
 

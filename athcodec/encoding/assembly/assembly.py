@@ -220,8 +220,9 @@ class FileAssembly:
         search made."""
         decided = self.decided
         settings, bound = decided.choice.settings, decided.choice.settings.bound
+        beside = settings.predicted_trees is not None
         choices = {
-            "motion": "predicted" if decided.choice.predicted else "transformed",
+            "motion": "predicted" if decided.choice.predicted else "both" if beside else "transformed",
             "step_ratio": settings.step / bound,
             "rest_step_ratio": settings.rest_step / bound,
             "still": settings.still,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from athcodec.encoding.clip.survey import Ath, Survey
 from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.segments.layers import Layers, layer_chunks
+from athcodec.encoding.segments.predicted import PredictedTrees
 from athcodec.encoding.segments.segment import CodedPrelude, Source
 from athcodec.encoding.segments.settings import Choice
 from athcodec.motion.branches.result import Found
@@ -61,6 +63,14 @@ class Decided:
     @property
     def segment_count(self) -> int:
         return len(self.source.segments)
+
+    @cached_property
+    def predicted_trees(self) -> PredictedTrees | None:
+        """The trees with predicted motion beside others; None: there are none."""
+        last = self.layers.each[-1]
+        if self.choice.settings.predicted_trees is None:
+            return None
+        return PredictedTrees(self.prelude, last.plan, last.settings, self.choice.error_share)
 
     @property
     def shared_bytes(self) -> int:

@@ -14,6 +14,7 @@ from athcodec.encoding.options.file_options import EncodingOptions
 from athcodec.encoding.search.choices.prediction import code_predicted_segment
 from athcodec.encoding.search.progress import Progress, silent
 from athcodec.encoding.segments.layers import CodedMotion, Ends
+from athcodec.encoding.segments.predicted import PredictedBeside
 from athcodec.encoding.segments.segment import Source, thread_count
 from athcodec.files.threads import ThreadPool
 
@@ -85,9 +86,10 @@ class SegmentCoder:
         decided, source = self.decided, self.decided.source
         loops = source.is_whole_loop(index)
         frames = positions, exact, source.goes_on(index), source.shown_times(index), source.box, loops
-        layers = decided.layers.of_segment(loops)
+        layers, trees = decided.layers.of_segment(loops), decided.predicted_trees
         release_memory()
-        return CodedMotion(decided.prelude, layers, decided.segment_count, *frames, before, after)
+        beside = None if trees is None else PredictedBeside(trees, positions)
+        return CodedMotion(decided.prelude, layers, decided.segment_count, *frames, before, after, beside)
 
     @staticmethod
     def _in_order(source: Source, segments: Sequence[int]) -> list[tuple[int, bool]]:

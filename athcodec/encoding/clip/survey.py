@@ -8,7 +8,7 @@ serves any number of thresholds. It works on the unquantised motion.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -97,6 +97,19 @@ class Ath:
         inner = np.zeros(self.node_count, bool)
         inner[self.node_parent[self.node_parent >= 0]] = True
         return inner
+
+    def as_one(self, trees: np.ndarray) -> Ath:
+        """Return the ATH in which some trees, (B,) bool of their branches, are a single node each."""
+        is_root = self.node_parent < 0
+        kept = is_root | ~trees[self.node_branch]
+        parent = self.node_parent[kept]
+        return replace(
+            self,
+            node_branch=self.node_branch[kept],
+            node_parent=np.where(parent < 0, -1, (np.cumsum(kept) - 1)[parent]).astype(self.node_parent.dtype),
+            node_depth=self.node_depth[kept],
+            whole=(self.whole | (is_root & trees[self.node_branch]))[kept],
+        )
 
     def whole_branches(self) -> np.ndarray:
         """Return which branches are nodes whose subtree moves as one (see `whole`).

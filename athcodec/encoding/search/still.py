@@ -76,7 +76,7 @@ class SplitSource:
         still = still_branches(source, bound)
         if still is None:
             return None
-        moving, others = (_part(source, ath, np.flatnonzero(some)) for some in (~still, still))
+        moving, others = (part_of(source, ath, np.flatnonzero(some)) for some in (~still, still))
         if moving.seen.ath(ath.thresholds).height != ath.height:
             return None
         return cls(source, ath, bound, still, moving, _standing(others))
@@ -98,7 +98,11 @@ class SplitSource:
 
     def choice(self, chosen: Choice, thresholds: Thresholds) -> Choice:
         """Return a choice for the branches that move, made for an ATH of some thresholds, for all branches."""
-        return self._with_thresholds(thresholds)._choice(chosen)
+        split, predicted = self._with_thresholds(thresholds), chosen.settings.predicted_trees
+        if predicted is not None:
+            trees = split._joined(predicted, np.zeros(self.still.sum(), bool))
+            split = replace(split, ath=split.ath.as_one(trees))
+        return split._choice(chosen)
 
     def _with_thresholds(self, thresholds: Thresholds) -> SplitSource:
         is_of_these = thresholds == self.ath.thresholds
@@ -157,10 +161,12 @@ class SplitSource:
         shape_of = None
         if moving.shape_of is not None or still.shape_of is not None:
             shape_of = self._joined(*(self._numbered(one, some) for one, some in self._shapes(moving, still)))
+        predicted = moving.predicted_trees
         settings = replace(
             moving,
             **arrays,
             details=details,
+            predicted_trees=None if predicted is None else self._joined(predicted, np.zeros(self.still.sum(), bool)),
             limit=self.source.limit(moving.bound) if isinstance(moving.limit, np.ndarray) else moving.limit,
             rest_step=step,
             rest_slack=slack,
@@ -221,7 +227,7 @@ class SplitSource:
         return whole
 
 
-def _part(source: Source, ath: Ath, branches: np.ndarray) -> Source:
+def part_of(source: Source, ath: Ath, branches: np.ndarray) -> Source:
     """Return a source that consists of some trees of `source` alone. `branches`: the numbers of their branches,
     ascending.
     """

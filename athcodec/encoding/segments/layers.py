@@ -40,6 +40,7 @@ from athcodec.encoding.segments.joins import (
     seen,
 )
 from athcodec.encoding.segments.levels import MOST_JERK, SourceFrames
+from athcodec.encoding.segments.predicted import PredictedBeside
 from athcodec.encoding.segments.segment import (
     CodedPrelude,
     Corrections,
@@ -414,7 +415,8 @@ class CodedMotion:
     layers: with the settings of the segment (Layers.of_segment). exact: the source's own numbers (Source.exact), for
     one more stage. goes_on: whether another segment follows. shown_times: as Source returns them. box: corners of the
     source, (2, 3). loops: whether the segment follows itself. before, after: the ends of the segment before, which this
-    one is joined to, and those of this one; None: nobody asks for them.
+    one is joined to, and those of this one; None: nobody asks for them. beside: the trees with predicted motion, or
+    None.
     """
 
     def __init__(
@@ -430,7 +432,10 @@ class CodedMotion:
         loops: bool,
         before: Ends | None = None,
         after: Ends | None = None,
+        beside: PredictedBeside | None = None,
     ):
+        self._beside, self._added, self._measured = beside, dict[int, float](), list[tuple[float, ...]]()
+        positions = positions if beside is None else beside.modes
         self._exact, self._goes_on, self._shown_times = exact, goes_on, shown_times
         self._output, self._origin, self.positions = prelude.output, prelude.origin, positions
         self._pool, self._layered = prelude.plan.pool, len(layers.each) > 1
@@ -464,6 +469,8 @@ class CodedMotion:
                 segment = self._refine(layer, segment, round(coarse.ratio / layer.ratio), stage)
         if self.errors[-1][0] > self._largest_bound:
             raise AssertionError(f"decoded error {self.errors[-1][0]} is beyond the bound {self._largest_bound}")
+        if self._beside is not None:
+            self.errors, self.chunks[len(self.errors) - 1, ct.PREDICTED] = self._measured, self._beside.payload
         if self._exact is not None:
             self.chunks[len(self.errors), ct.EXACT] = streams.encode_exact(self._decoded, self._exact)
             self.errors.append((0.0,) * 3)
@@ -634,6 +641,19 @@ class CodedMotion:
             loop_pose = self._source.last_shown(positions) if self._loops else None
             before = loop_pose if end is None else end.shown[0]
             self.flaws.append(self._source.flaws(positions, before, self.errors[stage][0]))
+            self._measure(stage, positions)
+
+    def _measure(self, stage: int, positions: np.ndarray) -> None:
+        """Note the errors of a stage with the trees whose motion is predicted, if there are any. `positions`: those of
+        modes, as the stage shows them.
+        """
+        if self._beside is None:
+            return
+        is_last = stage == self._stage_0.stage_count + len(self._layers) - 2
+        with self._beside.shown(positions, is_last):
+            self._measured.append(self.error(positions, self._added.get(stage, 0.0)))
+        if is_last and self._measured[-1][0] > self._largest_bound:
+            raise AssertionError(f"decoded error {self._measured[-1][0]} is beyond the bound {self._largest_bound}")
 
     @cached_property
     def _wanted_end(self) -> np.ndarray:
@@ -663,7 +683,8 @@ class CodedMotion:
             size = np.asarray(max(positions.max(), -positions.min()), self._output[1])
             # A decoder joins maps and rounds what it shows, and slopes make last bits larger.
             last_bits = 16 * (1 + join % SLOPED) * float(np.spacing(np.float64(size)))
-            self.errors[stage] = self.error(positions, 2 * float(np.spacing(size)) + last_bits)
+            self._added[stage] = 2 * float(np.spacing(size)) + last_bits
+            self.errors[stage] = self.error(positions, self._added[stage])
         else:
             if layer.ratio == 1 and positions.shape[2] >= LEAST_MEETING:
                 self._meet(end.corrections)

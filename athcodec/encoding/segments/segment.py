@@ -394,6 +394,8 @@ def branch_records(hierarchy: Hierarchy, ath: Ath, settings: Settings) -> np.nda
     branches["parent"], branches["count"] = hierarchy.branch_parent, hierarchy.stem_count
     branches["attach"], branches["first"] = hierarchy.attach, hierarchy.first_vertex
     free = settings.free_rigid & (settings.rigid > settings.layer) & (hierarchy.branch_parent >= 0)
+    if settings.predicted_trees is not None:
+        free |= settings.predicted_trees & (hierarchy.branch_parent < 0)
     branches["flags"] = (
         SHEET * (settings.forms != BEAM) + LOOSE * free + WHOLE * ath.whole_branches() + STILL * settings.still
     )

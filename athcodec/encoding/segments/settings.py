@@ -63,6 +63,7 @@ class Settings:
     periodic: bool = False  # Whether waves over time are periodic, in loops that are one segment.
     usual_change: float = np.inf  # Change of velocity in a usual frame where segments meet, length per frame squared.
     without: frozenset[Feature] = frozenset()  # Features that the file does without.
+    predicted_trees: np.ndarray | None = None  # (B,) bool: trees with predicted motion beside others; None: no tree.
 
     @property
     def key(self) -> Key:

@@ -24,9 +24,10 @@ from athcodec.encoding.search.choices.rest import with_best_rest
 from athcodec.encoding.search.progress import PREDICTION, REST, Work
 from athcodec.encoding.search.segment_samples import SAMPLES, TRIAL_FRAMES, SegmentSample, typical_segments
 from athcodec.encoding.segments.levels import MOST_AWAY, SourceFrames
+from athcodec.encoding.segments.predicted import code_predicted, largest_step
 from athcodec.encoding.segments.segment import CodedPrelude, Source, plain_settings
 from athcodec.encoding.segments.settings import Choice, Settings
-from athcodec.encoding.streams import streams, writing
+from athcodec.encoding.streams import streams
 from athcodec.errors import BoundError
 from athcodec.files.threads import ranges
 from athcodec.motion.algebra import length
@@ -36,7 +37,6 @@ from athcodec.options import SMOOTHNESS
 
 REST_STEPS = (1.15, 0.5, 0.25, 0.125)  # Steps of the rest pose, in bounds.
 USUAL_REST_RATIO = 0.5  # Step of the rest pose, in bounds, that is taken where none other is tried.
-STEPS = (0.999, 0.97, 0.9, 0.75, 0.5, 0.3)  # Steps tried, over the largest that reaches every point in the limit.
 TOO_MANY = 1.2  # Bytes, over those allowed, that TRIAL_FRAMES have to promise for predicted motion to be given up.
 STILL = 0.35  # Largest error, in limits, whose second differences stay within 1.4 limits.
 CALMER = (0.5, 0.7)  # Larger errors, in limits, that are tried where those are too dear.
@@ -56,7 +56,7 @@ def one_map_each(seen: Survey) -> Ath:
 
 
 def _settings(source: Source, ath: Ath, bound: float, rest_step: float) -> Settings:
-    settings = plain_settings(source, ath.height + 2, bound, _largest_step(source.limit(bound)), rest_step)
+    settings = plain_settings(source, ath.height + 2, bound, largest_step(source.limit(bound)), rest_step)
     return with_best_rest(source, ath, settings)
 
 
@@ -102,7 +102,7 @@ def best_prediction(
         not kept.
         """
         settings = by_ratio(way.rest_ratio)
-        stepped = replace(settings, step=_largest_step(way.error_share * settings.limit))
+        stepped = replace(settings, step=largest_step(way.error_share * settings.limit))
         choice = Choice(stepped, stepped, None, predicted=True, error_share=way.error_share)
         work.add(PREDICTION * vertices * sum(source.frames_of(segment) for segment, _ in samples))
         motion, twitches = 0.0, False
@@ -186,11 +186,6 @@ def _twitches(shown: np.ndarray, positions: np.ndarray, limit: np.ndarray | floa
     return share.max() > max(TWITCHING, 2 * np.median(share)) or seen.max() > TWITCHING
 
 
-def _largest_step(limit: np.ndarray | float) -> float:
-    """Return the largest step that reaches every place within the limit."""
-    return qz.single(qz.SAFE_REST_CAP * float(np.min(limit)))
-
-
 def _samples(source: Source) -> list[tuple[int, float]]:
     """Return a few segments spread over a clip, or the typical segments of several clips: pairs of a segment and the
     number of frames that it stands for."""
@@ -215,23 +210,8 @@ def _begun(prelude: CodedPrelude, settings: Settings, sample: SegmentSample) -> 
 
 
 def _predicted(prelude: CodedPrelude, choice: Choice, positions: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """Code the motion of a segment by prediction. Return the payload of the chunk PREDICTED, and the positions that it
-    decodes to, (N, 3, T), frame by frame in memory. Raises BoundError if no step keeps the limits. `positions`: (N, 3,
-    T) of the source, less the origin.
-    """
-    settings = choice.settings
-    limits = np.array(np.broadcast_to(settings.limit, len(positions)), np.float64)
-    for share in dict.fromkeys((choice.error_share, 1.0)):  # A part may need too fine numbers.
-        for factor in STEPS:
-            step = qz.single(factor * _largest_step(share * limits))
-            coded = streams.encode_predicted(
-                prelude.plan, prelude.origin, positions, share * limits, step, prelude.dtype
-            )
-            if coded is not None:
-                return writing.pack_predicted(step, coded[0]), coded[1].transpose(1, 2, 0)
-    raise BoundError(
-        f"max error: got {settings.bound:.3g}; it cannot be kept in the output's {prelude.dtype.name} numbers"
-    )
+    """Code the motion of a segment by prediction, as `code_predicted` does."""
+    return code_predicted(prelude.plan, prelude.output, choice.settings, choice.error_share, positions)
 
 
 def code_predicted_segment(
