@@ -61,7 +61,7 @@ CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
 LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Files that are coded at most to name a bound that can be kept: some clips can keep none.
-TREES_SAVE = 0.5  # Largest share of the bytes of trees in modes that prediction takes where it is used for them alone.
+TREES_SAVE = 0.65  # Largest share of the bytes of trees in modes that prediction takes where it is used for them alone.
 SHOWN_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from what others show in its place.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
@@ -310,13 +310,11 @@ class FileDecisions:
         split = PredictedSplit.by_growth(self.source, self.seen.ath(self.thresholds(bound)), bound)
         if split is None:
             return None
-        growing, others = (
-            dataclasses.replace(self, source=source)._prices(bound, work)
-            for source in (split.still_source, split.moving_source)
-        )
+        growing = dataclasses.replace(self, source=split.still_source)._prices(bound, work)
         prediction = growing.prediction
         if prediction is None or prediction.bytes > TREES_SAVE * growing.in_modes:
             return None
+        others = dataclasses.replace(self, source=split.moving_source)._prices(bound, work)
         return (split, prediction) if others.in_modes < others.predicted else None
 
     def _prices(self, bound: float, work: Work) -> Prices:
