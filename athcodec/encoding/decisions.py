@@ -61,7 +61,10 @@ CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
 LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Files that are coded at most to name a bound that can be kept: some clips can keep none.
-TREES_SAVE = 0.65  # Largest share of the bytes of trees in modes that prediction takes where it is used for them alone.
+TREES_SAVE = (
+    0.78  # Largest share that prediction takes of the bytes of growing trees in modes where it is tried for them.
+)
+SURELY_SAVES = 0.4  # The same at which it is without a comparison of both files.
 SHOWN_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from what others show in its place.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
@@ -70,16 +73,13 @@ LEVELS_BYTES = 20_000  # Bytes of motion from which on a file is streamed, and n
 SEARCH_SAVES = 0.4  # Smallest share of the bytes at its first settings that a search has come down to.
 
 
-class Prices(NamedTuple):
-    """The bytes of a file in modes, at the settings that a search starts with, and its usual prediction; None: none."""
+class GrowingTrees(NamedTuple):
+    """A source divided into trees that grow and others, the usual prediction of the former, and whether that is surely
+    better for them than modes."""
 
-    in_modes: float
-    prediction: FoundPrediction | None
-
-    @property
-    def predicted(self) -> float:
-        """The bytes of that prediction, infinite if there is none."""
-        return math.inf if self.prediction is None else self.prediction.bytes
+    split: PredictedSplit
+    prediction: FoundPrediction
+    is_sure: bool
 
 
 @dataclass(frozen=True)
@@ -161,9 +161,17 @@ class FileDecisions:
                 return self.decide(bound).shared_bytes, False
             found = self._growing_trees(bound, work)
             if found is not None:
-                others = dataclasses.replace(self, source=found[0].moving_source)
+                others = dataclasses.replace(self, source=found.split.moving_source)
                 size = others._tried(bound, work, frames_ratio, Hopeless())[0]
-                return frames_ratio * found[1].bytes + size, False
+                apart = frames_ratio * found.prediction.bytes + size, False
+                return apart if found.is_sure else min(apart, self._tried_alike(bound, work, frames_ratio, hopeless))
+            return self._tried_alike(bound, work, frames_ratio, hopeless)
+        except BoundError:
+            return math.inf, False
+
+    def _tried_alike(self, bound: float, work: Work, frames_ratio: float, hopeless: Hopeless) -> tuple[float, bool]:
+        """Return what `_tried` does, for a file of motion of one kind."""
+        try:
             ath = self.seen.ath(self.thresholds(bound))
             ratios, effort, jobs = (
                 self._layer_ratios(ath, bound, self.options.ladder),
@@ -196,7 +204,7 @@ class FileDecisions:
         if split is not None:
             moving = dataclasses.replace(holding, source=split.moving_source, beside=split.poses_beside)
         work = moving._allowed_work(bound)
-        decided = moving._decide_by_trees(bound, work) or moving._decide(bound, work)
+        decided = moving._decide_by_trees(bound, work)
         if split is not None:
             choice = split.choice(decided.choice, decided.ath.thresholds)
             decided = holding._coded_as(decided, choice)
@@ -284,15 +292,25 @@ class FileDecisions:
         tolerance = 0.0 if self.options.lossless else SHOWN_SHARE * self.source.smallest_bound(bound)
         return dataclasses.replace(self, source=self.source.holding(tolerance))
 
-    def _decide_by_trees(self, bound: float, work: Work) -> Decided | None:
-        """Decide about a file of trees that grow beside others. Return None if there are none, or if one way to code
-        all motion is better.
-        """
-        found = self._growing_trees(bound, work)
-        if found is None:
-            return None
-        split, usual = found
-        poses_beside = split.predicting(usual.choice).poses_beside
+    def _decide_by_trees(self, bound: float, work: Work) -> Decided:
+        """Decide about a file at `bound` in which trees that grow may have motion of another kind than others. If both
+        kinds of files may be the smaller one, and there is work left for as much again, both are compared."""
+        found, before = self._growing_trees(bound, work), work.done
+        if found is not None and found.is_sure:
+            return self._decide_apart(found, bound, work) or self._decide(bound, work)
+        alike = self._decide(bound, work)
+        if found is None or not work.fits(work.done - before):
+            return alike
+        apart = self._decide_apart(found, bound, work)
+        share = PREDICTED_SHARE if len(alike.layers.each) > 1 else 1.0
+        is_smaller = apart is not None and self._estimated_bytes(apart) < share * self._size(alike)
+        return apart if apart is not None and is_smaller else alike
+
+    def _decide_apart(self, found: GrowingTrees, bound: float, work: Work) -> Decided | None:
+        """Decide about a file of which some trees have predicted motion, and others modes. Return None if the others
+        are smaller with predicted motion, too, or if it cannot keep the bound. `found`: these trees."""
+        split = found.split
+        poses_beside = split.predicting(found.prediction.choice).poses_beside
         decided = dataclasses.replace(self, source=split.moving_source, beside=poses_beside)._decide(bound, work)
         source = split.still_source.in_segments(decided.source.segment_frames)
         growing = dataclasses.replace(self, source=source)
@@ -302,26 +320,30 @@ class FileDecisions:
         choice = split.predicting(prediction.choice).choice(decided.choice, decided.ath.thresholds)
         return self._coded_as(decided, choice)
 
-    def _growing_trees(self, bound: float, work: Work) -> tuple[PredictedSplit, FoundPrediction] | None:
-        """Return two things: the source divided into trees that grow and others, and how the motion of the former is
-        predicted. Return None if one way to code all motion is better."""
+    def _growing_trees(self, bound: float, work: Work) -> GrowingTrees | None:
+        """Return the source divided into trees that grow and others. Return None if one of them is missing, or if
+        motion of one kind is surely better.
+        """
         if self.options.tam or self.options.lossless or Feature.PREDICTED in self.options.without:
             return None
         split = PredictedSplit.by_growth(self.source, self.seen.ath(self.thresholds(bound)), bound)
         if split is None:
             return None
-        growing = dataclasses.replace(self, source=split.still_source)._prices(bound, work)
-        prediction = growing.prediction
-        if prediction is None or prediction.bytes > TREES_SAVE * growing.in_modes:
+        growing = dataclasses.replace(self, source=split.still_source, predicts_as_usual=True)
+        some = dataclasses.replace(growing, source=split.some_growing)
+        sample, prediction = (
+            some._best_prediction(bound, math.inf, work),
+            growing._best_prediction(bound, math.inf, work),
+        )
+        if sample is None or prediction is None:
             return None
-        others = dataclasses.replace(self, source=split.moving_source)._prices(bound, work)
-        return (split, prediction) if others.in_modes < others.predicted else None
+        share = sample.bytes / some._first_cost(bound, work)
+        return GrowingTrees(split, prediction, share <= SURELY_SAVES) if share <= TREES_SAVE else None
 
-    def _prices(self, bound: float, work: Work) -> Prices:
+    def _first_cost(self, bound: float, work: Work) -> float:
+        """Return the bytes of a file in modes, at the settings that a search starts with."""
         ath = self.seen.ath(self.thresholds(bound))
-        in_modes = Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs).first_cost()
-        usual = dataclasses.replace(self, predicts_as_usual=True)
-        return Prices(in_modes, usual._best_prediction(bound, math.inf, work))
+        return Search.of(self.source, ath, bound, self.options.effort, work, self.options.jobs).first_cost()
 
     def _coded_as(self, decided: Decided, choice: Choice) -> Decided:
         """Return the decision about a file of all branches, in the segments and layers of one of some branches, for a

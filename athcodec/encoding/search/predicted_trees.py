@@ -14,6 +14,7 @@ import numpy as np
 from athcodec.encoding.clip.survey import Ath
 from athcodec.encoding.model.motion import waves_over_time
 from athcodec.encoding.options.shape import detail_of
+from athcodec.encoding.search.sample import even_branches
 from athcodec.encoding.search.segment_samples import typical_segments
 from athcodec.encoding.search.still import SplitSource, part_of
 from athcodec.encoding.segments.segment import Source
@@ -25,6 +26,7 @@ from athcodec.motion.thresholds import Thresholds
 TREE_VERTICES = 64  # Vertices of a tree that are looked at, at most.
 LOOKED_AT = 8192  # Vertices of all trees that are looked at, about.
 GROWS = 0.4  # Bits that motion along a stem takes from frame to frame, over those in waves, below which a tree grows.
+PRICED = 256  # Vertices of the trees that grow on which both ways to code them are compared, about.
 LEAST_SHARE = 0.01  # Least share of the vertices in trees that grow, and in others.
 
 
@@ -44,7 +46,7 @@ def growing_trees(source: Source, bound: float) -> np.ndarray | None:
     step = source.smallest_bound(bound)
     by_frame, in_waves = np.diff(along, axis=2), along @ waves_over_time(frames)[1:].T
     bits = [np.bincount(tree_of, np.log2(1 + np.abs(some) / step).sum(axis=(1, 2))) for some in (by_frame, in_waves)]
-    grows = (bits[0] < GROWS * bits[1])[tree]
+    grows: np.ndarray = (bits[0] < GROWS * bits[1])[tree]
     share = hierarchy.stem_count[grows].sum() / hierarchy.vertex_count
     return grows if LEAST_SHARE <= share <= 1 - LEAST_SHARE else None
 
@@ -80,6 +82,16 @@ class PredictedSplit(SplitSource):
             return None
         others, growing = (part_of(source, ath, np.flatnonzero(some)) for some in (~grows, grows))
         return cls(source, ath.as_one(grows), bound, grows, others, growing)
+
+    @property
+    def some_growing(self) -> Source:
+        """A part of the trees that grow."""
+        source = self.still_source
+        if source.clip.vertex_count <= PRICED:
+            return source
+        branches = even_branches(source.hierarchy, PRICED, 0)
+        is_enough = 2 * source.hierarchy.stem_count[branches].sum() >= PRICED
+        return part_of(source, source.seen.ath(self.ath.thresholds), branches) if is_enough else source
 
     def predicting(self, prediction: Choice) -> PredictedSplit:
         """Return this split for a choice of how the trees that grow are predicted."""
