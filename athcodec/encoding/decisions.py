@@ -65,6 +65,8 @@ TREES_SAVE = (
     0.78  # Largest share that prediction takes of the bytes of growing trees in modes where it is tried for them.
 )
 SURELY_SAVES = 0.4  # The same at which it is without a comparison of both files.
+APART_SHARE = 0.9  # Largest share of the bytes of layers at which a file of which a part has none is better.
+SEARCHED = 0.8  # Bytes that a search usually leaves of those at first settings.
 SHOWN_SHARE = 1 / 64  # Largest distance, in bounds, of a frame from what others show in its place.
 FEW_BYTES = 2000  # Bytes up to which the file of a small clip may do without coarse levels.
 FINER_LADDERS = 0.5, 0.25  # Factors on the errors of layers that are tried where too few stages are fit for levels.
@@ -296,15 +298,24 @@ class FileDecisions:
         """Decide about a file at `bound` in which trees that grow may have motion of another kind than others. If both
         kinds of files may be the smaller one, and there is work left for as much again, both are compared."""
         found, before = self._growing_trees(bound, work), work.done
-        if found is not None and found.is_sure:
-            return self._decide_apart(found, bound, work) or self._decide(bound, work)
+        if found is None:
+            return self._decide(bound, work)
+        begins_apart = found.is_sure or self._is_smaller_apart(found, bound, work)
+        apart = self._decide_apart(found, bound, work) if begins_apart else None
+        if apart is not None and (found.is_sure or not work.fits(work.done - before)):
+            return apart
         alike = self._decide(bound, work)
-        if found is None or not work.fits(work.done - before):
-            return alike
-        apart = self._decide_apart(found, bound, work)
-        share = PREDICTED_SHARE if len(alike.layers.each) > 1 else 1.0
+        if not begins_apart and work.fits(work.done - before):
+            apart = self._decide_apart(found, bound, work)
+        share = APART_SHARE if len(alike.layers.each) > 1 else 1.0
         is_smaller = apart is not None and self._estimated_bytes(apart) < share * self._size(alike)
         return apart if apart is not None and is_smaller else alike
+
+    def _is_smaller_apart(self, found: GrowingTrees, bound: float, work: Work) -> bool:
+        """Return whether a file with two kinds of motion is smaller, as far as first settings show it."""
+        others = dataclasses.replace(self, source=found.split.moving_source)
+        alike, in_modes = (SEARCHED * one._first_cost(bound, work) for one in (self, others))
+        return found.prediction.bytes + in_modes < alike
 
     def _decide_apart(self, found: GrowingTrees, bound: float, work: Work) -> Decided | None:
         """Decide about a file of which some trees have predicted motion, and others modes. Return None if the others

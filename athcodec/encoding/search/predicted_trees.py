@@ -25,7 +25,7 @@ from athcodec.motion.thresholds import Thresholds
 
 TREE_VERTICES = 64  # Vertices of a tree that are looked at, at most.
 LOOKED_AT = 8192  # Vertices of all trees that are looked at, about.
-GROWS = 0.4  # Bits that motion along a stem takes from frame to frame, over those in waves, below which a tree grows.
+GROWS = 0.5  # Bits that motion along a stem takes from frame to frame, over those in waves, below which a tree grows.
 PRICED = 256  # Vertices of the trees that grow on which both ways to code them are compared, about.
 LEAST_SHARE = 0.01  # Least share of the vertices in trees that grow, and in others.
 
