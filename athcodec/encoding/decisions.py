@@ -165,7 +165,7 @@ class FileDecisions:
             if found is not None:
                 others = dataclasses.replace(self, source=found.split.moving_source)
                 size = others._tried(bound, work, frames_ratio, Hopeless())[0]
-                apart = frames_ratio * found.prediction.bytes + size, False
+                apart = found.prediction.bytes_of(frames_ratio) + size, False
                 return apart if found.is_sure else min(apart, self._tried_alike(bound, work, frames_ratio, hopeless))
             return self._tried_alike(bound, work, frames_ratio, hopeless)
         except BoundError:

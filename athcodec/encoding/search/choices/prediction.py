@@ -69,12 +69,20 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True)
 class FoundPrediction:
-    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have."""
+    """The choice that makes the smallest file with predicted motion, and its bytes but for what all files have.
+
+    poses: those of the bytes that hierarchy and rest pose take.
+    """
 
     way: Way
     choice: Choice
     bytes: float
     twitches: bool
+    poses: float = 0.0
+
+    def bytes_of(self, frames_ratio: float) -> float:
+        """Return the bytes of a file of so many times the frames."""
+        return self.poses + frames_ratio * (self.bytes - self.poses)
 
 
 def best_prediction(
@@ -115,7 +123,7 @@ def best_prediction(
                 del sample, shown  # One segment is in memory at a time.
         except BoundError:
             return FoundPrediction(way, choice, math.inf, False)
-        return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches)
+        return FoundPrediction(way, choice, motion + prelude.prelude_bytes, twitches, prelude.prelude_bytes)
 
     def best(share: float, most: float) -> FoundPrediction:
         """Return the best prediction whose errors are at most a share of the limit; far above `most`, any."""
