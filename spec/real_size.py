@@ -238,7 +238,7 @@ def features(data: bytes) -> set[str]:
         "repeats": any(header.repeats),
         "learned bases": any(head[5] > 0 for head in heads),
         "sheets": any(branch.flags & rules.SHEET for branch in file.branches),
-        "loose branches": any(branch.flags & rules.LOOSE for branch in file.branches),
+        "loose branches": any(branch.flags & rules.LOOSE and branch.parent >= 0 for branch in file.branches),
         "whole subtrees": any(branch.flags & rules.WHOLE for branch in file.branches),
         "tubes": any(branch.ring for branch in file.branches),
         "rigid branches": any(branch.rigid for branch in file.branches),

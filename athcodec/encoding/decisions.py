@@ -61,9 +61,7 @@ CHUNK_BYTES = 6  # Bytes of the front for a chunk, four of them its checksum.
 LEVEL_BYTES = 6  # Bytes of the front for the three errors of a level in a segment.
 PREDICTED_SHARE = 0.8  # Largest share of the bytes of layers at which predicted motion, which has none, is better.
 REFUSAL_ROUNDS = 12  # Files that are coded at most to name a bound that can be kept: some clips can keep none.
-TREES_SAVE = (
-    0.78  # Largest share that prediction takes of the bytes of growing trees in modes where it is tried for them.
-)
+TREES_SAVE = 0.78  # Largest share of the bytes of growing trees in modes at which prediction is tried for them.
 SURELY_SAVES = 0.4  # The same at which it is without a comparison of both files.
 APART_SHARE = 0.9  # Largest share of the bytes of layers at which a file of which a part has none is better.
 SEARCHED = 0.8  # Bytes that a search usually leaves of those at first settings.
@@ -301,15 +299,23 @@ class FileDecisions:
         if found is None:
             return self._decide(bound, work)
         begins_apart = found.is_sure or self._is_smaller_apart(found, bound, work)
-        apart = self._decide_apart(found, bound, work) if begins_apart else None
+        apart = self._tried_apart(found, bound, work) if begins_apart else None
         if apart is not None and (found.is_sure or not work.fits(work.done - before)):
             return apart
         alike = self._decide(bound, work)
         if not begins_apart and work.fits(work.done - before):
-            apart = self._decide_apart(found, bound, work)
+            apart = self._tried_apart(found, bound, work)
         share = APART_SHARE if len(alike.layers.each) > 1 else 1.0
         is_smaller = apart is not None and self._estimated_bytes(apart) < share * self._size(alike)
         return apart if apart is not None and is_smaller else alike
+
+    def _tried_apart(self, found: GrowingTrees, bound: float, work: Work) -> Decided | None:
+        """Return what `_decide_apart` does, and None, too, if typical segments cannot keep the bound."""
+        with suppress(BoundError):
+            apart = self._decide_apart(found, bound, work)
+            if apart is not None and math.isfinite(self._estimated_bytes(apart)):
+                return apart
+        return None
 
     def _is_smaller_apart(self, found: GrowingTrees, bound: float, work: Work) -> bool:
         """Return whether a file with two kinds of motion is smaller, as far as first settings show it."""

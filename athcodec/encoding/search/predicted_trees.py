@@ -20,7 +20,6 @@ from athcodec.encoding.search.still import SplitSource, part_of
 from athcodec.encoding.segments.segment import Source
 from athcodec.encoding.segments.settings import Choice, Settings
 from athcodec.motion.hierarchy import Hierarchy
-from athcodec.motion.sampling import spread
 from athcodec.motion.thresholds import Thresholds
 
 TREE_VERTICES = 64  # Vertices of a tree that are looked at, at most.
@@ -55,11 +54,11 @@ def _some_links(hierarchy: Hierarchy, tree: np.ndarray) -> tuple[np.ndarray, np.
     """Return some vertices, the vertex below each on its stem or that its stem hangs on, -1 for none, and the tree of
     each, (K,) each. `tree`: that of each branch, (B,)."""
     count = np.bincount(tree, hierarchy.stem_count).astype(np.int64)
-    most = max(1, min(TREE_VERTICES, LOOKED_AT // len(count)))
-    first = np.cumsum(count) - count
-    vertices = np.concatenate(
-        [start + np.array(spread(size, most)) for start, size in zip(first.tolist(), count.tolist())]
-    )
+    chosen = np.minimum(count, max(2, min(TREE_VERTICES, LOOKED_AT // len(count))))  # Of each tree, evenly spread.
+    of_tree = np.repeat(np.arange(len(count)), chosen)
+    place = np.arange(len(of_tree)) - np.repeat(np.cumsum(chosen) - chosen, chosen)
+    within = place * (count - 1)[of_tree] // np.maximum(chosen - 1, 1)[of_tree]
+    vertices = (np.cumsum(count) - count)[of_tree] + within
     branch = np.repeat(np.arange(len(tree)), hierarchy.stem_count)[vertices]
     below = np.where(vertices == hierarchy.first_vertex[branch], hierarchy.attach[branch], vertices - 1)
     return vertices, below, tree[branch]
