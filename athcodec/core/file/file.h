@@ -69,7 +69,7 @@ struct ath_file {
     int32_t rest_is_exact;     /* the reference pose is in the very numbers of source_rest */
     int32_t longest;           /* frames of the longest segment */
     int32_t has_joins;
-    int32_t predicted_trees; /* 1: some trees, and not the file, have predicted motion */
+    int32_t predicted_trees;            /* 1: some trees, and not the file, have predicted motion */
     uint32_t stems_stages;              /* bit d: stage d has STEMS */
     uint32_t affine_stages[ATH_LEVELS]; /* bit d of entry L: AFFINES of stage d serve to show stage L */
     uint32_t shown_affines;             /* bit d: AFFINES of stage d serve to show a stored level */
@@ -110,7 +110,7 @@ int ath_load(const ath_file *file, int32_t kind, ath_bytes *content, ath_fault_i
 ATH_INLINE int ath_is_shared(int32_t kind) { return kind == ATH_SHAPES || kind == ATH_REFINED_REST; }
 
 /* Returns whether a segment's end, as the segment joined to it takes it, depends on chunks of this kind. */
-ATH_INLINE int ath_shapes_end(int32_t kind) 
+ATH_INLINE int ath_shapes_end(int32_t kind)
 {
     return kind != ATH_CORRECTIONS && kind != ATH_EXACT && kind != ATH_PREDICTED;
 }
