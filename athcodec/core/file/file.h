@@ -115,6 +115,9 @@ ATH_INLINE int ath_shapes_end(int32_t kind)
     return kind != ATH_CORRECTIONS && kind != ATH_EXACT && kind != ATH_PREDICTED;
 }
 
+/* Returns whether all trees of the file have predicted motion, or some. */
+ATH_INLINE int ath_predicts(const ath_file *file) { return file->header.is_predicted || file->predicted_trees; }
+
 /* ---- rest poses and waves ---- */
 
 /* Does one of ATH_REST_PARTS parts of reading REST: the reference pose, or which mesh of the host's it is. Returns ATH_OK

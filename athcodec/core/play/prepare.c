@@ -19,7 +19,7 @@ static int32_t steps_of(const ath_file *file, int32_t segment, int32_t stage)
     for (int32_t d = 0; d <= stage; d++)
         for (int32_t kind = ATH_STEMS; kind <= ATH_PREDICTED; kind = ath_kind_after(kind))
             checks += ath_checksum_steps(ath_wanted_chunk(file, segment, stage, kind, d));
-    int32_t predictions = (file->header.is_predicted || file->predicted_trees) && stage > 0
+    int32_t predictions = ath_predicts(file) && stage > 0
                               ? ath_prediction_steps(file->plan.vertex_count, ath_file_frames(file, segment))
                               : 0;
     return checks + heads + predictions + file->plan.piece_count + 1;

@@ -51,7 +51,7 @@ uint64_t ath_carve_work(ath_work *work, const ath_file *file, int32_t frames, ui
     }
     work->corrections.model = (correction_model *)ath_take(&arena, sizeof(correction_model));
     if (ath_file_is_lossless(file)) work->exact_level.model = (exact_model *)ath_take(&arena, sizeof(exact_model));
-    if (file->header.is_predicted || file->predicted_trees)
+    if (ath_predicts(file))
         work->prediction = (ath_prediction *)ath_take(&arena, ath_prediction_size(file->plan.vertex_count));
     work->prelude_model = ath_take(&arena, ath_prelude_model_size());
     work->node.rows = (int32_t *)ath_take(&arena, 4 * row);
@@ -94,7 +94,7 @@ size_t ath_segment_size(const ath_file *file, int32_t level)
 static int are_side_by_side(const ath_file *file)
 {
     const int32_t *source = file->vertex_source;
-    if (file->header.is_predicted || file->predicted_trees) return 0;
+    if (ath_predicts(file)) return 0;
     for (const ath_piece *piece = file->plan.pieces; piece < file->plan.pieces + file->plan.piece_count; piece++)
         for (int32_t v = piece->first; v < piece->first + piece->count; v++)
             if (source[v] - source[piece->first] != v - piece->first) return 0;
