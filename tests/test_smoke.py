@@ -14,6 +14,7 @@ can break unseen until then.
 | makers of vectors | vectors | three vectors come out the same |
 | batches | tools, slow | a worker in this process codes one clip |
 | loader for three.js, GPU form, pages, galleries | web, browser | one file each |
+| decoder in WebAssembly, of the package and of the page | web, programs | both are what the C core makes |
 | plugin for USD, player in raylib | programs | their calls have the arguments that the headers declare |
 | release for other machines, media type | programs | a file of the core is read as for another; the first bytes |
 
@@ -286,6 +287,16 @@ def test_makers_of_vectors_make_the_same_files_again():
 
 
 # ---- what plays files elsewhere ----
+
+
+def test_the_decoders_in_webassembly_are_made_of_the_core_as_it_is():
+    """An older one refuses files that the package writes, and nothing else would tell."""
+    viewer = ROOT / "athcodec" / "viewer"
+    printed(sys.executable, viewer / "build_decoder.py", "--check")
+    decoder, worker = ((viewer / name).read_text("utf-8") for name in ("ath_decoder.mjs", "web/ath_worker.js"))
+    packed = max(re.findall(r'"([A-Za-z0-9+/=]+)"', decoder), key=len)
+    assert len(packed) > 50_000
+    assert packed in worker, "run python athcodec/viewer/build_viewer.py"
 
 
 def test_the_loader_of_three_shows_what_was_asked_for_last(layered_ath):

@@ -107,6 +107,7 @@ def main() -> int:
         if different:
             shutil.rmtree(WEB, ignore_errors=True)
             shutil.copytree(folder, WEB)
+            WEB.chmod(0o755)  # That of a temporary folder is for nobody else.
     done = f"{', '.join(different)} written" if different else "up to date"
     print(f"web: {size:,} bytes of our own, compressed, {done}")
     return 0

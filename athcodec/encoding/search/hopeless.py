@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from athcodec.encoding.segments.settings import Settings
 
 TOO_LARGE = 1.08  # Bytes in waves, over the fewest on other branches, above which time bases make up for nothing.
+CLEARLY_LARGER = 1.08  # Bytes with time bases of one kind, over the other, above which the one is not tried again.
 
 
 @dataclass
@@ -22,6 +24,16 @@ class OnPieces:
     def has_hope(self, settings: Settings) -> bool:
         """Return whether settings with time bases have those of the better kind."""
         return self.common_basis in (None, settings.common_basis)
+
+    def compare_bases(self, tried: Sequence[Settings], costs: Sequence[float]) -> None:
+        """Note which kind of time bases is better if these costs, in bytes, tell it clearly. Where they hardly differ,
+        the other kind may be far better once pieces hang on each other: their tree has more stages then."""
+        common, own = (
+            min((cost for settings, cost in zip(tried, costs) if settings.common_basis == is_common), default=math.inf)
+            for is_common in (True, False)
+        )
+        if max(common, own) > CLEARLY_LARGER * min(common, own):
+            self.common_basis = common < own
 
 
 @dataclass

@@ -137,7 +137,8 @@ def typical_moves(settings: Settings, trials: Trials, hopeless: Hopeless) -> lis
     if not in_bases:
         return [in_waves]
     best = min(in_bases, key=trials.cost)
-    known.common_basis, of_branches.still = best.common_basis, best.still
+    known.compare_bases(in_bases, trials.costs(in_bases))
+    of_branches.still = best.still
     return [in_waves, best]
 
 
