@@ -38,14 +38,14 @@ def encoded(positions, **options):
     return len(file), athcodec.open(file).file.segment_count
 
 
-@pytest.mark.parametrize("rel_error", [1e-3, 1e-5])
+@pytest.mark.parametrize("rel_error", [1e-3, pytest.param(1e-5, marks=pytest.mark.slow)])
 def test_a_leaf_takes_at_most_2_percent_more_than_in_its_best_segments(rel_error):
     leaf = fluttering(1, 280)
     fixed = [encoded(leaf, rel_error=rel_error, segment_frames=frames)[0] for frames in (256, 128, 64, 32)]
     assert encoded(leaf, rel_error=rel_error)[0] <= 1.02 * min(fixed)
 
 
-@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("ladder", ["decades", pytest.param("none", marks=pytest.mark.slow)])
 def test_what_is_cut_into_shots_gets_segments_as_short_as_these(ladder):
     shots = cut(1, 4, 32, 30)
     size, segments = encoded(shots, ladder=ladder)

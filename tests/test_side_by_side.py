@@ -57,7 +57,7 @@ def size_of(positions: np.ndarray, bound: float, **options) -> int:
 
 
 def test_points_of_plants_that_move_unlike_each_other_cost_little_more_than_apart():
-    one, other = crown(1), stems(2) + [0.8, 0, 0]
+    one, other = crown(1, 800), stems(2, 20) + [0.8, 0, 0]
     apart = size_of(one, 1e-4, ladder="none") + size_of(other, 1e-4, ladder="none")
     assert size_of(np.concatenate([one, other], axis=1), 1e-4, ladder="none") < 1.3 * apart
 

@@ -111,9 +111,13 @@ def test_a_plant_whose_trunk_stands_still_stays_whole():
     assert still_parts(MotionClip(positions, tree.time, edges=None), 0.0) is None
 
 
-@pytest.mark.parametrize("ladder", ["none", "decades"])
+@pytest.mark.parametrize("ladder", ["none", pytest.param("decades", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
-    ("named", "ways"), [(True, ((0.25, 1.0), (1.0, 1.0), (0.5, 0.5))), (False, ((1.0, 1.0),))], ids=["named", "found"]
+    ("named", "ways"),
+    [
+        pytest.param(True, ((0.25, 1.0), (1.0, 1.0), (0.5, 0.5)), marks=pytest.mark.slow, id="named"),
+        pytest.param(False, ((1.0, 1.0),), id="found"),
+    ],
 )
 def test_a_plant_on_a_turntable_costs_a_few_hundred_bytes_more_than_one_that_stands(named, ways, ladder):
     """`named`: whether the clip names its branches, or they are found. `ways`: whole turns, and the part of the clip
@@ -207,7 +211,7 @@ def test_what_stands_still_does_not_make_the_rest_pose_of_what_moves_finer():
 def test_modes_of_what_moves_fit_the_rest_pose_that_is_coded_with_what_stands_still():
     """Modes that take back how the rest pose is rounded were either learned about the pose of what moves alone, which
     fits only by luck, or not at all beside what stands still."""
-    scene = singles.tree_on_terrain(side=100).without_faces()
+    scene = singles.tree_on_terrain(side=30).without_faces()
     bound = 1.02 * bound_of(scene.clip.positions)
     alone = sum(size_of(scene.part(plant), bound) for plant in np.unique(scene.plant))
     assert size_of(scene.bare(), bound) <= 1.05 * alone
@@ -294,8 +298,21 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize(("ladder", "more"), [("none", 500), ("decades", 800)])
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    ("name", "ladder", "more"),
+    [
+        ("wheat", "decades", 800),
+        ("tubes", "none", 500),
+        *(
+            pytest.param(name, ladder, more, marks=pytest.mark.slow)
+            for name, ladder, more in [
+                ("wheat", "none", 500),
+                ("tubes", "decades", 800),
+                *((scene, *limit) for scene in ("hedge", "kelp") for limit in (("none", 500), ("decades", 800))),
+            ]
+        ),
+    ],
+)
 def test_several_plants_on_one_turntable_turn_once(name, ladder, more):
     clip = bare(SCENES[name]().clip)
     standing, turning = (size_of(one, bound_of(clip.positions), ladder=ladder) for one in (clip, on_a_table(clip)))

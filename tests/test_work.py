@@ -137,7 +137,7 @@ def test_rotations_that_trials_show_to_be_larger_are_not_taken_where_work_ends(m
     assert len(athcodec.encode(clip, rel_error=1e-4)) <= 1.01 * usual
 
 
-@pytest.mark.parametrize("share", [0.5, 0.35])
+@pytest.mark.parametrize("share", [0.35, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_leaves_hung_in_many_orders_are_hardly_larger_where_work_is_short(share, monkeypatch):
     """Each trial of a deep hierarchy takes much work: time bases, which save most, may not wait for other choices, and
     of two refinements the one that is smaller by trials is coded."""

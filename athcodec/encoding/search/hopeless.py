@@ -11,7 +11,7 @@ import numpy as np
 from athcodec.encoding.segments.settings import Settings
 
 TOO_LARGE = 1.08  # Bytes in waves, over the fewest on other branches, above which time bases make up for nothing.
-CLEARLY_LARGER = 1.08  # Bytes with time bases of one kind, over the other, above which the one is not tried again.
+CLEARLY_LARGER = 1.02  # Bytes with time bases of one kind, over the other, above which the one is not tried again.
 
 
 @dataclass
