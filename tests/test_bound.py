@@ -28,7 +28,7 @@ from athcodec.errors import BoundError, ClipError, CoarseWarning
 from athcodec.metrics import ErrorMeter
 
 
-@pytest.mark.parametrize("count", [10, pytest.param(3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [25, pytest.param(3000, marks=pytest.mark.slow)])
 def test_no_attack_breaks_a_promise(count, scratch):
     @settings(STEADY, max_examples=count)
     @given(attacks())

@@ -87,13 +87,15 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit 1 if a file differs")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
+        built = Path(folder) / "web"  # A temporary folder itself is for nobody else, and copies of it would be.
+        built.mkdir()
         try:
-            build(Path(folder))
+            build(built)
         except BuildError as error:
             print(f"build_viewer: {error}", file=sys.stderr)
             return 1
-        different = differences(Path(folder), WEB)
-        size = own_bytes(Path(folder))
+        different = differences(built, WEB)
+        size = own_bytes(built)
         if size > MOST_BYTES:
             print(f"build_viewer: got {size:,} bytes, expected at most {MOST_BYTES:,}", file=sys.stderr)
             return 1
@@ -106,8 +108,7 @@ def main() -> int:
             return 1
         if different:
             shutil.rmtree(WEB, ignore_errors=True)
-            shutil.copytree(folder, WEB)
-            WEB.chmod(0o755)  # That of a temporary folder is for nobody else.
+            shutil.copytree(built, WEB)
     done = f"{', '.join(different)} written" if different else "up to date"
     print(f"web: {size:,} bytes of our own, compressed, {done}")
     return 0
