@@ -26,9 +26,11 @@ var zstd=(()=>{var t=Object.defineProperty;var wr=Object.getOwnPropertyDescripto
 function normals(positions, { array, columns = 0, counts = null }) {
 const out = new Float64Array(positions.length), faces = counts ? counts.length : array.length / columns, middle = [0, 0, 0];
 for (let face = 0, first = 0; face < faces; face++) {
-const size = counts ? Number(counts[face]) : columns;
+const size = counts ? Number(counts[face]) : columns, normal = [0, 0, 0];
 for (let k = 1; k + 1 < size; k++)
-add(out, positions, Number(array[first]), Number(array[first + k]), Number(array[first + k + 1]));
+add(normal, positions, 3 * Number(array[first]), 3 * Number(array[first + k]), 3 * Number(array[first + k + 1]));
+for (let corner = first; corner < first + size; corner++)
+for (let k = 0; k < 3; k++) out[3 * Number(array[corner]) + k] += normal[k];
 first += size;
 }
 for (let i = 0; i < out.length; i++) middle[i % 3] += 3 * positions[i] / out.length;
@@ -40,18 +42,12 @@ for (let k = 0; k < 3; k++) out[at + k] /= length;
 }
 return Float32Array.from(out);
 }
-function add(out, p, a, b, c) {
-a *= 3;
-b *= 3;
-c *= 3;
+function add(normal, p, a, b, c) {
 const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
 const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
-const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
-for (const at of [a, b, c]) {
-out[at] += nx;
-out[at + 1] += ny;
-out[at + 2] += nz;
-}
+normal[0] += uy * vz - uz * vy;
+normal[1] += uz * vx - ux * vz;
+normal[2] += ux * vy - uy * vx;
 }
 const OK = 0, BAD_CHUNK = 9, MORE = 64, HELD = 65, MISSING = 66, NOT_PREPARED = 67, NO_MEMORY = 68, BAD_ARGUMENT = 69;
 const ORDERS = { file: 0, source: 1 };

@@ -3,7 +3,7 @@
 
 const FIRST_BYTES = 12 << 10; // as the download's first request
 
-// Hands the pieces of a whole file to whoever gets the port, as they come: null is the end, and false a connection that was cut
+// Hands the pieces of an answer to whoever gets the port, as they come: null is the end, and false a connection that was cut
 // off. Any answer ends the download.
 function piecesOf(body, stop) {
   const { port1, port2 } = new MessageChannel(), reader = body.getReader();
@@ -22,8 +22,8 @@ async function frontOf(url) {
   try {
     const answer = await fetch(url, { headers: { Range: `bytes=0-${FIRST_BYTES - 1}` }, cache: "no-store", signal: stop.signal });
     const { status } = answer, headers = [...answer.headers];
-    if (status === 206) return { status, headers, bytes: await answer.arrayBuffer() };
-    if (status === 200) return { status, headers, bytes: piecesOf(answer.body, stop) }; // from a server without ranges
+    // A server without ranges answers with the whole file, and status 200.
+    if (status === 206 || status === 200) return { status, headers, port: piecesOf(answer.body, stop) };
     stop.abort();
   } catch {
     // The loader tries it several times.

@@ -479,7 +479,7 @@ export class ATHLoader extends Loader {
   }
 
   /** Takes what a page has begun before this module was there: a `worker` that runs ath_worker.js and, where the `url` of a file
-   * is known, its `front`, a promise of {status, headers, bytes} of an answer to a request for its first bytes, or of null. */
+   * is known, its `front`, a promise of {status, headers, port} of an answer to a request for its first bytes, or of null. */
   takeOver({ worker, url = null, front = null }) {
     this.#add(worker);
     this.begun = { url, front };
@@ -523,7 +523,7 @@ export class ATHLoader extends Loader {
   async #openUrl(url, options, onProgress) {
     const { clip, hostMesh, bandwidth, begun } = this, front = begun?.url === url && bandwidth === null ? await begun.front : null;
     this.begun = null;
-    return this.#open({ url, options: { ...options, front }, clip, hostMesh, bandwidth }, front ? [front.bytes] : [], onProgress);
+    return this.#open({ url, options: { ...options, front }, clip, hostMesh, bandwidth }, front ? [front.port] : [], onProgress);
   }
 
   async #open(message, transfer, onProgress) {

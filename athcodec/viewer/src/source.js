@@ -84,18 +84,17 @@ export class PacedSource {
   }
 }
 
-// The bytes of an answer that a page has begun to read: a buffer, or a stream of the pieces that come by a port.
-function bodyOf(bytes, signal) {
-  if (!(bytes instanceof MessagePort)) return bytes;
+// The body of an answer that a page has begun to read, the pieces of which come by a port.
+function bodyOf(port, signal) {
   return new ReadableStream({
     start(controller) {
-      bytes.onmessage = ({ data }) => {
+      port.onmessage = ({ data }) => {
         if (data) controller.enqueue(data);
         else if (data === null) controller.close();
         else controller.error(new TypeError("connection cut off"));
       };
       signal.addEventListener("abort", () => {
-        bytes.postMessage("stop");
+        port.postMessage("stop");
         controller.error(signal.reason);
       });
     },
@@ -148,7 +147,7 @@ export class HttpSource {
     this.requests++;
     const front = offset === 0 ? this.#front : null;
     this.#front = null;
-    const answer = front ? new Response(bodyOf(front.bytes, this.#abort.signal), front) : await fetch(this.url, {
+    const answer = front ? new Response(bodyOf(front.port, this.#abort.signal), front) : await fetch(this.url, {
       headers: { ...headers, Range: `bytes=${offset}-${offset + size - 1}` }, credentials, signal: this.#abort.signal,
       cache: "no-store", // browsers' caches let ranges of one file wait for each other, and ask for some twice
     });
