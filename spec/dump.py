@@ -2,7 +2,8 @@
 
     python -m spec.dump spec/vectors/valid/traced.ath
 
-Fields and streams are read with the code of FORMAT.md. A file may have one segment and one layer.
+Fields and streams are read with the code of FORMAT.md. What is said of a field holds for files of one branch, one segment and
+one layer with an exact rest pose; other files are refused.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ def parts(data: bytes) -> Iterator[Part]:
     """Yield the parts of a file in order, as pairs of a number of bytes and a text that says what they mean."""
     file = rules.open_file(data, True)
     header, table = rules.decode_front(data[24 : rules.u32(data, 16) - 4 * rules.u32(data, 20)], rules.u32(data, 20))
+    check(data, file, header, table)
     yield 8, "Magic"
     yield 1, f"Major_Version {data[8]}"
     yield 1, f"Minor_Version {data[9]}"
@@ -53,6 +55,26 @@ def parts(data: bytes) -> Iterator[Part]:
         content = data[at : at + chunk[3]]
         yield from described(file, chunk, content) if content else []
         at += chunk[3]
+
+
+def check(data: bytes, file, header, table: list) -> None:
+    """Raise ValueError unless the sentences of this module hold for a file."""
+    methods, at = {}, rules.u32(data, 16)
+    for kind, _, _, length in table:
+        methods[kind] = data[at] if length else None
+        at += length
+    told = {rules.HIERARCHY, rules.REST, rules.TIME, rules.STEMS}
+    counts = {word: getattr(header, word + "_count") for word in ("branch", "segment", "layer", "clip")}
+    reasons = [f"{word.title()}_Count {count}" for word, count in counts.items() if count != 1]
+    reasons += sorted({f"a chunk {KIND_NAMES.get(chunk[0], chunk[0])}" for chunk in table if chunk[0] not in told})
+    reasons += [] if methods[rules.REST] == rules.IS_EXACT else ["a rest pose that is not exact, or not of binary32"]
+    reasons += [] if methods[rules.TIME] == 1 else ["times without a rate"]
+    reasons += [] if at == len(data) else [f"{len(data) - at} bytes behind its chunks"]
+    if reasons:
+        raise ValueError(
+            f"got a file with {', '.join(reasons)}, expected one of one branch, one segment and one layer whose rest pose is "
+            "exact, such as spec/vectors/valid/traced.ath; athcodec info FILE.ath describes any file"
+        )
 
 
 def name(kind: int, level: int | None, segment: int, length: int) -> str:
@@ -117,4 +139,7 @@ def rows(file, level: int, segment: int) -> str:
 
 
 if __name__ == "__main__":
-    print("\n".join(lines(Path(sys.argv[1]).read_bytes())))
+    try:
+        print("\n".join(lines(Path(sys.argv[1]).read_bytes())))
+    except ValueError as error:
+        sys.exit(f"{sys.argv[1]}: {error}")

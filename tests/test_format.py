@@ -135,6 +135,11 @@ def test_the_dump_is_that_of_a_vector_as_the_command_prints_it(spec):
         assert decoder.positions()[0, 2].tolist() == [float(x) for x in rows["as put out"].split(", ")]
 
 
+def test_a_file_that_the_dump_has_no_words_for_is_refused():
+    with pytest.raises(ValueError, match="Branch_Count 2.*describes any file"):
+        list(dump_lines((VALID / "two-roots.ath").read_bytes()))
+
+
 EXAMPLE = bytes.fromhex("ffd134")  # the stream of "Worked example"
 # What the table "A way for a first decoder" says works after a step, of a file that it names, by a decoder.
 WORKS: dict[int, Callable[[ModuleType, bytes], object]] = {
