@@ -2,8 +2,8 @@
 
     python -m spec.dump spec/vectors/valid/traced.ath
 
-Fields and streams are read with the code of FORMAT.md. What is said of a field holds for files of one branch, one segment and
-one layer with an exact rest pose; other files are refused.
+Fields and streams are read with the code of FORMAT.md. What is said of a field holds for files of one branch, one
+segment and one layer with an exact rest pose; other files are refused.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ def check(data: bytes, file, header, table: list) -> None:
     reasons += [] if at == len(data) else [f"{len(data) - at} bytes behind its chunks"]
     if reasons:
         raise ValueError(
-            f"got a file with {', '.join(reasons)}, expected one of one branch, one segment and one layer whose rest pose is "
-            "exact, such as spec/vectors/valid/traced.ath; athcodec info FILE.ath describes any file"
+            f"got a file with {', '.join(reasons)}, expected one of one branch, one segment and one layer whose "
+            "rest pose is exact, such as spec/vectors/valid/traced.ath; athcodec info FILE.ath describes any file"
         )
 
 

@@ -136,7 +136,7 @@ def test_the_dump_is_that_of_a_vector_as_the_command_prints_it(spec):
 
 
 def test_a_file_that_the_dump_has_no_words_for_is_refused():
-    with pytest.raises(ValueError, match="Branch_Count 2.*describes any file"):
+    with pytest.raises(ValueError, match="Branch_Count 4.*describes any file"):
         list(dump_lines((VALID / "two-roots.ath").read_bytes()))
 
 
