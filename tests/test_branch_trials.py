@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import itertools
 
 import numpy as np
 import pytest
+from plants import blown_tree, diagonal
 
 import athcodec
 from athcodec import MotionClip
@@ -98,3 +100,19 @@ def test_a_plant_is_not_divided_where_that_saves_less_than_trials_err_by(of_torn
     monkeypatch.setattr(branch_trials, "candidates", lambda clip, by_points: iter([single, torn]))
     monkeypatch.setattr(Trial, "size", lambda self, branches: (of_torn if branches is torn else 1010.0, False))
     assert best_branches(hedge, BOUND, Work())[0] is (torn if is_torn else single)
+
+
+def test_runs_of_points_that_tremble_by_a_small_part_of_the_bound_are_tried():
+    clip = blown_tree(3, branches=60, frames=40)
+    order = np.random.default_rng(5).permutation(clip.vertex_count)
+    points = clip.block(0, clip.frame_count).astype(np.float64)[:, order]
+    trembling = points + np.random.default_rng(1).normal(0, 0.01 * BOUND.rel_error * diagonal(clip), points.shape)
+
+    def size(positions: np.ndarray) -> int:
+        data = io.BytesIO()
+        athcodec.encode(
+            MotionClip(positions.astype(np.float32), clip.time), data, rel_error=BOUND.rel_error, ladder="none"
+        )
+        return len(data.getvalue())
+
+    assert size(trembling) < 1.4 * size(points)

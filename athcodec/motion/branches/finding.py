@@ -21,7 +21,7 @@ from athcodec.motion.branches.centre_lines import line_branches
 from athcodec.motion.branches.common_motion import carried
 from athcodec.motion.branches.grown_pose import with_grown_pose
 from athcodec.motion.branches.patches import rigid_patches
-from athcodec.motion.branches.point_runs import base_points, run_links
+from athcodec.motion.branches.point_runs import CROWDED, DOUBTFULLY_CROWDED, base_points, run_links
 from athcodec.motion.branches.result import Found, order_of
 from athcodec.motion.branches.seen import Seen, affine_share, components, links_of, numbered, parts_of
 from athcodec.motion.branches.steady import scipy_module
@@ -115,6 +115,11 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     if first is not None and not seen.growing:
         yield first
     if not len(seen.mesh):
+        doubtful = (
+            _by_runs(seen, None, DOUBTFULLY_CROWDED) if first is None and by_points and not seen.growing else None
+        )
+        if doubtful is not None:
+            yield doubtful
         yield from _of_bodies(seen)
         return
     grown = seen.by_contact()  # Patches of one mesh hang on each other.
@@ -444,16 +449,17 @@ def _by_components(seen: Seen, root: int | None) -> Found | None:
     return arranged(seen, label, root, "components")
 
 
-def _by_runs(seen: Seen, root: int | None) -> Found | None:
+def _by_runs(seen: Seen, root: int | None, crowded: float = CROWDED) -> Found | None:
     """Return branches such as blades, needles and strands, for points that nothing joins, by linking points that keep
-    their distance, or, if plants grow, those that never are far apart; None if the points form no such runs.
+    their distance, or, if plants grow, those that never are far apart; None if the points form no such runs. `crowded`:
+    as for `run_links`.
     """
     if len(seen.mesh):
         return None
     if seen.growing:
         return _of_growing(seen, seen.growing[0], root)
     frames = seen.frames[1:]  # The rest pose may have links of other lengths.
-    links = run_links(seen.frames_of_roots[1:])
+    links = run_links(seen.frames_of_roots[1:], crowded)
     if links is None:
         return None
     bases = base_points(frames, links, root)

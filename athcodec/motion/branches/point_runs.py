@@ -27,13 +27,15 @@ UNLIKE = 4.0  # Its other links must change more than this many times as much.
 OFF_LINE = 0.5  # Part of a link's length that a still point behind it may be off its line.
 CROWD = 1.5  # Part of the length of a point's links within which other steady points are no neighbours on a run.
 CROWDED = 0.25  # Such pairs for each point that make the points a sheet or a body.
+DOUBTFULLY_CROWDED = 1.0  # The same where a trial decides: noise makes pairs of neighbouring runs as steady as links.
 SCATTERED = 0.05  # Links for each point, among its nearest ones, below which points form no runs.
 JOINED = 0.5  # Smallest share of the points that must be linked; with fewer, the points form no runs.
 
 
-def run_links(frames: np.ndarray) -> np.ndarray | None:
+def run_links(frames: np.ndarray, crowded: float = CROWDED) -> np.ndarray | None:
     """Return the links between points that lie next to each other on a run, such as a blade or a strand, (L, 2) without
-    cycles; None if the points form no runs. `frames`: (F, N, 3) positions in a few frames.
+    cycles; None if the points form no runs. `frames`: (F, N, 3) positions in a few frames; `crowded`: pairs for each
+    point, beside those that are linked, above which the points are no runs.
     """
     frames = np.ldexp(frames, -np.frexp(np.abs(frames).max())[1])  # Squares of tiny or huge positions would be lost.
     count, steady = frames.shape[1], _Steady(frames)
@@ -41,7 +43,7 @@ def run_links(frames: np.ndarray) -> np.ndarray | None:
     for turn in range(ROUNDS):
         steady.add(near_pairs(frames[-turn % len(frames), loose], loose))
         links, before = steady.tree(), len(links)
-        if turn == 0 and (steady.beside(links) > CROWDED * count or len(links) < SCATTERED * count):
+        if turn == 0 and (steady.beside(links) > crowded * count or len(links) < SCATTERED * count):
             return None
         if len(links) == before:
             break
