@@ -21,6 +21,8 @@ from athcodec.motion.branches.finding import candidates
 from athcodec.motion.branches.result import Found
 from bench.scenes import fields, singles
 
+pytestmark = pytest.mark.sizes
+
 BOUND = BoundOption(rel_error=1e-4)
 
 

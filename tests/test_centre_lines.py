@@ -12,6 +12,8 @@ from athcodec.errors import ClipError
 from athcodec.motion.hierarchy import hierarchy_of
 from bench.odd.growing import growth, growth_in_wind
 
+pytestmark = pytest.mark.sizes
+
 SEED = 6
 
 

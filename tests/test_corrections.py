@@ -10,6 +10,8 @@ from athcodec.encoding.model.motion import Plan
 from athcodec.encoding.segments import segment
 from athcodec.encoding.streams import streams
 
+pytestmark = pytest.mark.sizes
+
 VERTICES, FRAMES = 40, 96
 NOWHERE = np.zeros(3)
 

@@ -30,6 +30,8 @@ from bench.trees.mesh import dress
 from bench.trees.ride import rotations
 from bench.trees.wind import Wind
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = 24
 
 

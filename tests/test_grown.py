@@ -9,6 +9,8 @@ import pytest
 import athcodec
 from athcodec.motion.branches.grown_pose import grown_pose, with_grown_pose
 
+pytestmark = pytest.mark.sizes
+
 ORGANS = 10  # leaves of the plant
 VERTICES = 20  # vertices of each leaf
 FRAMES = 24  # a second

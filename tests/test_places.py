@@ -15,6 +15,8 @@ from athcodec.encoding.options.features import Feature
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.places import Places
 
+pytestmark = pytest.mark.sizes
+
 ALONE = {"attributes": "none", "ladder": "none", "rest_error": "bound"}
 
 

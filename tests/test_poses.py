@@ -19,6 +19,8 @@ from bench.odd.bending import scanned_tree
 from bench.scenes import fields
 from bench.scenes.assembly import bare
 
+pytestmark = pytest.mark.sizes
+
 OPTIONS = {"rel_error": 1e-4, "segment_frames": 16, "tam": athcodec.Thresholds(0, 0, 0, 0)}  # not predicted
 
 

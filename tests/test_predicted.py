@@ -22,6 +22,8 @@ from athcodec.metrics import SmoothnessMeter
 from bench.odd.growing import unfolding_leaves
 from spec.document import File
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = 60
 
 

@@ -11,6 +11,8 @@ from athcodec import MotionClip, encoding
 from athcodec._native import LOOSE
 from bench.odd.growing import growth
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = 60  # Frames of a scene, 2 s, in which growth comes to its end.
 STEMS = 40  # Stems that sway: about as many vertices as the plant that grows has, or twice that.
 POINTS = 24  # Vertices of each stem, a single piece.

@@ -20,6 +20,8 @@ from bench.data import Canopy
 from bench.scenes import fields
 from bench.scenes.assembly import bare
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = 32
 MOST = 1.05  # Size on branches that are found, over that on true ones.
 

@@ -13,6 +13,8 @@ from athcodec import MotionClip
 from athcodec.motion.branches.rows import row_places
 from athcodec.motion.polygons import sides
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = 24
 
 

@@ -5,6 +5,8 @@ import pytest
 
 import athcodec
 
+pytestmark = pytest.mark.sizes
+
 
 def fluttering(seed, frames, rows=8, columns=3):
     """Return (frames, rows * columns, 3) positions of a leaf that is held at its foot and swings in a few modes."""

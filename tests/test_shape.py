@@ -12,6 +12,8 @@ import athcodec
 from athcodec.cli import main
 from athcodec.errors import BoundError
 
+pytestmark = pytest.mark.sizes
+
 
 @pytest.fixture(scope="module")
 def tree():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 
 import numpy as np
+import pytest
 
 from athcodec.encoding.encoder import encode_clip
 from athcodec.encoding.model.kinds import plant_kinds
@@ -16,6 +17,8 @@ from athcodec.motion.branches.result import Found
 from athcodec.motion.clip import MotionClip
 from athcodec.motion.hierarchy import build_hierarchy
 from bench.scenes import singles
+
+pytestmark = pytest.mark.sizes
 
 FRAMES = 60
 

@@ -24,6 +24,8 @@ from bench.scenes.assembly import Assembly, bare
 from bench.scenes.stems import bent, headings, ribbons, tubes
 from bench.trees.ride import sideways
 
+pytestmark = pytest.mark.sizes
+
 SINGLE = {"ladder": "none", "attributes": "none", "rest_error": "bound", "jobs": 1}
 
 

@@ -46,4 +46,4 @@ def test_what_passed_and_failed_is_counted_with_its_date_and_commit(ran):
 
 
 def test_every_tier_of_the_tests_can_be_run():
-    assert tiers.tiers() == "first formats web tools vectors slow programs browser machines".split()
+    assert tiers.tiers() == "first sizes formats web tools vectors slow programs browser machines".split()

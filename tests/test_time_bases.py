@@ -20,6 +20,8 @@ from bench.odd.bending import FPS, Bones, clip_of, gusty
 from bench.trees.plant import grow
 from spec.document import File
 
+pytestmark = pytest.mark.sizes
+
 
 def hit_by_a_gust(seed: int = 5, frames: int = 60, after: float = 1.0) -> athcodec.MotionClip:
     """A calm shrub that bends once, after so many seconds."""

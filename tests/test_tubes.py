@@ -16,6 +16,8 @@ from bench.scenes.assembly import Assembly
 from bench.scenes.stems import bent, swayed, tubes
 from bench.trees.ride import sideways
 
+pytestmark = pytest.mark.sizes
+
 SIDES, RINGS, TWIGS = 6, 12, 9
 RADIUS = 0.004
 

@@ -10,6 +10,8 @@ import athcodec
 from athcodec.encoding.model.motion import Waves, waves_over_time
 from spec.document import File, rules
 
+pytestmark = pytest.mark.sizes
+
 FRAMES = (1, 2, 3, 4, 5, 8, 31, 64, 121, 200, 255, 256, 270)
 
 

@@ -19,6 +19,8 @@ from athcodec.motion.branches.result import with_branches
 from bench import odd
 from bench.scenes import fields, singles
 
+pytestmark = pytest.mark.sizes
+
 
 def sheet(**options) -> MotionClip:
     return odd.MAKERS["rippling_sheet"](seed=1, **{"side": 16, "frames": 40, "bumps": 5} | options)
