@@ -261,6 +261,12 @@ def test_a_hostile_file_is_refused_and_a_whole_one_plays_within_limits(small_ath
     assert hostile.within_limits(hostile.repaired(data)) > 0
 
 
+def test_the_time_of_a_file_is_measured_beside_what_its_counts_determine(small_ath):
+    seconds, size = hostile.seconds_and_bytes(small_ath.read_bytes())
+    with athcodec.open(small_ath) as decoder:
+        assert seconds > 0 and size > small_ath.stat().st_size + decoder.positions().nbytes
+
+
 def test_the_report_on_robustness_is_that_of_its_record():
     spec = ROOT / "spec"
     record = json.loads((spec / "robustness.json").read_text("utf-8"))

@@ -197,8 +197,9 @@ def seconds_and_bytes(data: bytes) -> tuple[float, int]:
     decoder = athcodec.open(BytesIO(data))
     decoded = sum(block.nbytes for _, block in decoder.blocks())
     seconds = time.perf_counter() - start
-    work = decoder.file.core.work_size() + decoder.file.core.segment_size(decoder.file.level_count - 1)
-    memory = len(decoder.file.core._memory) + len(decoder.file.core._build) + work * len(decoder.segments)
+    core, deepest = decoder.file.core, decoder.file.level_count - 1
+    work = core.work_size() + core.segment_size(deepest)
+    memory = len(core._memory) + core.refinement_size(deepest) + work * len(decoder.segments)
     memory += CHUNK_BYTES * decoder.file.tables.header.chunk_count
     return seconds, len(data) + decoded + decoder.file.rest.nbytes + memory
 
