@@ -94,6 +94,7 @@ function bodyOf(port, signal) {
         else controller.error(new TypeError("connection cut off"));
       };
       signal.addEventListener("abort", () => {
+        port.onmessage = null; // Pieces may be on their way.
         port.postMessage("stop");
         controller.error(signal.reason);
       });
