@@ -257,7 +257,8 @@ def test_readers_are_given_a_seed_of_their_kind(kind, tmp_path):
 
 def test_a_hostile_file_is_refused_and_a_whole_one_plays_within_limits(small_ath):
     data = small_ath.read_bytes()
-    assert hostile.prefix_strictly(data, len(data) // 2) == 0
+    assert hostile.prefix_strictly(data, len(data) // 2) == hostile.prefix_as_a_stream(data, len(data) // 2) == 0
+    assert hostile.too_long(data, b"more") == 0
     assert hostile.within_limits(hostile.repaired(data)) > 0
 
 
