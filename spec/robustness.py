@@ -88,6 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     args = arguments(argv)
     record = args.out / "robustness.json"
+    args.out.mkdir(parents=True, exist_ok=True)  # before minutes of work
     results = json.loads(record.read_text()) if record.exists() else {}
     faults = 0
     for name in args.only or classes():
