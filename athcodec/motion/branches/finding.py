@@ -115,9 +115,7 @@ def _candidates(seen: Seen, by_points: bool) -> Iterator[Found]:
     if first is not None and not seen.growing:
         yield first
     if not len(seen.mesh):
-        doubtful = (
-            _by_runs(seen, None, DOUBTFULLY_CROWDED) if first is None and by_points and not seen.growing else None
-        )
+        doubtful = _by_runs(seen, None, DOUBTFULLY_CROWDED) if first is None else None
         if doubtful is not None:
             yield doubtful
         yield from _of_bodies(seen)
